@@ -1,0 +1,3 @@
+"""Glowtree: interactive progressive radiosity on the GPU."""
+
+__version__ = "0.1.0"

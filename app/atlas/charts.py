@@ -1,0 +1,54 @@
+"""Where each lit side of each triangle lies in the virtual atlas.
+
+The *virtual atlas* is one rectangle of W×H texels at the root level, cut into tiles of 16×16. A *face* is one side of a
+triangle that light can reach (a double-sided triangle has two faces). Faces that unfold together are a *chart*: one
+axis-aligned chart for each flat rectangle, xatlas for the rest. Charts keep ``GAP`` empty texels between them, so that
+bilinear look-ups and filled gutters never bleed, and start at multiples of ``ALIGN`` texels, so that the 4×4 patches that
+shoot are whole. A *facet* is a connected flat piece of one chart: nothing in it can hide anything else in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+TILE = 16  # texels along the edge of a leaf tile [Coombe03, 4.1]
+GAP = 2  # empty texels between charts: one gutter texel for each neighbour
+ALIGN = 4  # charts start at multiples of the default shooting patch (mip level 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Charts:
+    """The unfolding of a scene's lit sides into the virtual atlas.
+
+    size: (W, H) texels, multiples of TILE.
+    density: texels per metre that was aimed at.
+    face_triangle (f,) i32: the scene's triangle; face_back (f,) bool: whether it is its back side.
+    face_uv (f, 3, 2) f64: atlas position [texels] of the triangle's corners, in the triangle's own corner order.
+    face_chart (f,) i32 in [0, chart_count); face_facet (f,) i32 in [0, facet_count).
+    chart_rects (c, 4) i32: x, y, width, height of each chart in whole texels.
+    dark_faces: number of sides left out because nothing in the scene lies in front of them.
+    method: how the charts were made, e.g. ``12 rectangles, 932 xatlas charts``.
+    """
+
+    size: tuple[int, int]
+    density: float
+    face_triangle: NDArray[np.int32]
+    face_back: NDArray[np.bool_]
+    face_uv: NDArray[np.float64]
+    face_chart: NDArray[np.int32]
+    face_facet: NDArray[np.int32]
+    chart_rects: NDArray[np.int32]
+    dark_faces: int
+    method: str
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def chart_count(self) -> int:
+        return len(self.chart_rects)
+
+    @property
+    def facet_count(self) -> int:
+        return int(self.face_facet.max(initial=-1)) + 1

@@ -1,0 +1,178 @@
+"""The light on every texel, on the GPU: what solvers write and everything else reads.
+
+Node-set textures hold the leaf tiles of 16×16 texels side by side [Coombe03, 4.2]:
+
+    t_position_area  RGBA32F  centroid p (solver frame), area A (solver frame; 0 = nothing here)
+    t_normal_ids     RG32UI   unit normal (octahedral, 2×snorm16), facet << MATERIAL_BITS | material (facet from 1)
+    t_irradiance     storage  H [W/m²]: light received so far, so that radiosity B = E + ρH at any ρ, also 0
+    t_residual       storage  r [W/m²]: exitance not yet shot
+    t_albedo, t_emission      only where a material has such a texture: the factor is in the material table
+
+and tables: t_pages (tile number from 1 of each 16×16 cell of the virtual atlas), t_facets, t_materials, t_tile_bounds.
+The solver frame is centred on the scene and scaled by its half diagonal, so answers do not depend on unit or origin. H and r
+are stored relative to the largest exitance, which keeps half floats in range and is what 8-bit fixed point needs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.charts import Charts
+from app.atlas.node_set import VERTEX_FORMAT, Frame, NodeSet
+from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
+from app.scene.model import F32, F64, Material, Scene
+
+STORAGE = {"rgba32f": "f4", "rgba16f": "f2", "fixed8": "f1"}  # name: moderngl dtype
+_DTYPES = {"f4": np.float32, "f2": np.float16, "f1": np.uint8}
+_BYTES = {"f4": 4, "u4": 4, "f2": 2, "f1": 1}
+
+
+class Lightmap:
+    """Texel surfaces, irradiance H and residual r of one scene. Whoever makes it releases it.
+
+    Made from a NodeSet, or at once from a scene and its charts. tiles: leaf tiles; columns, rows: of the node set in tiles;
+    size: in texels; unit: W/m² per stored unit of H and r.
+    """
+
+    def __init__(self, gpu: Gpu, nodes: NodeSet, *, storage: str = "rgba32f") -> None:
+        self.gpu, self.nodes, self.scene, self.charts = gpu, nodes, nodes.scene, nodes.charts
+        self.frame: Frame = nodes.frame
+        self.tiles, self.columns, self.rows, self.size = nodes.tiles, nodes.columns, nodes.rows, nodes.size
+        self._textures = {name: self._upload(array) for name, array in nodes.arrays.items()}
+        self._emit = Pass(gpu, "lightmap/emit", defines=self.defines("MATERIAL_BITS", "EMISSION_TEXTURE"))
+        self.mesh = Mesh(gpu, nodes.vertices.tobytes(), VERTEX_FORMAT)
+        self._targets: list[Framebuffer] = []
+        self.set_storage(storage)
+
+    @staticmethod
+    def of(gpu: Gpu, scene: Scene, charts: Charts, *, storage: str = "rgba32f") -> Lightmap:
+        return Lightmap(gpu, NodeSet(scene, charts), storage=storage)
+
+    # -- what passes bind ----------------------------------------------------------------------------------------------
+
+    def defines(self, *names: str) -> dict[str, object]:
+        """Those shader defines that follow from the scene: look-ups exist only where a texture does."""
+        values: dict[str, object] = {
+            "MATERIAL_BITS": self.nodes.material_bits,
+            "ALBEDO_TEXTURE": "t_albedo" in self._textures,
+            "EMISSION_TEXTURE": "t_emission" in self._textures,
+        }
+        return {name: values[name] for name in names}
+
+    def texture(self, name: str) -> Texture:
+        return self._textures[name]
+
+    def textures(self, *names: str) -> dict[str, Texture]:
+        """The named textures, to bind; ``t_albedo`` and ``t_emission`` are left out where the scene has none."""
+        optional = {"t_albedo", "t_emission"}
+        return {n: self._textures[n] for n in names if n in self._textures or n not in optional}
+
+    @property
+    def light_target(self) -> Framebuffer:
+        """Attachment 0: irradiance, 1: residual."""
+        return self._targets[0]
+
+    @property
+    def residual_target(self) -> Framebuffer:
+        return self._targets[1]
+
+    # -- state ---------------------------------------------------------------------------------------------------------
+
+    def set_storage(self, storage: str) -> None:
+        """Choose how H and r are stored (a key of STORAGE), and start from no light."""
+        for target in self._targets:
+            target.release()
+        for name in ("t_irradiance", "t_residual"):
+            if name in self._textures:
+                self._textures[name].release()
+            self._textures[name] = self.gpu.texture(self.size, 4, STORAGE[storage])
+        self.storage = storage
+        irradiance, residual = self._textures["t_irradiance"], self._textures["t_residual"]
+        self._targets = [self.gpu.target(irradiance, residual), self.gpu.target(residual)]
+        self.clear()
+
+    def set_materials(self, materials: tuple[Material, ...]) -> None:
+        """Use other albedos and emissions (factors; textures stay) from now on, and start from no light."""
+        self.scene = self.scene.with_materials(materials)
+        self._textures["t_materials"].write(self.nodes.material_table(self.scene).tobytes())
+        self.clear()
+
+    def clear(self) -> None:
+        """H = 0, r = E: nothing has been shot [Coombe03, 3]."""
+        self.unit = max((np.pi * max(m.emission) for m in self.scene.materials), default=0.0) or 1.0
+        self.light_target.clear()
+        self._emit.draw(
+            self.residual_target,
+            textures=self.textures("t_position_area", "t_normal_ids", "t_materials", "t_emission"),
+            uniforms={"u_unit": self.unit},
+        )
+
+    def release(self) -> None:
+        for target in self._targets:
+            target.release()
+        for texture in self._textures.values():
+            texture.release()
+        self.mesh.release()
+
+    # -- read-back -----------------------------------------------------------------------------------------------------
+
+    def irradiance(self) -> F32:
+        """H of every tile (tiles, 16, 16, 3) f32 [W/m²]. Waits for the GPU."""
+        return self._read("t_irradiance")
+
+    def residual(self) -> F32:
+        """r of every tile (tiles, 16, 16, 3) f32 [W/m²]. Waits for the GPU."""
+        return self._read("t_residual")
+
+    def light_at(self, texel: tuple[int, int]) -> tuple[F64, F64]:
+        """H and r [W/m²] of one texel (column, row) of the node set, RGB. Waits for the GPU."""
+        scale = self.unit / (255 if self.storage == "fixed8" else 1)
+        dtype = STORAGE[self.storage]
+        raw = [self.light_target.read((*texel, 1, 1), 3, attachment=i, dtype=dtype, alignment=1) for i in (0, 1)]
+        H, r = (np.frombuffer(data, _DTYPES[dtype]).astype(np.float64) * scale for data in raw)
+        return H, r
+
+    def albedo(self) -> F32:
+        """ρ of every texel (tiles, 16, 16, 3) f32; 0 where nothing is covered."""
+        return self._factor([m.albedo for m in self.scene.materials], self.nodes.albedo_tiles)
+
+    def emission(self) -> F32:
+        """E = πL of every texel (tiles, 16, 16, 3) f32 [W/m²]."""
+        return self._factor([m.emission for m in self.scene.materials], self.nodes.emission_tiles) * np.float32(np.pi)
+
+    def radiosity(self) -> F32:
+        """B = E + ρH of every texel (tiles, 16, 16, 3) f32 [W/m²]. Waits for the GPU."""
+        return self.emission() + self.albedo() * self.irradiance()
+
+    def atlas_image(self, tiles: NDArray[np.generic]) -> NDArray[np.generic]:
+        """Per-tile values (tiles, 16, 16, …) laid out in the virtual atlas (H, W, …), row 0 at v = 0; 0 between charts."""
+        return self.nodes.atlas_image(tiles)
+
+    @property
+    def texel_count(self) -> int:
+        """Texels that cover a surface."""
+        return self.nodes.texel_count
+
+    @property
+    def memory(self) -> dict[str, int]:
+        """Bytes on the GPU, by texture."""
+        return {n: t.width * t.height * t.components * _BYTES[t.dtype] for n, t in self._textures.items()}
+
+    def _upload(self, array: NDArray[np.generic]) -> Texture:
+        """(height, width, components) as a texture of the same type."""
+        height, width, components = array.shape
+        dtype = {"float32": "f4", "float16": "f2", "uint32": "u4"}[array.dtype.name]
+        return self.gpu.texture((width, height), components, dtype, np.ascontiguousarray(array).tobytes())
+
+    def _read(self, name: str) -> F32:
+        texture = self._textures[name]
+        raw = np.frombuffer(texture.read(), _DTYPES[texture.dtype]).reshape(*self.size[::-1], 4)
+        scale = self.unit / (255 if texture.dtype == "f1" else 1)
+        return self.nodes.tiles_from_image(raw)[..., :3].astype(np.float32) * np.float32(scale)
+
+    def _factor(self, factors: list[tuple[float, float, float]], colours: F32 | None) -> F32:
+        surfaces = self.nodes.surfaces
+        material = self.scene.material_ids[self.charts.face_triangle[surfaces.face]]
+        out = np.where((surfaces.face >= 0)[..., None], np.array(factors, np.float32)[material], np.float32(0))
+        return out if colours is None else out * colours

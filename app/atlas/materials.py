@@ -1,0 +1,147 @@
+"""What a material's textures put on each texel: the texture averaged over the texel's footprint.
+
+Mip levels average a texture by area; each texel takes SAMPLES² bilinear look-ups at the level whose pixels are as large
+as what a look-up stands for [Williams83].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.charts import TILE, Charts
+from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents
+from app.scene.model import F32, F64, I32, Scene, Texture
+
+__all__ = ["faces_tangents", "texel_colours"]
+
+SAMPLES = 2  # look-ups along each side of a texel
+BLOCK = 1 << 17  # texels in work at a time
+
+
+def texel_colours(
+    scene: Scene, charts: Charts, leaves: Leaves, surfaces: TexelSurfaces
+) -> tuple[F32 | None, F32 | None]:
+    """Albedo and emission textures on every texel, (n, 16, 16, 3) f32: 1 where the material has no such texture.
+
+    None where no material in use has one. The material's factors are not included.
+    """
+    albedo = {m: material.albedo_texture for m, material in enumerate(scene.materials)}
+    emission = {m: material.emission_texture for m, material in enumerate(scene.materials)}
+    return _colours(scene, charts, leaves, surfaces, albedo), _colours(scene, charts, leaves, surfaces, emission)
+
+
+def _colours(
+    scene: Scene, charts: Charts, leaves: Leaves, surfaces: TexelSurfaces, textures: dict[int, Texture | None]
+) -> F32 | None:
+    face = surfaces.face.reshape(-1)
+    materials = scene.material_ids[charts.face_triangle]
+    colours: F32 | None = None
+    for material in np.unique(materials):
+        texture = textures[int(material)]
+        coordinates = None if texture is None else (scene.uv1 if texture.texcoord else scene.uv0)
+        if texture is None or coordinates is None:
+            continue
+        if colours is None:
+            colours = np.ones((len(face), 3), np.float32)
+        levels = _mip_levels(texture.pixels)
+        lookup = np.concatenate([coordinates, np.ones_like(coordinates[..., :1])], axis=2) @ texture.uv_transform.T
+        mine = np.flatnonzero((face >= 0) & (np.append(materials, -1)[face] == material))
+        for block in np.split(mine, range(BLOCK, len(mine), BLOCK)):
+            f = face[block]
+            at, du, dv = _footprints(charts, leaves, surfaces, scene, f, block, lookup[charts.face_triangle[f]])
+            colours[block] = _average(texture, levels, at, du, dv)
+    return None if colours is None else colours.reshape(*surfaces.face.shape, 3)
+
+
+def _footprints(
+    charts: Charts, leaves: Leaves, surfaces: TexelSurfaces, scene: Scene, face: I32, texel: NDArray[np.int64], uv: F64
+) -> tuple[F64, F64, F64]:
+    """Texture coordinates (n, 2) of the texels' centroids, and their change over one texel along u and along v.
+
+    face, texel (n,); uv (n, 3, 2): texture coordinates of each face's corners.
+    """
+    triangle = charts.face_uv[face]
+    d1, d2 = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
+    t1, t2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    scale = 1 / (d1[:, :1] * d2[:, 1:] - d1[:, 1:] * d2[:, :1])
+    per_u, per_v = (t1 * d2[:, 1:] - t2 * d1[:, 1:]) * scale, (t2 * d1[:, :1] - t1 * d2[:, :1]) * scale
+    # barycentric coordinates of the centroid, dropped onto the face's plane
+    corners = scene.corners[charts.face_triangle[face]]
+    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(e1, e2)
+    squared = np.einsum("nk,nk->n", normal, normal)
+    p = surfaces.position.reshape(-1, 3)[texel] - corners[:, 0]
+    b1 = np.einsum("nk,nk->n", np.cross(p, e2), normal) / squared
+    b2 = np.einsum("nk,nk->n", np.cross(e1, p), normal) / squared
+    at = uv[:, 0] + b1[:, None] * t1 + b2[:, None] * t2
+    size = 0.5 ** leaves.level[texel // (TILE * TILE)][:, None]
+    return at, per_u * size, per_v * size
+
+
+def _average(texture: Texture, levels: list[F32], at: F64, du: F64, dv: F64) -> F32:
+    """Mean of the texture over the parallelograms at ± du/2 ± dv/2, (n, 3)."""
+    height, width = texture.pixels.shape[:2]
+    extent = np.array([width, height])
+    step = np.maximum(np.linalg.norm(du * extent, axis=1), np.linalg.norm(dv * extent, axis=1)) / SAMPLES
+    level = np.clip(np.round(np.log2(np.maximum(step, 1.0))), 0, len(levels) - 1).astype(np.int32)
+    total = np.zeros((len(at), 3))
+    offsets = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
+    for number in np.unique(level):
+        mine = level == number
+        for a in offsets:
+            for b in offsets:
+                total[mine] += _look_up(texture, levels[number], at[mine] + a * du[mine] + b * dv[mine])
+    return (total / SAMPLES**2).astype(np.float32)
+
+
+def _look_up(texture: Texture, pixels: F32, at: F64) -> F32:
+    """One look-up per texture coordinate (n, 2) in one mip level, (n, 3)."""
+    size = np.array([pixels.shape[1], pixels.shape[0]])
+    place = at * size
+    if not texture.bilinear:
+        column, row = (_wrap(np.floor(place[:, k]), int(size[k]), texture.wrap[k]) for k in range(2))
+        return np.asarray(pixels[row, column])
+    low = np.floor(place - 0.5)
+    share = (place - 0.5 - low).astype(np.float32)
+    left, right = (_wrap(low[:, 0] + k, int(size[0]), texture.wrap[0]) for k in range(2))
+    top, bottom = (_wrap(low[:, 1] + k, int(size[1]), texture.wrap[1]) for k in range(2))
+    s, t = share[:, :1], share[:, 1:]
+    upper = pixels[top, left] * (1 - s) + pixels[top, right] * s
+    lower = pixels[bottom, left] * (1 - s) + pixels[bottom, right] * s
+    return np.asarray(upper * (1 - t) + lower * t, np.float32)
+
+
+def _wrap(index: F64, size: int, mode: str) -> NDArray[np.int64]:
+    """Pixel numbers in [0, size) for whole numbers outside it."""
+    if mode == "clamp":
+        return np.asarray(np.clip(index, 0, size - 1), np.int64)
+    if mode == "mirror":
+        back_and_forth = np.mod(index, 2 * size)
+        return np.asarray(np.minimum(back_and_forth, 2 * size - 1 - back_and_forth), np.int64)
+    assert mode == "repeat", mode
+    return np.asarray(np.mod(index, size), np.int64)
+
+
+def _mip_levels(pixels: F32) -> list[F32]:
+    """The image and its area averages at half, a quarter ... of its size, down to one pixel."""
+    levels = [pixels]
+    while max(levels[-1].shape[:2]) > 1:
+        levels.append(_halved(_halved(levels[-1], 0), 1))
+    return levels
+
+
+def _halved(pixels: F32, axis: int) -> F32:
+    """Area average to half the pixels along an axis, rounded down; every old pixel weighs the same."""
+    size = pixels.shape[axis]
+    smaller = max(size // 2, 1)
+    if size == 2 * smaller:
+        even, odd = (pixels.take(np.arange(k, size, 2), axis) for k in range(2))
+        return np.asarray((even + odd) / 2, np.float32)
+    moved = np.moveaxis(pixels, axis, 0).astype(np.float64)
+    running = np.concatenate([np.zeros_like(moved[:1]), np.cumsum(moved, axis=0)])
+    edges = np.arange(smaller + 1) * (size / smaller)
+    below = np.minimum(edges.astype(np.int64), size - 1)
+    share = (edges - below).reshape(-1, *[1] * (moved.ndim - 1))
+    sums = running[below] + share * moved[below]
+    return np.asarray(np.moveaxis(np.diff(sums, axis=0) * (smaller / size), 0, axis), np.float32)

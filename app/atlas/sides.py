@@ -1,0 +1,224 @@
+"""The sides of a scene's triangles that light can reach, and how triangles join into flat facets.
+
+Radiosity travels in straight lines, so a side receives light only from what lies strictly in front of its plane. The
+farthest that anything reaches in a direction is a vertex of the scene's convex hull: if every hull vertex lies on or
+behind the plane of a side, that side is *dark* and needs no texels.
+
+Facets are found on welded vertices: triangles that share an edge, a material and a plane belong together, whichever
+file order or diagonal they came with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, QhullError, cKDTree
+
+from app.scene.model import F64, I32, Scene
+
+# Relative to the scene's diagonal. Vertices in float32 are good to 6e-8 of their coordinate.
+WELD = 1e-7  # vertices closer than this are one
+FLAT = 1e-6  # distance from a plane that still counts as on it
+# Radians between two normals of one plane: what FLAT allows over a triangle a thousandth of the scene high.
+FLAT_ANGLE = 1e-3
+BLOCK = 1 << 22  # numbers in a temporary array
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """The lit sides: triangle (f,) i32, back (f,) bool; fronts first, each in triangle order. dark: sides left out."""
+
+    triangle: I32
+    back: NDArray[np.bool_]
+    dark: int
+
+
+def scene_size(scene: Scene) -> float:
+    """Diagonal of the box around the scene [m]."""
+    low, high = scene.bounds
+    return float(np.linalg.norm(high - low))
+
+
+def lit_sides(scene: Scene) -> Sides:
+    """Every front, and every back of a double-sided material, that has something in front of it.
+
+    Where no side has (a lone sheet, a convex body seen from outside) all are kept: there is then no light to save
+    texels for, but still a surface to show.
+    """
+    size = scene_size(scene)
+    low, high = scene.bounds
+    corners = (scene.corners - (low + high) / 2) / size
+    normals, _ = scene.normals_areas
+    offsets = np.einsum("mk,mk->m", normals, corners[:, 0])
+    hull = _hull_points(corners.reshape(-1, 3)[distinct_rows(*corners.reshape(-1, 3).T)[0]])
+    reach_front, reach_back = np.empty(len(normals)), np.empty(len(normals))
+    step = max(1, BLOCK // len(hull))
+    for start in range(0, len(normals), step):
+        part = slice(start, start + step)
+        heights = normals[part] @ hull.T
+        reach_front[part] = heights.max(axis=1) - offsets[part]
+        reach_back[part] = offsets[part] - heights.min(axis=1)
+    fronts = reach_front > FLAT
+    two_sided = scene.sides
+    backs = two_sided & (reach_back > FLAT)
+    if not fronts.any() and not backs.any():
+        fronts, backs = np.ones_like(fronts), two_sided
+    triangle = np.concatenate([np.flatnonzero(fronts), np.flatnonzero(backs)]).astype(np.int32)
+    back = np.arange(len(triangle)) >= np.count_nonzero(fronts)
+    return Sides(triangle, back, len(normals) + int(np.count_nonzero(two_sided)) - len(triangle))
+
+
+def _hull_points(points: F64) -> F64:
+    """The corners of the convex hull of points (n, 3), which may all lie in one plane."""
+    try:
+        vertices = ConvexHull(points).vertices
+    except QhullError:
+        _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+        try:
+            vertices = ConvexHull(points @ axes[:2].T).vertices
+        except QhullError:
+            return points
+    return np.asarray(points[vertices])
+
+
+def distinct_rows(*columns: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """One row of each kind, in sorted order: its index (d,), the kind of each row (n,), rows of each kind (d,).
+
+    columns (n,) each; many times faster than np.unique(axis=0).
+    """
+    order = np.lexsort(columns[::-1])
+    fresh = np.zeros(len(order), bool)
+    fresh[:1] = True
+    for column in columns:
+        in_order = column[order]
+        fresh[1:] |= in_order[1:] != in_order[:-1]
+    kind = np.empty(len(order), np.int64)
+    kind[order] = np.cumsum(fresh) - 1
+    return order[fresh], kind, np.diff(np.append(np.flatnonzero(fresh), len(order)))
+
+
+def totals(label: NDArray[np.integer], values: F64, count: int) -> F64:
+    """Sums of values (n,) or (n, k) over each label in [0, count): (count,) or (count, k)."""
+    if values.ndim == 1:
+        return np.bincount(label, values, count).astype(np.float64)
+    return np.stack([np.bincount(label, column, count) for column in values.T], axis=1).astype(np.float64)
+
+
+def weld(scene: Scene) -> tuple[F64, I32]:
+    """Join vertices that coincide: points (n, 3) [m] and the corner indices (m, 3) of the triangles into them."""
+    corners = scene.positions[scene.triangles.reshape(-1)]
+    index, inverse, _ = distinct_rows(*corners.T)
+    points = corners[index]
+    pairs = cKDTree(points).query_pairs(WELD * scene_size(scene), output_type="ndarray")
+    count, label = _groups(len(points), pairs)
+    first = np.zeros(count, np.int64)
+    first[label[::-1]] = np.arange(len(points))[::-1]
+    return points[first], label[inverse.reshape(-1, 3)].astype(np.int32)
+
+
+def facets(points: F64, triangles: I32, materials: I32, size: float) -> I32:
+    """Number the connected flat pieces of one material.
+
+    points (n, 3) [m], triangles (m, 3) into them (welded), materials (m,), size: the scene's diagonal [m].
+    Returns (m,) i32. A piece that bends little by little, edge after edge, falls back to its single triangles.
+    """
+    corners = (points[triangles] - points.mean(axis=0)) / size
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    doubled = np.linalg.norm(normals, axis=1)
+    normals /= np.maximum(doubled, np.finfo(float).tiny)[:, None]
+    edges = _flat_edges(corners, triangles, materials, normals)
+    joins = np.concatenate([edges[0], _t_junctions(corners, normals, materials, edges[1])])
+    count, label = _groups(len(triangles), joins)
+    # plane of each piece, and how far the piece strays from it
+    mean = totals(label, normals * doubled[:, None], count)
+    mean /= np.maximum(np.linalg.norm(mean, axis=1), np.finfo(float).tiny)[:, None]
+    centre = totals(label, corners.mean(axis=1), count) / np.bincount(label, minlength=count)[:, None]
+    stray = np.abs(np.einsum("mck,mk->mc", corners - centre[label][:, None], mean[label])).max(axis=1)
+    bent = np.zeros(count, bool)
+    bent[label[stray > 4 * FLAT]] = True  # an honest plane strays by FLAT from its neighbour, a few from the mean
+    alone = bent[label]
+    label[alone] = count + np.arange(np.count_nonzero(alone))
+    return np.unique(label, return_inverse=True)[1].astype(np.int32)
+
+
+def _groups(count: int, pairs: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
+    graph = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    number, label = connected_components(graph, directed=False)
+    return int(number), label.astype(np.int64)
+
+
+def _flat_edges(
+    corners: F64, triangles: I32, materials: I32, normals: F64
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs (p, 2) of triangles that continue each other across a whole edge, and the half-edges (h,) left without one.
+
+    Half-edge 3·m + k runs from corner k to corner k + 1 of triangle m. One with two possible partners (sheets that
+    coincide) gets none, and is not listed as left either.
+    """
+    start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    order = np.lexsort((high, low, np.repeat(materials, 3)))
+    key = np.stack([np.repeat(materials, 3)[order], low[order], high[order]], axis=1)
+    firsts, seconds = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    for shift in range(1, len(order)):
+        same = np.flatnonzero((key[shift:] == key[:-shift]).all(axis=1))
+        if not len(same):
+            break
+        i, j = order[same], order[same + shift]
+        fits = (start[i] == end[j]) & (start[i] != end[i])
+        fits[fits] = _coplanar(corners, normals, i[fits], j[fits])
+        firsts.append(i[fits])
+        seconds.append(j[fits])
+    i, j = np.concatenate(firsts), np.concatenate(seconds)
+    partners = np.bincount(np.concatenate([i, j]), minlength=3 * len(triangles))
+    clear = (partners[i] == 1) & (partners[j] == 1)
+    return np.stack([i[clear] // 3, j[clear] // 3], axis=1), np.flatnonzero((partners == 0) & (start != end))
+
+
+def _coplanar(corners: F64, normals: F64, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether the triangles of half-edges i and j lie in one plane and face the same way."""
+    ti, tj = i // 3, j // 3
+    far_i, far_j = corners[ti, (i % 3 + 2) % 3], corners[tj, (j % 3 + 2) % 3]
+    off_i = np.einsum("ek,ek->e", far_j - corners[ti, i % 3], normals[ti])
+    off_j = np.einsum("ek,ek->e", far_i - corners[tj, j % 3], normals[tj])
+    turn = np.linalg.norm(normals[ti] - normals[tj], axis=1)
+    return np.asarray((np.maximum(np.abs(off_i), np.abs(off_j)) < FLAT) & (turn < FLAT_ANGLE))
+
+
+def _t_junctions(corners: F64, normals: F64, materials: I32, half: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Pairs of triangles whose edges overlap in part: one long edge against several short ones.
+
+    Half-edges of one plane and line are found by rounding both; along each line, runs of overlapping intervals join.
+    A line on which two edges of the same direction overlap belongs to sheets that coincide, and is left alone.
+    """
+    t = half // 3
+    p, q = corners[t, half % 3], corners[t, (half + 1) % 3]
+    along = q - p
+    length = np.linalg.norm(along, axis=1)
+    along /= length[:, None]
+    generic = np.array([0.5319, 0.7023, 0.4733])  # any direction that no edge of a model is at right angles to
+    forward = along @ generic > 0
+    along[~forward] *= -1
+    foot = p - np.einsum("ek,ek->e", p, along)[:, None] * along
+    key = np.round(np.concatenate([foot, along, normals[t]], axis=1) / (10 * FLAT)).astype(np.int64)
+    line = distinct_rows(*key.T, materials[t])[1]
+    low = np.einsum("ek,ek->e", np.where(forward[:, None], p, q), along)
+    order = np.lexsort((low, line))
+    line, low, high, forward = line[order], low[order], (low + length)[order], forward[order]
+    # shift every line into its own range of numbers, so that one running maximum serves them all
+    shift = 4.0 * line
+    reach = np.maximum.accumulate(high + shift)
+    overlaps = np.flatnonzero((line[1:] == line[:-1]) & (low[1:] + shift[1:] < reach[:-1] - WELD))
+    doubled = np.zeros(line.max(initial=0) + 1, bool)
+    for way in (True, False):
+        mine = np.flatnonzero(forward == way)
+        reach = np.maximum.accumulate((high + shift)[mine])
+        clash = (line[mine][1:] == line[mine][:-1]) & ((low + shift)[mine][1:] < reach[:-1] - WELD)
+        doubled[line[mine][1:][clash]] = True
+    overlaps = overlaps[~doubled[line[overlaps]]]
+    return np.stack([t[order[overlaps]], t[order[overlaps + 1]]], axis=1)

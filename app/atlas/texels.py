@@ -1,0 +1,263 @@
+"""The surface that every texel really covers: each triangle cut by the texel grid, exactly.
+
+For a triangle counter-clockwise in the atlas and a texel S = [0, 1]², slices along v give, by Green's theorem,
+
+    area = -∮ c(v) du,   ∫u = -∮ u c(v) du,   ∫v = -∮ c(v)²/2 du,   c(v) = clamp(v, 0, 1),
+
+over the triangle's edges with u inside S: closed forms, since c(v) along an edge is a chain of three straight pieces.
+Area and centroid go to the world by the triangle's affine map; the fragments of a texel are summed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.charts import TILE, Charts
+from app.scene.model import F32, F64, I32, Scene
+
+BLOCK = 1 << 16  # candidate texels in work at a time
+# Fragments below this share of the texel, or of a smaller triangle, are rounding where an edge runs along a texel's.
+SLIVER = 1e-9
+
+I64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Leaves:
+    """(n,) i32 each: tile (level, x, y) has TILE×TILE texels and covers [x, x + 1)·TILE/2^level of the atlas, so y."""
+
+    level: I32
+    x: I32
+    y: I32
+
+    def __len__(self) -> int:
+        return len(self.level)
+
+
+@dataclass(frozen=True, eq=False)
+class TexelSurfaces:
+    """Per texel [tile, row (v), column (u)] of n tiles.
+
+    position (n, 16, 16, 3) f64: centroid of the covered surface [m], where curved a mean that may lie off it;
+    area (n, 16, 16) f64 [m²], 0 where nothing is covered; normal (n, 16, 16, 3) f32: unit area-weighted mean,
+    towards the lit side; face (n, 16, 16) i32: the face with the largest share, -1 where nothing is covered.
+    """
+
+    position: F64
+    area: F64
+    normal: F32
+    face: I32
+
+
+def faces_tangents(scene: Scene, charts: Charts) -> tuple[F64, F64]:
+    """∂p/∂u and ∂p/∂v of each face, (f, 3) f64 [m per texel of level 0]. Their cross product points to the lit side."""
+    corners = scene.corners[charts.face_triangle]
+    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    d1, d2 = _uv_edges(charts.face_uv)
+    scale = 1 / (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0])
+    dpdu = (d2[:, 1:] * e1 - d1[:, 1:] * e2) * scale[:, None]
+    dpdv = (d1[:, :1] * e2 - d2[:, :1] * e1) * scale[:, None]
+    return dpdu, dpdv
+
+
+def uniform_leaves(charts: Charts, level: int = 0) -> Leaves:
+    """The tiles of one level that some face covers, row by row."""
+    columns = charts.size[0] * 2**level // TILE
+    keys = [part.y * columns + part.x for part in _fragments(charts.face_uv * (2.0**level / TILE))]
+    key = np.unique(np.concatenate(keys)) if keys else np.empty(0, np.int64)
+    x, y = (key % columns).astype(np.int32), (key // columns).astype(np.int32)
+    return Leaves(np.full(len(key), level, np.int32), x, y)
+
+
+def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurfaces:
+    """Where each texel of the leaves lies in the world, how much surface it covers, and which way that faces."""
+    texels = len(leaves) * TILE * TILE
+    area, best = np.zeros(texels), np.zeros(texels)
+    face = np.full(texels, -1, np.int32)
+    moment, normal = np.zeros((3, texels)), np.zeros((3, texels))
+    origin = scene.corners[charts.face_triangle, 0]
+    normals, areas = scene.normals_areas
+    towards = normals[charts.face_triangle] * np.where(charts.face_back, -1.0, 1.0)[:, None]
+    d1, d2 = _uv_edges(charts.face_uv)
+    per_texel = 2 * areas[charts.face_triangle] / np.abs(d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0])
+    tangents = np.stack(faces_tangents(scene, charts))
+    for level in np.unique(leaves.level):
+        size = 0.5**level  # of a texel, in texels of level 0
+        uv = charts.face_uv / size
+        windows = _windows(uv, leaves, int(level))
+        for part in _fragments(uv, windows):
+            f, slot = windows.face[part.pair], windows.slot(part)
+            covered = part.share * per_texel[f] * size**2
+            du, dv = (part.u - uv[f, 0, 0]) * size, (part.v - uv[f, 0, 1]) * size
+            for k in range(3):
+                centre = origin[f, k] + du * tangents[0, f, k] + dv * tangents[1, f, k]
+                np.add.at(moment[k], slot, covered * centre)
+                np.add.at(normal[k], slot, covered * towards[f, k])
+            np.add.at(area, slot, covered)
+            np.maximum.at(best, slot, covered)
+            leading = covered >= best[slot]
+            face[slot[leading]] = f[leading]
+    shape = (len(leaves), TILE, TILE)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        position = np.where(area > 0, moment / area, 0.0)
+        length = np.linalg.norm(normal, axis=0)
+        normal = np.where(length > 0, normal / length, 0.0)
+    folded = (face >= 0) & (length < SLIVER * area)  # opposite fragments cancel: the largest decides
+    normal[:, folded] = towards[face[folded]].T
+    return TexelSurfaces(
+        position=np.ascontiguousarray(position.T).reshape(*shape, 3),
+        area=area.reshape(shape),
+        normal=np.ascontiguousarray(normal.T, dtype=np.float32).reshape(*shape, 3),
+        face=face.reshape(shape),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Fragments:
+    """Pieces of triangles in cells: (n,) pair, cell x and y; share of the cell's area; centroid u, v in the atlas."""
+
+    pair: I64
+    x: I64
+    y: I64
+    share: F64
+    u: F64
+    v: F64
+
+
+@dataclass(frozen=True, eq=False)
+class _Windows:
+    """Pairs of a face and a leaf that it meets: (p,) face, leaf, whether it fills it, and the leaf's first texel."""
+
+    face: I64
+    leaf: I64
+    full: NDArray[np.bool_]
+    left: I64
+    bottom: I64
+
+    def slot(self, part: _Fragments) -> I64:
+        """Where the fragments' texels are stored."""
+        row, column = part.y - self.bottom[part.pair], part.x - self.left[part.pair]
+        return np.asarray((self.leaf[part.pair] * TILE + row) * TILE + column)
+
+
+def _windows(uv: F64, leaves: Leaves, level: int) -> _Windows:
+    """Which leaves of a level each face meets. uv: in texels of that level."""
+    mine = np.flatnonzero(leaves.level == level)
+    keys = (leaves.y[mine].astype(np.int64) << 32) | leaves.x[mine]
+    order = np.argsort(keys)
+    keys, mine = keys[order], mine[order]
+    faces, places, fulls = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty(0, bool)]
+    for part in _fragments(uv / TILE):
+        wanted = (part.y << 32) | part.x
+        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        hit = keys[place] == wanted
+        faces.append(part.pair[hit])
+        places.append(mine[place[hit]])
+        fulls.append(part.share[hit] == 1.0)
+    leaf = np.concatenate(places)
+    left, bottom = (corner[leaf].astype(np.int64) * TILE for corner in (leaves.x, leaves.y))
+    return _Windows(np.concatenate(faces), leaf, np.concatenate(fulls), left, bottom)
+
+
+def _fragments(uv: F64, windows: _Windows | None = None) -> Iterator[_Fragments]:
+    """Cut triangles uv (f, 3, 2) by the unit grid, in blocks; with windows, each pair only inside its leaf."""
+    face = np.arange(len(uv)) if windows is None else windows.face
+    low = np.floor(uv.min(axis=1)).astype(np.int64)[face]
+    high = np.maximum(np.ceil(uv.max(axis=1)).astype(np.int64)[face], low + 1)
+    single = (high - low == 1).all(axis=1)
+    if windows is not None:
+        corner = np.stack([windows.left, windows.bottom], axis=1)
+        low, high = np.maximum(low, corner), np.minimum(high, corner + TILE)
+    across, up = np.maximum(high - low, 0).T
+    planes = np.ascontiguousarray(uv.transpose(2, 1, 0))
+    full = np.zeros(len(face), bool) if windows is None else windows.full
+    for pairs in _blocks(np.flatnonzero(full), across * up):
+        pair, x, y = _cells(pairs, low, across, up)
+        yield _Fragments(pair, x, y, np.ones(len(pair)), x.astype(np.float64) + 0.5, y.astype(np.float64) + 0.5)
+    for pairs in _blocks(np.flatnonzero(~full), across * up):
+        pair, x, y = _cells(pairs, low, across, up)
+        yield _cut_block(planes, face, pair, x, y, single[pair])
+
+
+def _blocks(pairs: I64, cells: I64) -> list[I64]:
+    """Split pairs into runs of about BLOCK cells."""
+    ends = np.cumsum(cells[pairs])
+    return np.split(pairs, np.searchsorted(ends, np.arange(BLOCK, ends[-1] if len(ends) else 0, BLOCK)))
+
+
+def _cells(pairs: I64, low: I64, across: I64, up: I64) -> tuple[I64, I64, I64]:
+    """Every cell of every pair's box: pair, x, y."""
+    cells = across[pairs] * up[pairs]
+    pair = np.repeat(pairs, cells)
+    nth = np.arange(len(pair)) - np.repeat(np.cumsum(cells) - cells, cells)
+    row = nth // across[pair]
+    return pair, low[pair, 0] + nth - row * across[pair], low[pair, 1] + row
+
+
+def _cut_block(planes: F64, face: I64, pair: I64, x: I64, y: I64, single: NDArray[np.bool_]) -> _Fragments:
+    """The fragments among candidate cells: whole cells and whole triangles directly, the rest by cutting.
+
+    planes (2, 3, f): u and v of the triangles' corners.
+    """
+    f = face[pair]
+    u, v = planes[0][:, f] - x, planes[1][:, f] - y  # (3, n): each cell is [0, 1]²
+    doubled = (u[1] - u[0]) * (v[2] - v[0]) - (v[1] - v[0]) * (u[2] - u[0])
+    least, most = _edge_distances(u, v, np.sign(doubled))
+    whole = ~single & (least >= 0)
+    cut = ~single & ~whole & (most > 0)
+    share, u_mean, v_mean = np.zeros(len(pair)), np.full(len(pair), 0.5), np.full(len(pair), 0.5)
+    share[whole] = 1.0
+    share[single] = np.abs(doubled[single]) / 2
+    u_mean[single], v_mean[single] = u[:, single].mean(axis=0), v[:, single].mean(axis=0)
+    share[cut], u_mean[cut], v_mean[cut] = _cut(u[:, cut], v[:, cut])
+    keep = share > SLIVER * np.minimum(np.abs(doubled) / 2, 1.0)
+    return _Fragments(pair[keep], x[keep], y[keep], share[keep], (x + u_mean)[keep], (y + v_mean)[keep])
+
+
+def _edge_distances(u: F64, v: F64, winding: F64) -> tuple[F64, F64]:
+    """How far inside the edges of triangles u, v (3, n) the unit square lies at least, and at most.
+
+    Each the least over the edges, times the edge's length. Within rounding of an edge, the square counts as inside for
+    the first and as outside for the second.
+    """
+    du, dv = (np.roll(u, -1, axis=0) - u) * winding, (np.roll(v, -1, axis=0) - v) * winding
+    at_corner = dv * u - du * v
+    length = np.abs(du) + np.abs(dv)
+    slack = 0.1 * SLIVER * length * np.minimum(length.max(axis=0), 1.0)
+    least = at_corner + np.minimum(du, 0) - np.maximum(dv, 0) + slack
+    most = at_corner + np.maximum(du, 0) - np.minimum(dv, 0) - slack
+    return least.min(axis=0), most.min(axis=0)
+
+
+def _cut(pu: F64, pv: F64) -> tuple[F64, F64, F64]:
+    """Area and centroid (u, v) of triangles u, v (3, n) inside the unit square, by the formulas above."""
+    qu, qv = np.roll(pu, -1, axis=0), np.roll(pv, -1, axis=0)
+    ua, ub = np.clip(pu, 0, 1), np.clip(qu, 0, 1)
+    upright = np.abs(qu - pu) < np.finfo(float).eps  # covers no u: adds nothing to any of the integrals
+    ub = np.where(upright, ua, ub)
+    slope = (qv - pv) / np.where(upright, 1.0, qu - pu)
+    va, vb = pv + (ua - pu) * slope, qv + (ub - qu) * slope
+    rise = np.where(va == vb, 1.0, vb - va)
+    t0, t1 = np.clip(-va / rise, 0, 1), np.clip((1 - va) / rise, 0, 1)
+    area, first_u, first_v = (np.zeros(pu.shape[1]) for _ in range(3))
+    u, c = ua, np.clip(va, 0, 1)
+    for t in (np.minimum(t0, t1), np.maximum(t0, t1), np.ones_like(t0)):
+        un, cn = ua + t * (ub - ua), np.clip(va + t * (vb - va), 0, 1)
+        du = un - u
+        area -= (du * (c + cn) / 2).sum(axis=0)
+        first_u -= (du * (u * (2 * c + cn) + un * (c + 2 * cn)) / 6).sum(axis=0)
+        first_v -= (du * (c * c + c * cn + cn * cn) / 6).sum(axis=0)
+        u, c = un, cn
+    some = np.abs(area) > 0
+    whole = np.where(some, area, 1.0)
+    # a sliver's centroid is rounding, but it lies in the square
+    u_mean, v_mean = np.clip(first_u / whole, 0, 1), np.clip(first_v / whole, 0, 1)
+    return np.abs(area), np.where(some, u_mean, 0.5), np.where(some, v_mean, 0.5)
+
+
+def _uv_edges(uv: F64) -> tuple[F64, F64]:
+    return uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]

@@ -1,0 +1,235 @@
+"""Unfold curved and irregular surfaces into charts: least-squares conformal maps by xatlas [Levy02], in metres.
+
+xatlas runs in a process of its own with a time limit; its answer is cached by what went in. Where it fails, and for the
+few triangles it gives up on, every flat piece becomes a chart by itself, laid down without distortion.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+import platformdirs
+from numpy.typing import NDArray
+
+from app.atlas.sides import totals
+from app.scene.model import F64, I32
+
+Progress = Callable[[str, float], None]
+
+TIME_LIMIT_S = 120.0
+TIME_LIMIT_S_PER_TRIANGLE = 1e-3  # about ten times what xatlas takes for models that it digests
+POLL_S = 0.05
+CACHE_FILES = 64  # kept, newest first
+FORMAT = b"glowtree unwrap 1"  # changes when the worker's options or its answer do
+# Diagonal of what xatlas sees: it drops triangles smaller than 1e-7 in area, whatever the unit.
+XATLAS_SIZE = 1000.0
+# A triangle squeezed to less than this share of its area, or turned over, is unusable in its chart.
+LEAST_SHARE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Unfolded:
+    """chart (m,) i32 numbered from 0; uv (m, 3, 2) f64 [m], to scale in area, right-handed seen from the front.
+
+    by_xatlas: how many of the charts come from xatlas (they are numbered first).
+    """
+
+    chart: I32
+    uv: F64
+    by_xatlas: int
+    warnings: tuple[str, ...] = ()
+
+
+def unwrap(
+    points: F64,
+    triangles: I32,
+    corners: F64,
+    groups: I32,
+    facet: I32,
+    *,
+    time_limit: float | None = None,
+    progress: Progress | None = None,
+) -> Unfolded:
+    """Charts for triangles (m, 3) into welded points (n, 3) [m]; charts never mix groups (m,).
+
+    corners (m, 3, 3) [m]: as the scene has them, for welding can rob a sliver of its area. facet (m,): connected flat
+    pieces, the charts to fall back to. time_limit [s]; by default it grows with m.
+    """
+    if not len(triangles):
+        return Unfolded(np.empty(0, np.int32), np.empty((0, 3, 2)), 0)
+    warnings: list[str] = []
+    try:
+        chart, uv = _xatlas(points, triangles, groups, time_limit, progress)
+    except _UnwrapError as failure:
+        warnings.append(f"xatlas {failure}: every flat piece is a chart of its own")
+        chart, uv = np.full(len(triangles), -1, np.int32), np.zeros((len(triangles), 3, 2))
+    chart, uv = _to_scale(chart, uv, corners)
+    count = int(chart.max()) + 1
+    rest = np.flatnonzero(chart < 0)
+    if len(rest):
+        label = np.unique(facet[rest], return_inverse=True)[1].astype(np.int32)
+        chart[rest] = count + label
+        uv[rest] = _laid_flat(corners[rest], label)
+    return Unfolded(chart, uv, count, tuple(warnings))
+
+
+class _UnwrapError(Exception):
+    """xatlas gave no usable answer; the message completes "xatlas ..."."""
+
+
+def _xatlas(
+    points: F64, triangles: I32, groups: I32, time_limit: float | None, progress: Progress | None
+) -> tuple[I32, F64]:
+    """xatlas's own charts, from the cache or from a worker."""
+    used, local = np.unique(triangles, return_inverse=True)
+    centred = points[used] - (points[used].min(axis=0) + points[used].max(axis=0)) / 2
+    centred *= XATLAS_SIZE / np.linalg.norm(np.ptp(centred, axis=0))
+    given = {
+        "positions": centred.astype(np.float32),
+        "triangles": local.reshape(-1, 3).astype(np.uint32),
+        "groups": groups.astype(np.int32),
+    }
+    digest = hashlib.sha256(FORMAT + version("xatlas").encode())
+    for name, array in given.items():
+        digest.update(f"{name} {array.shape}".encode() + array.tobytes())
+    cached = Path(platformdirs.user_cache_dir("glowtree")) / "unwrap" / f"{digest.hexdigest()}.npz"
+    answer = _read(cached, len(triangles))
+    if answer is None:
+        if time_limit is None:
+            time_limit = TIME_LIMIT_S + TIME_LIMIT_S_PER_TRIANGLE * len(triangles)
+        with tempfile.TemporaryDirectory(prefix="glowtree-") as folder:
+            source, target = Path(folder) / "in.npz", Path(folder) / "out.npz"
+            np.savez(source, **given)
+            _run_worker(source, target, time_limit, progress)
+            answer = _read(target, len(triangles))
+            if answer is None:
+                raise _UnwrapError("wrote no charts")
+            _store(target, cached)
+    return answer
+
+
+def _run_worker(source: Path, target: Path, time_limit: float, progress: Progress | None) -> None:
+    """Run xatlas on source; whatever ends the wait (the limit, Ctrl-C, a cancelling callback) ends the worker."""
+    root = str(Path(__file__).resolve().parents[2])
+    path = os.pathsep.join(p for p in (root, os.environ.get("PYTHONPATH")) if p)
+    command = [sys.executable, "-m", "app.atlas.unwrap_worker", str(source), str(target)]
+    with (source.with_name("log")).open("w+b") as log:
+        start = time.monotonic()
+        worker = subprocess.Popen(command, env={**os.environ, "PYTHONPATH": path}, stdout=log, stderr=log)
+        try:
+            while worker.poll() is None:
+                elapsed = time.monotonic() - start
+                if elapsed > time_limit:
+                    raise _UnwrapError(f"took longer than {time_limit:g} s")
+                if progress is not None:
+                    progress("unwrap", elapsed / (elapsed + time_limit / 10))
+                time.sleep(POLL_S)
+        finally:
+            worker.kill()
+            worker.wait()
+        if worker.returncode:
+            log.seek(0)
+            last = log.read().decode(errors="replace").strip().splitlines()
+            raise _UnwrapError(f"failed ({last[-1] if last else f'exit code {worker.returncode}'})")
+
+
+def _read(path: Path, count: int) -> tuple[I32, F64] | None:
+    """Charts from a file, or None where there is no such file or it is not whole."""
+    try:
+        with np.load(path) as data:
+            chart, uv = data["chart"].astype(np.int32), data["uv"].astype(np.float64)
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+    return (chart, uv) if chart.shape == (count,) and uv.shape == (count, 3, 2) and np.isfinite(uv).all() else None
+
+
+def _store(source: Path, cached: Path) -> None:
+    """Keep an answer for next time; a cache that cannot be written is none."""
+    try:
+        cached.parent.mkdir(parents=True, exist_ok=True)
+        partial = cached.with_suffix(f".{os.getpid()}.tmp")
+        partial.write_bytes(source.read_bytes())
+        partial.replace(cached)
+        by_age = sorted(cached.parent.glob("*.npz"), key=lambda p: p.stat().st_mtime, reverse=True)
+        for old in by_age[CACHE_FILES:]:
+            old.unlink()
+    except OSError:
+        return
+
+
+def _to_scale(chart: I32, uv: F64, corners: F64) -> tuple[I32, F64]:
+    """Undo xatlas's scaling: right-handed charts in metres, each with the area of its surface.
+
+    Triangles that have no area in their chart, or lie in it upside down, lose their chart (-1); the rest is renumbered.
+    """
+    chart, uv = chart.copy(), uv - uv.mean(axis=(0, 1))
+    inside = chart >= 0
+    if not inside.any():
+        return chart, uv
+    label = np.where(inside, chart, 0)
+    count = int(label.max()) + 1
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    area = np.where(inside, area, 0.0)
+    flat = np.where(inside, _signed_area(uv), 0.0)
+    uv[totals(label, flat, count)[label] < 0, :, 0] *= -1
+    # xatlas stretches each chart to whole texels of its page, along u and v apart: even out the mean stretch
+    stretch = _squared_stretch(uv, corners)
+    weight = np.maximum(totals(label, area, count), np.finfo(float).tiny)
+    mean = totals(label, area[:, None] * stretch, count) / weight[:, None]
+    uv /= np.sqrt(np.where(mean > 0, mean, 1.0))[label][:, None]
+    flat = np.where(inside, _signed_area(uv), 0.0)
+    total = totals(label, np.maximum(flat, 0.0), count)
+    scale = np.sqrt(weight / np.where(total > 0, total, np.inf))
+    uv *= scale[label][:, None, None]
+    chart[inside & ~(flat * scale[label] ** 2 > LEAST_SHARE * area)] = -1
+    inside = chart >= 0
+    chart[inside] = np.unique(chart[inside], return_inverse=True)[1]
+    return chart, uv
+
+
+def _signed_area(uv: F64) -> F64:
+    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    return (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+
+
+def _squared_stretch(uv: F64, corners: F64) -> NDArray[np.float64]:
+    """(m, 2): squared length of the surface gradient of u and of v in each triangle."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    da, db = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    turned = a[:, :, None] * db[:, None] - b[:, :, None] * da[:, None]
+    doubled_area = np.linalg.norm(np.cross(a, b), axis=1)[:, None]
+    return np.asarray((np.linalg.norm(turned, axis=1) / doubled_area) ** 2)
+
+
+def _laid_flat(corners: F64, label: I32) -> F64:
+    """Each flat piece in its own plane [m], its longest edge along u, without distortion."""
+    count = int(label.max()) + 1
+    edges = np.roll(corners, -1, axis=1) - corners
+    lengths = np.linalg.norm(edges, axis=2)
+    order = np.lexsort((lengths.max(axis=1), label))
+    best = np.empty(count, np.int64)
+    best[label[order]] = order  # the last of each label wins: the longest
+    u = edges[best, lengths[best].argmax(axis=1)]
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    n = totals(label, cross, count)
+    n -= np.einsum("ck,ck->c", n, u)[:, None] * u
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    origin = np.zeros((count, 3))
+    origin[label] = corners[:, 0]
+    local = corners - origin[label][:, None]
+    return np.stack(
+        [np.einsum("mck,mk->mc", local, axis[label]) for axis in (u, np.cross(n, u))],
+        axis=2,
+    )

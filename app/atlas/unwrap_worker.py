@@ -1,0 +1,59 @@
+"""xatlas in a process of its own: ``python -m app.atlas.unwrap_worker in.npz out.npz``.
+
+xatlas holds the interpreter for the whole call, cannot be cancelled and can hang or crash, so whoever wants charts
+starts this and waits with a time limit.
+
+in.npz: positions (n, 3) f32, triangles (m, 3) u32, groups (m,) i32; charts never mix groups.
+out.npz: chart (m,) i32, -1 where xatlas made none; uv (m, 3, 2) f32 in texels of xatlas's page, not to scale.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import xatlas
+from numpy.typing import NDArray
+
+UNASSIGNED = np.uint32(0xFFFFFFFF)
+# Side of the page that xatlas packs for itself. It rounds the sizes of charts to its texels, so that a coarse page
+# distorts them; a finer one costs packing time and gains nothing.
+PAGE = 1024
+
+
+def unwrap(
+    positions: NDArray[np.float32], triangles: NDArray[np.uint32], groups: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Charts of one xatlas run, as in ``out.npz``."""
+    corners = positions[triangles].astype(np.float64)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    atlas = xatlas.Atlas()
+    members = [np.flatnonzero(groups == g) for g in np.unique(groups)]
+    for rows in members:
+        used, local = np.unique(triangles[rows], return_inverse=True)
+        atlas.add_mesh(np.ascontiguousarray(positions[used]), local.reshape(-1, 3).astype(np.uint32))
+    pack = xatlas.PackOptions()
+    pack.texels_per_unit = PAGE / float(np.sqrt(area))
+    atlas.generate(xatlas.ChartOptions(), pack)
+    chart = np.full(len(triangles), -1, np.int32)
+    uv = np.zeros((len(triangles), 3, 2), np.float32)
+    first = 0
+    for number, rows in enumerate(members):
+        _, indices, uvs = atlas[number]
+        page, local_chart = atlas.get_mesh_vertex_assignment(number)
+        placed = (page[indices] != UNASSIGNED).all(axis=1) & (local_chart[indices] != UNASSIGNED).all(axis=1)
+        chart[rows[placed]] = first + local_chart[indices[placed, 0]].astype(np.int32)
+        uv[rows] = uvs[indices] * np.array([atlas.width, atlas.height], np.float32)
+        first = int(chart.max()) + 1
+    return chart, uv
+
+
+def main() -> None:
+    source, target = sys.argv[1:]
+    with np.load(source) as given:
+        chart, uv = unwrap(given["positions"], given["triangles"], given["groups"])
+    np.savez(target, chart=chart, uv=uv)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,104 @@
+"""A finished bake as files: ``irradiance.exr``, ``scene.glb`` and ``report.json`` in one folder.
+
+All three are written beside their final names first and then renamed, so that a bake that fails or is stopped while
+writing leaves the previous files as they were.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.charts import Charts
+from app.bake.exr import write_irradiance
+from app.bake.gltf_writer import glb_bytes
+from app.bake.gutter import fill_gutter
+from app.errors import UserError
+from app.scene.model import F32, Scene
+
+__all__ = ["IRRADIANCE_NAME", "REPORT_NAME", "SCENE_NAME", "BakeFiles", "prepare_directory", "write_bake"]
+
+IRRADIANCE_NAME = "irradiance.exr"
+SCENE_NAME = "scene.glb"
+REPORT_NAME = "report.json"
+
+
+@dataclass(frozen=True)
+class BakeFiles:
+    """Where the files of a bake are."""
+
+    irradiance: Path
+    scene: Path
+    report: Path
+
+
+def prepare_directory(directory: Path) -> Path:
+    """Make ``directory`` if need be and try to write there: call it before a long bake. UserError if it cannot be."""
+    probe = directory / f".probe.{os.getpid()}"
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise UserError(f"{directory}: cannot write here ({error.strerror or error})") from error
+    return directory
+
+
+def write_bake(
+    directory: Path,
+    scene: Scene,
+    charts: Charts,
+    irradiance: F32,
+    covered: NDArray[np.bool_],
+    report: Mapping[str, Any],
+) -> BakeFiles:
+    """Write the lightmap, the scene that uses it and the report into ``directory``, which is made if need be.
+
+    irradiance (H, W, 3) f32 [W/m²] in the virtual atlas, row 0 at v = 0, finite wherever ``covered`` (H, W).
+    In the report, numbers that are not finite become null. UserError if the folder cannot be written.
+    """
+    width, height = charts.size
+    assert irradiance.shape == (height, width, 3), f"irradiance {irradiance.shape} for an atlas of {width}×{height}"
+    assert covered.shape == (height, width)
+    assert np.isfinite(irradiance[covered]).all(), "irradiance that is not finite"
+    prepare_directory(directory)
+    files = BakeFiles(directory / IRRADIANCE_NAME, directory / SCENE_NAME, directory / REPORT_NAME)
+    temporary = {path: path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") for path in vars(files).values()}
+    try:
+        write_irradiance(temporary[files.irradiance], fill_gutter(irradiance, covered))
+        temporary[files.scene].write_bytes(glb_bytes(scene, charts, IRRADIANCE_NAME))
+        temporary[files.report].write_text(json_text(report), encoding="utf-8")
+        for path, written in temporary.items():
+            os.replace(written, path)
+    except OSError as error:
+        raise UserError(f"{directory}: cannot write the bake ({error.strerror or error})") from error
+    finally:
+        for written in temporary.values():
+            written.unlink(missing_ok=True)
+    return files
+
+
+def json_text(report: Mapping[str, Any]) -> str:
+    """The report as JSON with sorted keys, so that equal reports are equal files."""
+    return json.dumps(_plain(report), indent=2, sort_keys=True, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def _plain(value: Any) -> Any:
+    """``value`` from JSON's own types: numpy numbers and arrays, paths and tuples are converted."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value) if isinstance(value, Path) else value

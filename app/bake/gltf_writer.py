@@ -1,0 +1,153 @@
+"""The scene with its lightmap as GLB: original materials, TEXCOORD_1 in the atlas, MOZ_lightmap naming the irradiance.
+
+MOZ_lightmap (Mozilla Hubs) is what readers of the web know: {"index": texture, "texCoord": 1, "intensity": 1}, with
+irradiance that the renderer multiplies by albedo/π, as three.js' ``lightMap``. Its picture is the EXR file itself, by
+name: readers that do not know the extension never load it, and the Khronos validator, which knows only PNG and JPEG,
+passes the file with one warning. ``extras.lightmap`` of the glTF scene repeats file, quantity and unit. (three.js'
+EXRLoader puts the last scanline first: set ``flipY = true`` on what it returns.)
+
+Every triangle has its own lightmap area:
+
+- both sides lit: written twice, front and back (reversed), each one-sided;
+- one side lit: written once, that side in front, as two-sided as its material is;
+- no side lit: written once, without TEXCOORD_1 and without lightmap: nothing but its own emission is seen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app import __version__
+from app.atlas.charts import Charts
+from app.bake.glb import GlbBuilder
+from app.bake.gltf_materials import MaterialWriter
+from app.scene.model import F32, F64, Camera, Scene
+
+# Positions are 32-bit floats: beyond this distance from the origin, in radii of the scene, nodes carry the offset, so
+# that never more than 3 of the 24 bits are lost to it.
+FAR = 4.0
+NEAR_PLANE = 1e-3  # of the scene's radius: glTF cameras must have one, the scene's have none
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """The triangle sides to write, (k,) each. uv (k, 3, 2) in [0, 1], in the triangle's corner order; 0 if not lit."""
+
+    triangle: NDArray[np.int64]
+    back: NDArray[np.bool_]
+    lit: NDArray[np.bool_]
+    double_sided: NDArray[np.bool_]
+    uv: F64
+
+
+def glb_bytes(scene: Scene, charts: Charts, lightmap_uri: str) -> bytes:
+    """The whole GLB file. ``lightmap_uri`` is the EXR's file name beside it."""
+    glb = GlbBuilder(f"glowtree {__version__}")
+    image = glb.add("images", {"uri": lightmap_uri, "name": "irradiance"})
+    sampler = glb.add("samplers", {"magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071})
+    lightmap = glb.add("textures", {"source": image, "sampler": sampler, "name": "irradiance"})
+    materials = MaterialWriter(glb, scene.materials, lightmap)
+
+    lower, upper = scene.bounds
+    centre, radius = (lower + upper) / 2, float(np.linalg.norm(upper - lower)) / 2
+    offset = centre if np.linalg.norm(centre) > FAR * radius else np.zeros(3)
+    nodes = _add_objects(glb, scene, _sides(scene, charts), materials, offset)
+    nodes += [_add_camera(glb, camera, NEAR_PLANE * radius) for camera in scene.cameras]
+    about = {"file": lightmap_uri, "quantity": "irradiance", "unit": "W/m2", "texCoord": 1, "firstRow": "v = 0"}
+    glb.add("scenes", {"name": scene.name, "nodes": nodes, "extras": {"lightmap": about}})
+    glb.document["scene"] = 0
+    return glb.to_bytes()
+
+
+def _sides(scene: Scene, charts: Charts) -> _Sides:
+    """Which sides of which triangles are written, front before back."""
+    face = np.full((len(scene.triangles), 2), -1)
+    face[charts.face_triangle, charts.face_back.astype(int)] = np.arange(len(charts.face_triangle))
+    front_lit, back_lit = face[:, 0] >= 0, face[:, 1] >= 0
+    assert not (back_lit & ~scene.sides).any(), "a chart at the back of a one-sided triangle"
+    front, back = np.flatnonzero(front_lit | ~back_lit), np.flatnonzero(back_lit)
+    triangle = np.concatenate([front, back])
+    side = np.repeat([0, 1], [len(front), len(back)])
+    written = face[triangle, side]
+    lit = written >= 0
+    uv = np.zeros((len(triangle), 3, 2))
+    uv[lit] = charts.face_uv[written[lit]] / np.array(charts.size)
+    return _Sides(
+        triangle=triangle,
+        back=side == 1,
+        lit=lit,
+        double_sided=scene.sides[triangle] & ~(front_lit & back_lit)[triangle],
+        uv=uv,
+    )
+
+
+def _add_objects(glb: GlbBuilder, scene: Scene, sides: _Sides, materials: MaterialWriter, offset: F64) -> list[int]:
+    """One node and mesh for each object that has triangles, one primitive for each glTF material; returns the nodes."""
+    keys = np.stack(
+        [scene.object_ids[sides.triangle], scene.material_ids[sides.triangle], sides.double_sided, sides.lit], axis=1
+    )
+    groups, group_of = np.unique(keys, axis=0, return_inverse=True)
+    members = np.split(np.argsort(group_of, kind="stable"), np.cumsum(np.bincount(group_of))[:-1])
+    primitives: dict[int, list[dict[str, Any]]] = {}
+    for (obj, material, double_sided, lit), rows in zip(groups.tolist(), members, strict=True):
+        vertices = _vertices(scene, sides, rows, materials.texcoords(material, lit=bool(lit)), bool(lit), offset)
+        primitive = _add_primitive(glb, vertices)
+        primitive["material"] = materials.index(material, double_sided=bool(double_sided), lit=bool(lit))
+        primitives.setdefault(obj, []).append(primitive)
+    nodes = []
+    for obj, items in primitives.items():
+        name = scene.objects[obj]
+        node: dict[str, Any] = {"name": name, "mesh": glb.add("meshes", {"name": name, "primitives": items})}
+        if offset.any():
+            node["translation"] = offset.tolist()
+        nodes.append(glb.add("nodes", node))
+    return nodes
+
+
+def _vertices(
+    scene: Scene, sides: _Sides, rows: NDArray[np.int64], texcoords: dict[int, int], lit: bool, offset: F64
+) -> dict[str, F32]:
+    """Attribute name → (3k, 2|3) f32, three vertices per side, counter-clockwise from where the side is seen."""
+    triangle, back = sides.triangle[rows], sides.back[rows]
+    order = np.where(back[:, None], [0, 2, 1], [0, 1, 2])
+    attributes: dict[str, NDArray[Any]] = {"POSITION": scene.corners[triangle] - offset}
+    if scene.normals is not None:
+        attributes["NORMAL"] = scene.normals[triangle] * np.where(back, -1.0, 1.0)[:, None, None]
+    for source, slot in texcoords.items():
+        uv = (scene.uv0, scene.uv1)[source]
+        if uv is not None:
+            attributes[f"TEXCOORD_{slot}"] = uv[triangle]
+    if lit:
+        attributes["TEXCOORD_1"] = sides.uv[rows]
+    # + 0.0 makes -0.0 and 0.0 one vertex
+    return {
+        name: np.take_along_axis(values, order[:, :, None], axis=1).astype(np.float32).reshape(-1, values.shape[2])
+        + 0.0
+        for name, values in attributes.items()
+    }
+
+
+def _add_primitive(glb: GlbBuilder, attributes: dict[str, F32]) -> dict[str, Any]:
+    """Equal vertices become one, in the order in which they come first."""
+    rows = np.ascontiguousarray(np.concatenate(list(attributes.values()), axis=1))
+    whole = rows.view(np.dtype((np.void, rows.itemsize * rows.shape[1])))[:, 0]
+    _, first, inverse = np.unique(whole, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    kept = first[order]
+    written = {name: glb.add_vertices(values[kept], bounds=name == "POSITION") for name, values in attributes.items()}
+    if "TEXCOORD_1" in written:
+        written.setdefault("TEXCOORD_0", written["TEXCOORD_1"])  # sets must be numbered from 0 (glTF 2.0, 3.7.2.1)
+    return {"attributes": written, "indices": glb.add_indices(rank[inverse])}
+
+
+def _add_camera(glb: GlbBuilder, camera: Camera, near: float) -> int:
+    perspective = {"yfov": camera.yfov, "znear": near}
+    index = glb.add("cameras", {"name": camera.name, "type": "perspective", "perspective": perspective})
+    matrix = camera.world_from_camera.T.reshape(-1).tolist()
+    return glb.add("nodes", {"name": camera.name, "camera": index, "matrix": matrix})

@@ -1,0 +1,35 @@
+"""Filled gutters: texels around a chart repeat its nearest texel, so that bilinear look-ups at its border are right.
+
+A bilinear look-up inside a covered texel reads its eight neighbours. Charts lie ``atlas.charts.GAP`` = 2 texels apart,
+so such a neighbour is at most √2 from its own chart and at least 2 from any other: the nearest texel is its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.scene.model import F32
+
+GUTTER = 4  # texels; one is needed at full size, 2^k for bilinear look-ups in mip level k: good down to level 2
+
+
+def fill_gutter(values: F32, covered: NDArray[np.bool_]) -> F32:
+    """(H, W, 3): uncovered texels within GUTTER of a covered one get the nearest one's value, those beyond 0."""
+    filled: F32 = np.where(covered[:, :, None], values, np.float32(0.0))
+    height, width = covered.shape
+    y, x = np.nonzero(~covered)
+    for dy, dx in _offsets():
+        source_y, source_x = y + dy, x + dx
+        found = (source_y >= 0) & (source_y < height) & (source_x >= 0) & (source_x < width)
+        found[found] = covered[source_y[found], source_x[found]]
+        filled[y[found], x[found]] = values[source_y[found], source_x[found]]
+        y, x = y[~found], x[~found]
+    return filled
+
+
+def _offsets() -> list[tuple[int, int]]:
+    """All steps (dy, dx) no longer than GUTTER, nearest first."""
+    reach = range(-GUTTER, GUTTER + 1)
+    steps = [(dy, dx) for dy in reach for dx in reach if 0 < dy * dy + dx * dx <= GUTTER * GUTTER]
+    return sorted(steps, key=lambda step: step[0] ** 2 + step[1] ** 2)

@@ -1,0 +1,167 @@
+"""The command line: glowtree view | shot | bake | info | bench | doctor.
+
+Flags are the declared options of scene cutting, shooting and display; nothing is listed twice. Bad input is one line on stderr
+and exit code 2; Ctrl-C ends early, keeps what is there, and exits with 130.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NoReturn
+
+from app import __version__
+from app.atlas.options import AtlasOptions
+from app.errors import UserError
+from app.options import add_flags
+from app.render.options import DisplayOptions
+from app.solvers import ShootingOptions
+
+DEFAULT_SCENE = "cornell-box"
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse, with errors on one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command. Returns the exit code."""
+    flags = build_parser().parse_args(arguments or ["view"])
+    command: Callable[[argparse.Namespace], int] = flags.command
+    try:
+        return command(flags)
+    except UserError as error:
+        print(f"glowtree: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("glowtree: stopped", file=sys.stderr)
+        return 130
+
+
+def build_parser() -> Parser:
+    parser = Parser(prog="glowtree", description="Interactive radiosity: watch light being shot until it converges.")
+    parser.add_argument("--version", action="version", version=f"glowtree {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="command", parser_class=Parser)
+
+    view = _scene_command(commands, "view", _view, "open the viewer", optional=True)
+    view.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="window size (default 1280x720)")
+    view.add_argument("--frames", type=int, metavar="N", help="close after N frames (for tests)")
+    add_flags(view, DisplayOptions)
+
+    shot = _scene_command(commands, "shot", _shot, "solve without a window and save a picture")
+    shot.add_argument("-o", "--output", type=Path, required=True, metavar="PNG", help="the picture to write")
+    shot.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="picture size (default 1280x720)")
+    shot.add_argument("--camera", metavar="NAME", help="a camera of the scene (default: its first)")
+    shot.add_argument("--ui", action="store_true", help="draw the viewer's panels too")
+    _stop_flags(shot)
+    add_flags(shot, DisplayOptions)
+
+    bake = _scene_command(commands, "bake", _bake, "solve and write scene.glb, irradiance.exr and report.json")
+    bake.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write")
+    _stop_flags(bake)
+
+    _scene_command(commands, "info", _info, "what a scene would take, before any work")
+
+    bench = commands.add_parser("bench", help="measure", description="Measure on this machine.")
+    benches = bench.add_subparsers(required=True, metavar="what", parser_class=Parser)
+    shots = benches.add_parser("shots", help="milliseconds per shot, by pass, at the papers' sizes")
+    shots.add_argument("--json", action="store_true", help="print JSON")
+    add_flags(shots, ShootingOptions)
+    shots.set_defaults(command=_bench_shots)
+
+    doctor = commands.add_parser("doctor", help="what this machine has, and what is missing")
+    doctor.add_argument("--json", action="store_true", help="print JSON")
+    doctor.set_defaults(command=_doctor)
+    return parser
+
+
+def _scene_command(
+    commands: argparse._SubParsersAction[Parser],
+    name: str,
+    command: Callable[[argparse.Namespace], int],
+    help: str,
+    *,
+    optional: bool = False,
+) -> Parser:
+    parser = commands.add_parser(name, help=help, description=help[0].upper() + help[1:] + ".")
+    scene_help = "a file (.glb .gltf .obj .ply .stl .toml) or the name of a scene"
+    if optional:
+        parser.add_argument("scene", nargs="?", default=DEFAULT_SCENE, help=f"{scene_help} (default {DEFAULT_SCENE})")
+    else:
+        parser.add_argument("scene", help=scene_help)
+    parser.add_argument("--light", action="store_true", help="add a ceiling light")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of text")
+    add_flags(parser, AtlasOptions)
+    add_flags(parser, ShootingOptions)
+    parser.set_defaults(command=command)
+    return parser
+
+
+def _stop_flags(parser: Parser) -> None:
+    stop = parser.add_argument_group("stop (whichever comes first; --residual is always on)")
+    stop.add_argument("--shots", type=_positive(int), metavar="N", help="after N shots")
+    stop.add_argument("--time", type=_positive(float), metavar="S", help="after S seconds of shooting")
+
+
+def _positive(kind: type[int] | type[float]) -> Callable[[str], float]:
+    def read(text: str) -> float:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = kind(0)
+        if not 0 < value < 1e12:
+            raise argparse.ArgumentTypeError(f"{text}: must be a {'whole ' if kind is int else ''}number above 0")
+        return value
+
+    return read
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    if not (width.isdigit() and height.isdigit() and 16 <= int(width) <= 16384 and 16 <= int(height) <= 16384):
+        raise argparse.ArgumentTypeError(f"{text}: must be WIDTHxHEIGHT, each 16 to 16384")
+    return int(width), int(height)
+
+
+# Each command imports what it needs: --help and errors answer at once.
+
+
+def _view(flags: argparse.Namespace) -> int:
+    from app.headless import view_or_shot
+
+    return view_or_shot(flags)
+
+
+def _shot(flags: argparse.Namespace) -> int:
+    from app.headless import shot
+
+    return shot(flags)
+
+
+def _bake(flags: argparse.Namespace) -> int:
+    from app.headless import bake
+
+    return bake(flags)
+
+
+def _info(flags: argparse.Namespace) -> int:
+    from app.info import info
+
+    return info(flags)
+
+
+def _bench_shots(flags: argparse.Namespace) -> int:
+    from app.bench.shots import bench_shots
+
+    return bench_shots(flags)
+
+
+def _doctor(flags: argparse.Namespace) -> int:
+    from app.doctor import doctor
+
+    return doctor(flags)

@@ -1,0 +1,55 @@
+"""``glowtree doctor``: which context this machine gives, and what is missing with the command that installs it."""
+
+from __future__ import annotations
+
+import argparse
+import ctypes.util
+import importlib.metadata
+import os
+import platform
+import sys
+from typing import Any
+
+from app import __version__
+from app.console import Console
+from app.errors import GpuError
+from app.gpu import gpu_context
+
+PACKAGES = ("moderngl", "moderngl-window", "imgui-bundle", "numpy", "trimesh", "xatlas", "OpenEXR")
+LIBRARIES = {"EGL": "libegl1", "GL": "libgl1"}  # library: Debian's package
+
+
+def doctor(flags: argparse.Namespace) -> int:
+    """Print what is there. Returns 0 if glowtree can run here headless, else 2."""
+    values: dict[str, Any] = {
+        "glowtree": __version__,
+        "python": sys.version.split()[0],
+        "platform": platform.platform(),
+    }
+    values |= {name: importlib.metadata.version(name) for name in PACKAGES}
+    missing = []
+    try:
+        with gpu_context() as gpu:
+            limits = gpu.limits
+            values |= {
+                "renderer": limits.renderer,
+                "vendor": limits.vendor,
+                "opengl": limits.version,
+                "largest texture": limits.max_texture,
+                "compute shaders": "yes" if limits.compute else "no (not needed yet)",
+                "rasteriser": "software" if gpu.software else "hardware",
+            }
+    except GpuError as error:
+        missing.append(str(error))
+    if sys.platform.startswith("linux"):
+        absent = [package for library, package in LIBRARIES.items() if ctypes.util.find_library(library) is None]
+        if absent:
+            missing.append(f"missing libraries: apt-get install {' '.join(absent)} libgl1-mesa-dri")
+        values["display"] = (
+            os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or "none: headless commands only"
+        )
+    values["missing"] = missing
+    text = "\n".join(f"{name:>18}  {value}" for name, value in values.items() if name != "missing")
+    verdict = "\n".join(missing) if missing else "Everything that is needed is there."
+    Console(quiet=flags.json).result(values, f"{text}\n\n{verdict}")
+    return 2 if missing else 0

@@ -1,0 +1,130 @@
+"""A pass is one draw call and one sentence: which program, what it reads, which values, where it draws.
+
+    Pass(gpu, "shooting/receive").draw(target, textures={"t_normal": n}, uniforms={"u_shot": 3}, vertices=6, instances=tiles)
+
+Everything binds by name, checked both ways: a name that the program lacks, or one that was not given, raises.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import moderngl
+
+from app.gpu.context import Gpu
+from app.gpu.shader import ShaderError
+
+GL_CLIP_DISTANCE0 = 0x3000
+BLEND: dict[str, tuple[int, ...]] = {
+    "add": (moderngl.ONE, moderngl.ONE),
+    "over": (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA),
+}
+
+
+class Pass:
+    """A program with its defines and slots, ready to draw. The name is also its label in the timers."""
+
+    def __init__(
+        self,
+        gpu: Gpu,
+        name: str,
+        *,
+        defines: Mapping[str, object] | None = None,
+        slots: Mapping[str, str] | None = None,
+        label: str | None = None,
+    ) -> None:
+        self.gpu, self.name, self.label = gpu, name, label or name
+        self._defines, self._slots = dict(defines or {}), dict(slots or {})
+        self._generation = -1
+        self._bind()
+
+    def _bind(self) -> None:
+        self.program = self.gpu.shaders.program(self.name, self._defines, self._slots)
+        self._generation = self.gpu.shaders.generation
+        members = {n: self.program[n] for n in self.program if isinstance(self.program[n], moderngl.Uniform)}
+        # GL types of samplers are the only ones that are bound to a unit
+        self._samplers = {n: i for i, n in enumerate(sorted(n for n in members if n.startswith("t_")))}
+        self._uniforms = {n: u for n, u in members.items() if not n.startswith("t_")}
+        for name, unit in self._samplers.items():
+            members[name].value = unit
+
+    def draw(
+        self,
+        target: moderngl.Framebuffer,
+        *,
+        textures: Mapping[str, moderngl.Texture] | None = None,
+        uniforms: Mapping[str, Any] | None = None,
+        mesh: Mesh | None = None,
+        vertices: int = 3,
+        instances: int = 1,
+        viewport: tuple[int, int, int, int] | None = None,
+        blend: str | None = None,
+        depth: bool = False,
+        strip: bool = False,
+        lines: bool = False,
+        clip_distances: int = 0,
+    ) -> None:
+        """Draw once into ``target``. Without a mesh, ``vertices`` without attributes. Raises ShaderError on a wrong name."""
+        if self._generation != self.gpu.shaders.generation:
+            self._bind()
+        self._check("texture", set(textures or {}), set(self._samplers))
+        self._check("uniform", set(uniforms or {}), set(self._uniforms))
+        for name, texture in (textures or {}).items():
+            texture.use(self._samplers[name])
+        for name, value in (uniforms or {}).items():
+            self._uniforms[name].value = value
+        ctx = self.gpu.ctx
+        target.use()
+        target.viewport = viewport or (0, 0, *target.size)
+        flags = (moderngl.BLEND if blend else 0) | (moderngl.DEPTH_TEST if depth else 0)
+        ctx.enable_only(flags | moderngl.PROGRAM_POINT_SIZE)
+        if blend:
+            ctx.blend_func = BLEND[blend]
+        mode = moderngl.LINES if lines else moderngl.TRIANGLE_STRIP if strip else moderngl.TRIANGLES
+        for plane in range(clip_distances):
+            ctx.enable_direct(GL_CLIP_DISTANCE0 + plane)
+        with self.gpu.timers.measure(self.label):
+            if mesh is None:
+                array = self.gpu.shaders.attributeless(self.program)
+                array.render(mode, vertices=vertices, instances=instances)
+            else:
+                mesh.vertex_array(self.program).render(mode, instances=instances)
+        for plane in range(clip_distances):
+            ctx.disable_direct(GL_CLIP_DISTANCE0 + plane)
+
+    def _check(self, kind: str, given: set[str], known: set[str]) -> None:
+        if unknown := given - known:
+            raise ShaderError(f"pass {self.name} has no {kind} {', '.join(sorted(unknown))}")
+        if missing := known - given:
+            raise ShaderError(f"pass {self.name} needs {kind} {', '.join(sorted(missing))}")
+
+
+class Mesh:
+    """An interleaved vertex buffer: ``attributes`` maps names to moderngl formats (``3f``, ``2u``), in order."""
+
+    def __init__(self, gpu: Gpu, data: bytes, attributes: Mapping[str, str]) -> None:
+        self._ctx = gpu.ctx
+        self.buffer = gpu.ctx.buffer(data)
+        self.attributes = dict(attributes)
+        self._arrays: list[tuple[moderngl.Program, moderngl.VertexArray]] = []
+
+    def vertex_array(self, program: moderngl.Program) -> moderngl.VertexArray:
+        """This mesh as ``program`` reads it; attributes that it does not use are skipped. Raises ShaderError."""
+        for known, array in self._arrays:
+            if known is program:
+                return array
+        wanted = {n for n in program if isinstance(program[n], moderngl.Attribute) and not n.startswith("gl_")}
+        if missing := wanted - set(self.attributes):
+            raise ShaderError(f"mesh has no attribute {', '.join(sorted(missing))}")
+        layout = " ".join(f if n in wanted else f"{int(f[0]) * 4}x" for n, f in self.attributes.items())
+        names = [n for n in self.attributes if n in wanted]
+        array = self._ctx.vertex_array(program, [(self.buffer, layout, *names)])
+        self._arrays.append((program, array))
+        return array
+
+    def release(self) -> None:
+        for _, array in self._arrays:
+            array.release()
+        self._arrays.clear()
+        self.buffer.release()

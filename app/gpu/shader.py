@@ -1,0 +1,130 @@
+"""Plain GLSL from ``app/shaders`` with our own ``#include``: recursive, once; an error names file and line.
+
+The host keeps the map from flattened to source lines itself: Mesa attributes type errors in an included file to the outer one
+when ``#line`` tells it the file.
+
+``#include "common/atlas.glsl"`` is a file below ``app/shaders``; ``#include <projection>`` is a slot that the host fills with a
+file. A define of the host overrides a ``#define NAME value`` that the shader declares, never adds one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import moderngl
+
+SHADERS = Path(__file__).parent.parent / "shaders"
+VERSION = "#version 410 core"
+_INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
+_DEFINE = re.compile(r"^\s*#define\s+(\w+)(?:\s+(.*?))?\s*$")
+_LOCATION = re.compile(r"\b0[:(](\d+)\)?")  # Mesa: 0:line(column), NVIDIA: 0(line)
+
+
+class ShaderError(Exception):
+    """A shader that does not compile, link or bind: our mistake, with the file and line."""
+
+
+class ShaderLibrary:
+    """Compiles programs by name: ``shooting/receive`` is ``receive.vert.glsl`` (or the full-screen triangle) and
+    ``receive.frag.glsl``. Keeps what it has compiled; ``reload`` compiles all again and keeps the last good program."""
+
+    def __init__(self, ctx: moderngl.Context, root: Path = SHADERS) -> None:
+        self._ctx = ctx
+        self._root = root
+        self._programs: dict[tuple[object, ...], moderngl.Program] = {}
+        self._empty: dict[int, moderngl.VertexArray] = {}
+        self.generation = 0  # counts reloads: holders of vertex arrays rebuild when it moves
+
+    def program(
+        self, name: str, defines: Mapping[str, object] | None = None, slots: Mapping[str, str] | None = None
+    ) -> moderngl.Program:
+        """The program ``name`` with these defines and slots. Raises ShaderError."""
+        key = (name, tuple(sorted((defines or {}).items())), tuple(sorted((slots or {}).items())))
+        if key not in self._programs:
+            self._programs[key] = self._compile(name, defines or {}, slots or {})
+        return self._programs[key]
+
+    def attributeless(self, program: moderngl.Program) -> moderngl.VertexArray:
+        """A vertex array without buffers: the vertex shader makes its vertices from ``gl_VertexID``."""
+        if program.glo not in self._empty:
+            self._empty[program.glo] = self._ctx.vertex_array(program, [])
+        return self._empty[program.glo]
+
+    def reload(self) -> None:
+        """Compile every program again from disk. Raises ShaderError and changes nothing if one fails."""
+        fresh = {key: self._compile(key[0], dict(key[1]), dict(key[2])) for key in self._programs}  # type: ignore[arg-type, call-overload]
+        self.release()
+        self._programs = fresh
+        self.generation += 1
+
+    def release(self) -> None:
+        for vertex_array in self._empty.values():
+            vertex_array.release()
+        for program in self._programs.values():
+            program.release()
+        self._empty.clear()
+        self._programs.clear()
+
+    def _compile(self, name: str, defines: Mapping[str, object], slots: Mapping[str, str]) -> moderngl.Program:
+        vertex_file = self._root / f"{name}.vert.glsl"
+        vertex = f"{name}.vert.glsl" if vertex_file.exists() else "common/fullscreen.vert.glsl"
+        unused = set(defines)
+        stages = [Source(self._root, stage, defines, slots, unused) for stage in (vertex, f"{name}.frag.glsl")]
+        if unused:
+            raise ShaderError(f"{name}: no shader declares #define {', '.join(sorted(unused))}")
+        try:
+            return self._ctx.program(vertex_shader=stages[0].text, fragment_shader=stages[1].text)
+        except moderngl.Error as error:
+            message = str(error)
+            raise ShaderError(stages["vertex_shader" not in message].explain(message)) from None
+
+
+class Source:
+    """One stage's text, flattened; remembers which line came from which file."""
+
+    def __init__(
+        self, root: Path, name: str, defines: Mapping[str, object], slots: Mapping[str, str], unused: set[str]
+    ) -> None:
+        self._root, self._defines, self._slots, self._unused = root, defines, slots, unused
+        self._included: set[str] = set()
+        self._places = ["version"]  # file and line that each flattened line came from
+        lines = [VERSION]
+        self._flatten(name, (root / name).read_text(), lines)
+        self.text = "\n".join(lines) + "\n"
+
+    def _flatten(self, name: str, text: str, lines: list[str]) -> None:
+        self._included.add(name)
+        for number, line in enumerate(text.splitlines(), start=1):
+            place = f"{name}:{number}"
+            if include := _INCLUDE.match(line):
+                self._include(include[1], include[2], place, lines)
+                continue
+            if (define := _DEFINE.match(line)) and define[1] in self._defines:
+                self._unused.discard(define[1])
+                value = self._defines[define[1]]
+                line = f"#define {define[1]} {int(value) if isinstance(value, bool) else value}"
+            lines.append(line)
+            self._places.append(place)
+
+    def _include(self, path: str | None, slot: str | None, place: str, lines: list[str]) -> None:
+        if slot is not None:
+            if slot not in self._slots:
+                raise ShaderError(f"app/shaders/{place}: nothing fills the slot <{slot}>")
+            path = self._slots[slot]
+        assert path is not None
+        if path in self._included:
+            return
+        if not (self._root / path).is_file():
+            raise ShaderError(f"app/shaders/{place}: no file app/shaders/{path}")
+        self._flatten(path, (self._root / path).read_text(), lines)
+
+    def explain(self, message: str) -> str:
+        """The driver's message with its line numbers turned into file and line."""
+
+        def place(match: re.Match[str]) -> str:
+            line = int(match[1])
+            return f"app/shaders/{self._places[line - 1]}" if line <= len(self._places) else match[0]
+
+        return "\n".join(_LOCATION.sub(place, line, count=1) for line in message.splitlines())

@@ -1,0 +1,66 @@
+"""Milliseconds per pass from GL timer queries, read a few frames late so that nothing waits for the GPU."""
+
+from __future__ import annotations
+
+import contextlib
+from collections import defaultdict, deque
+from collections.abc import Iterator
+
+import moderngl
+
+LAG = 3  # queries in flight per pass before the oldest is read
+
+
+class Timers:
+    """Totals per pass label. Off by default: a query costs little, but not nothing."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._ctx = ctx
+        self._pending: dict[str, deque[moderngl.Query]] = defaultdict(deque)
+        self._free: list[moderngl.Query] = []
+        self._open = False
+        self.enabled = False
+        self.total_ms: dict[str, float] = defaultdict(float)
+        self.calls: dict[str, int] = defaultdict(int)
+
+    @contextlib.contextmanager
+    def measure(self, label: str) -> Iterator[None]:
+        """Time what is drawn inside. GL allows one timer at a time: an inner one is counted with the outer."""
+        if not self.enabled or self._open:
+            yield
+            return
+        query = self._free.pop() if self._free else self._ctx.query(time=True)
+        self._open = True
+        try:
+            with query:
+                yield
+        finally:
+            self._open = False
+        pending = self._pending[label]
+        pending.append(query)
+        if len(pending) > LAG:
+            self._collect(label, pending.popleft())
+
+    def flush(self) -> None:
+        """Read every query in flight (waits for the GPU)."""
+        for label, pending in self._pending.items():
+            while pending:
+                self._collect(label, pending.popleft())
+
+    def reset(self) -> None:
+        self.flush()
+        self.total_ms.clear()
+        self.calls.clear()
+
+    def mean_ms(self) -> dict[str, float]:
+        """Mean milliseconds per call, by label, in order of first use."""
+        return {label: self.total_ms[label] / self.calls[label] for label in self.total_ms}
+
+    def release(self) -> None:
+        self.flush()
+        self._free.clear()
+
+    def _collect(self, label: str, query: moderngl.Query) -> None:
+        self.total_ms[label] += query.elapsed * 1e-6
+        self.calls[label] += 1
+        self._free.append(query)

@@ -1,0 +1,207 @@
+"""The viewer's twin without a window: pictures and bakes from the same session."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from app import __version__
+from app.atlas.options import AtlasOptions
+from app.bake import prepare_directory, write_bake
+from app.console import Console
+from app.errors import UserError
+from app.gpu import gpu_context
+from app.headless_ui import pixels, ui_image
+from app.options import from_flags
+from app.render.options import DisplayOptions
+from app.session import Session, Stop
+from app.solvers import ShootingOptions
+
+SAMPLES = 2  # per pixel along each axis: smooth edges
+
+
+def shot(flags: argparse.Namespace) -> int:
+    """Solve and save a picture."""
+    _writable_file(flags.output)
+    console = Console(quiet=flags.json)
+    with gpu_context() as gpu:
+        session = _solved(Session(gpu, **session_options(flags)), flags, console)
+        _choose_camera(session, flags.camera)
+        if flags.exposure is None:
+            session.expose()
+        if flags.ui:
+            image = ui_image(gpu, session, flags.size)
+        else:
+            image = picture(session, flags.size)
+        _save_png(flags.output, image)
+        result = {"output": str(flags.output), **report(session)}
+        session.release()
+    console.result(result, f"{flags.output}: {_summary(result)}")
+    return 130 if result["interrupted"] else 0
+
+
+def bake(flags: argparse.Namespace) -> int:
+    """Solve and write scene.glb, irradiance.exr and report.json."""
+    prepare_directory(flags.output)
+    console = Console(quiet=flags.json)
+    with gpu_context() as gpu:
+        session = _solved(Session(gpu, **session_options(flags)), flags, console)
+        clock = time.perf_counter()
+        lightmap = session.lightmap
+        irradiance = lightmap.atlas_image(lightmap.irradiance())
+        covered = lightmap.atlas_image(lightmap.nodes.surfaces.face >= 0)
+        session.load_seconds["read back"] = time.perf_counter() - clock
+        result = report(session)
+        files = write_bake(flags.output, session.scene, session.charts, irradiance, covered, result)
+        session.release()
+    result = {"output": [str(path) for path in vars(files).values()], **result}
+    console.result(result, f"{flags.output}: {_summary(result)}")
+    return 130 if result["interrupted"] else 0
+
+
+def view_or_shot(flags: argparse.Namespace) -> int:
+    """Open the viewer; without a display, render the same headless and say where."""
+    from app.window import no_display
+
+    if reason := no_display():
+        flags.output = Path(f"{Path(flags.scene).stem}.png")
+        flags.shots = flags.time = flags.camera = None
+        flags.ui = True
+        print(f"glowtree: {reason}: rendering headless to {flags.output}", file=sys.stderr)
+        return shot(flags)
+    return view(flags)
+
+
+def view(flags: argparse.Namespace) -> int:
+    """Open the window on a scene. Raises UserError."""
+    from platformdirs import user_config_path
+
+    from app.scene.library import scene_names
+    from app.scene.load import SUFFIXES
+    from app.window import run_window
+
+    def make_session(gpu: Any) -> Session:
+        session = Session(gpu, **session_options(flags))
+        session.open(flags.scene)
+        return session
+
+    layout = user_config_path("glowtree", ensure_exists=True) / "layout.ini"
+    run_window(
+        make_session,
+        size=flags.size,
+        scenes=scene_names(),
+        suffixes=SUFFIXES,
+        layout_file=layout,
+        frames=flags.frames,
+    )
+    return 0
+
+
+def session_options(flags: argparse.Namespace) -> dict[str, Any]:
+    """What the flags say, as a Session takes it."""
+    return {
+        "shooting": from_flags(ShootingOptions, flags),
+        "atlas": from_flags(AtlasOptions, flags),
+        "display": from_flags(DisplayOptions, flags),
+        "default_light": flags.light,
+    }
+
+
+def picture(session: Session, size: tuple[int, int]) -> np.ndarray:
+    """(height, width, 3) u8 sRGB of the session as it is, top row first. Raises UserError for sizes beyond the GPU's."""
+    limit = session.gpu.limits.max_texture // SAMPLES
+    if max(size) > limit:
+        raise UserError(f"--size {size[0]}x{size[1]}: at most {limit} pixels along a side on this GPU")
+    texture = session.gpu.texture(size, 4, "f1")
+    target = session.gpu.target(texture)
+    try:
+        session.draw(target, size, samples=SAMPLES)
+        return pixels(target, size)
+    finally:
+        target.release()
+        texture.release()
+
+
+def report(session: Session) -> dict[str, Any]:
+    """Everything that shaped the solution and what came of it."""
+    stats, books = session.stats, session.books
+    return {
+        "glowtree": __version__,
+        "scene": session.name,
+        "source": str(session.source),
+        "renderer": session.gpu.limits.renderer,
+        "gl_version": session.gpu.limits.version,
+        "parameters": session.parameters,
+        "charts": {"count": stats.charts, "method": session.charts.method, "texels_per_metre": session.charts.density},
+        "triangles": stats.triangles,
+        "texels": stats.texels,
+        "atlas": list(session.charts.size),
+        "memory_mib": stats.memory_mib,
+        "shots": stats.shots,
+        "residual": stats.residual,
+        "converged": stats.converged,
+        "interrupted": session.interrupted,
+        "seconds": {**session.load_seconds, "shoot": stats.seconds},
+        "energy_w": {
+            name: [float(x) for x in getattr(books, name)]
+            for name in ("emitted", "absorbed", "escaped", "unshot", "imbalance")
+        },
+        "imbalance": stats.imbalance,
+        "warnings": [*session.scene.warnings, *session.charts.warnings],
+    }
+
+
+def _solved(session: Session, flags: argparse.Namespace, console: Console) -> Session:
+    with console.progress("loading") as tell:
+        session.open_now(flags.scene, tell)
+    for warning in (*session.scene.warnings, *session.charts.warnings):
+        console.warn(warning)
+    if session.message:
+        console.warn(session.message)
+    stop = Stop(shots=flags.shots, seconds=flags.time)
+    with console.progress("shooting") as tell:
+        session.solve(
+            stop, lambda stats: tell(f"{stats.shots} shots, {stats.residual:.3%} unshot", session.progress(stop))
+        )
+    return session
+
+
+def _choose_camera(session: Session, name: str | None) -> None:
+    if name is None:
+        return
+    cameras = {camera.name: camera for camera in session.scene.cameras}
+    if name not in cameras:
+        raise UserError(f"--camera {name}: {session.name} has {', '.join(cameras)}")
+    session.look_through(cameras[name])
+
+
+def _writable_file(path: Path) -> None:
+    """Raise UserError now rather than after the work."""
+    if path.is_dir() or path.suffix.lower() != ".png":
+        raise UserError(f"-o {path}: must be a .png file")
+    if not path.parent.is_dir():
+        raise UserError(f"-o {path}: the folder {path.parent} does not exist")
+
+
+def _save_png(path: Path, image: np.ndarray) -> None:
+    try:
+        Image.fromarray(image).save(path)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def _summary(result: dict[str, Any]) -> str:
+    state = "stopped early" if result["interrupted"] else "converged" if result["converged"] else "stopped as asked"
+    return (
+        f"{result['shots']} shots in {result['seconds']['shoot']:.1f} s, {result['residual']:.2%} unshot ({state}), "
+        f"{result['texels']} texels, energy imbalance {result['imbalance']:+.2%}, {result['renderer']}"
+    )
+
+
+__all__ = ["bake", "picture", "report", "shot", "view", "view_or_shot"]

@@ -1,0 +1,44 @@
+"""How a solve went: one row per report, thinned so that it never grows without bound."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.scene.model import F64
+from app.solvers import EnergyBook
+
+CAPACITY = 4096  # rows kept: more than a plot has pixels
+COLUMNS = ("shots", "seconds", "residual", "absorbed", "escaped")
+
+
+class History:
+    """Columns of equal length: shots, seconds, residual [-], absorbed and escaped (shares of the emitted power)."""
+
+    def __init__(self) -> None:
+        self._rows = np.zeros((CAPACITY, len(COLUMNS)))
+        self._count = 0
+
+    def add(self, shots: int, seconds: float, residual: float, books: EnergyBook) -> None:
+        """Append a row; when full, every second row goes."""
+        if self._count == CAPACITY:
+            self._rows[: CAPACITY // 2] = self._rows[::2]
+            self._count = CAPACITY // 2
+        emitted = max(float(books.emitted.sum()), 1e-300)
+        shares = float(books.absorbed.sum()) / emitted, float(books.escaped.sum()) / emitted
+        self._rows[self._count] = shots, seconds, residual, *shares
+        self._count += 1
+
+    def column(self, name: str) -> F64:
+        """One of COLUMNS, contiguous (n,) f64."""
+        return np.ascontiguousarray(self._rows[: self._count, COLUMNS.index(name)])
+
+    @property
+    def shots_per_second(self) -> float:
+        """Over the last second of solving, or all of it."""
+        rows = self._rows[: self._count]
+        if len(rows) < 2:
+            return 0.0
+        recent = rows[rows[:, 1] >= rows[-1, 1] - 1.0]
+        first = recent[0] if len(recent) > 1 else rows[-2]
+        span = rows[-1, 1] - first[1]
+        return float((rows[-1, 0] - first[0]) / span) if span > 0 else 0.0

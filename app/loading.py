@@ -1,0 +1,102 @@
+"""From a file to a node set, in a thread of its own: the window never waits for it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.atlas.charts import Charts
+from app.atlas.node_set import NodeSet
+from app.atlas.options import AtlasOptions
+from app.atlas.parametrize import parametrize
+from app.errors import UserError
+from app.scene.load import load_scene
+from app.scene.model import Scene
+
+Progress = Callable[[str, float], None]  # stage, share done
+
+
+class Cancelled(Exception):
+    """The user stopped it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """A node set and how long each stage took [s]."""
+
+    nodes: NodeSet
+    seconds: dict[str, float]
+
+
+def read_and_unfold(
+    source: str | Path, atlas: AtlasOptions, default_light: bool, tell: Progress
+) -> tuple[Scene, Charts, dict[str, float]]:
+    """The scene, its charts, and the seconds of both stages. Raises UserError (SceneError)."""
+    start = time.perf_counter()
+    tell("reading", 0.0)
+    scene = load_scene(source, default_light=default_light)
+    middle = time.perf_counter()
+    tell("unfolding", 0.1)
+    charts = parametrize(scene, density=atlas.density, texels=atlas.texels, progress=tell)
+    return scene, charts, {"read": middle - start, "unfold": time.perf_counter() - middle}
+
+
+def load(
+    source: str | Path, atlas: AtlasOptions, *, default_light: bool = False, progress: Progress | None = None
+) -> Loaded:
+    """Read a scene, unfold it and cut it into texels. Raises UserError (SceneError)."""
+    tell: Progress = progress or (lambda stage, share: None)
+    scene, charts, seconds = read_and_unfold(source, atlas, default_light, tell)
+    start = time.perf_counter()
+    tell("cutting into texels", 0.6)
+    nodes = NodeSet(scene, charts)
+    tell("done", 1.0)
+    return Loaded(nodes, seconds | {"texels": time.perf_counter() - start})
+
+
+class Loading:
+    """A load under way. ``poll`` says whether it ended; ``result`` gives it or raises what went wrong."""
+
+    def __init__(self, source: str | Path, atlas: AtlasOptions, *, default_light: bool = False) -> None:
+        self.source = source
+        self.stage, self.fraction = "reading", 0.0
+        self._cancelled = False
+        self._loaded: Loaded | None = None
+        self._error: BaseException | None = None
+        self._thread = threading.Thread(target=self._run, args=(atlas, default_light), daemon=True)
+        self._thread.start()
+
+    @property
+    def ended(self) -> bool:
+        return not self._thread.is_alive()
+
+    @property
+    def result(self) -> Loaded:
+        """What was loaded. Raises UserError, or Cancelled."""
+        self._thread.join()
+        if self._cancelled:
+            raise Cancelled
+        if self._error is not None:
+            raise self._error
+        assert self._loaded is not None
+        return self._loaded
+
+    def cancel(self) -> None:
+        """Stop at the next stage; the scene that is open stays."""
+        self._cancelled = True
+
+    def _run(self, atlas: AtlasOptions, default_light: bool) -> None:
+        try:
+            self._loaded = load(self.source, atlas, default_light=default_light, progress=self._progress)
+        except (UserError, Cancelled, MemoryError) as error:
+            self._error = UserError("not enough memory for this scene") if isinstance(error, MemoryError) else error
+        except Exception as error:  # shown by the main thread, with its traceback
+            self._error = error
+
+    def _progress(self, stage: str, share: float) -> None:
+        if self._cancelled:
+            raise Cancelled
+        self.stage, self.fraction = stage, share

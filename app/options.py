@@ -1,0 +1,161 @@
+"""One declared field = default, unit, range and help; the command line flag, the widget and the report follow from it.
+
+    @dataclass(frozen=True)
+    class ShootingOptions(Options):
+        level: int = option(2, "mip level that shoots, above the texels", minimum=0, maximum=4)
+
+An ``Options`` checks itself when made: a value out of range raises ``UserError`` with name, value and what is allowed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import math
+import types
+import typing
+from dataclasses import dataclass
+from typing import Any, Self, TypeVar
+
+from app.errors import UserError
+
+OptionsT = TypeVar("OptionsT", bound="Options")
+
+
+@dataclass(frozen=True)
+class Spec:
+    """What is known of one option: enough for a flag, a widget and a line of the report."""
+
+    name: str
+    type: type
+    default: Any
+    help: str
+    unit: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: tuple[str, ...] = ()
+    logarithmic: bool = False
+    multiple: int = 1
+    optional: bool = False
+
+    @property
+    def flag(self) -> str:
+        return "--" + self.name.replace("_", "-")
+
+    @property
+    def allowed(self) -> str:
+        """The legal values in words, e.g. ``0 to 4``."""
+        if self.multiple > 1:
+            return f"{self.minimum:g} to {self.maximum:g} in steps of {self.multiple}"
+        if self.choices:
+            return "one of " + ", ".join(self.choices)
+        if self.minimum is not None and self.maximum is not None:
+            return f"{self.minimum:g} to {self.maximum:g}"
+        if self.minimum is not None:
+            return f"at least {self.minimum:g}"
+        if self.maximum is not None:
+            return f"at most {self.maximum:g}"
+        return {int: "a whole number", float: "a number", bool: "true or false"}.get(self.type, "text")
+
+    def check(self, value: Any) -> None:
+        """Raise UserError unless ``value`` is legal."""
+        if value is None and self.optional:
+            return
+        number = self.type in (int, float)
+        legal = (
+            isinstance(value, (int, float)) and not isinstance(value, bool) if number else isinstance(value, self.type)
+        )
+        if legal and self.type is int:
+            legal = float(value).is_integer()
+        if legal and number:
+            legal = math.isfinite(value)
+            legal = legal and (self.minimum is None or value >= self.minimum)
+            legal = legal and (self.maximum is None or value <= self.maximum)
+            legal = legal and (self.multiple == 1 or value % self.multiple == 0)
+        if legal and self.choices:
+            legal = value in self.choices
+        if not legal:
+            raise UserError(f"{self.flag} {value}: must be {self.allowed}")
+
+
+def option(
+    default: Any,
+    help: str,
+    *,
+    unit: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+    choices: typing.Iterable[str] = (),
+    logarithmic: bool = False,
+    multiple: int = 1,
+) -> Any:
+    """Declare one field of an ``Options`` dataclass."""
+    meta = {"help": help, "unit": unit, "minimum": minimum, "maximum": maximum, "choices": tuple(choices)}
+    return dataclasses.field(default=default, metadata={**meta, "logarithmic": logarithmic, "multiple": multiple})
+
+
+@dataclass(frozen=True)
+class Options:
+    """Base of every set of knobs: frozen, checked when made, edited by ``replace``."""
+
+    def __post_init__(self) -> None:
+        for spec in specs(type(self)):
+            spec.check(getattr(self, spec.name))
+
+    def replace(self, **changes: Any) -> Self:
+        """A checked copy with some fields changed; an unknown name is an error."""
+        unknown = changes.keys() - {f.name for f in dataclasses.fields(self)}
+        if unknown:
+            raise UserError(f"unknown option {', '.join(sorted(unknown))} for {type(self).__name__}")
+        return dataclasses.replace(self, **changes)
+
+    def as_dict(self) -> dict[str, Any]:
+        return dataclasses.asdict(self)
+
+
+def specs(options: type[Options]) -> list[Spec]:
+    """The declared options of a class, in order."""
+    hints = typing.get_type_hints(options)
+    out = []
+    for f in dataclasses.fields(options):
+        kind, optional = hints[f.name], False
+        if isinstance(kind, types.UnionType):
+            kind = next(a for a in typing.get_args(kind) if a is not type(None))
+            optional = True
+        out.append(Spec(f.name, kind, f.default, optional=optional, **f.metadata))
+    return out
+
+
+def add_flags(parser: argparse.ArgumentParser, options: type[Options]) -> None:
+    """Give ``parser`` one flag per declared option; booleans become ``--name`` / ``--no-name``."""
+    group = parser.add_argument_group(options.__name__.removesuffix("Options").lower())
+    for spec in specs(options):
+        unit = f" [{spec.unit}]" if spec.unit else ""
+        default = "" if spec.default is None else f" (default {spec.default})"
+        text = (spec.help + unit + default).replace("%", "%%")
+        if spec.type is bool:
+            group.add_argument(spec.flag, action=argparse.BooleanOptionalAction, default=None, help=text)
+        else:
+            meta = "{" + ",".join(spec.choices) + "}" if spec.choices else spec.type.__name__.upper()
+            group.add_argument(spec.flag, type=_reader(spec), default=None, metavar=meta, help=text)
+
+
+def from_flags(options: type[OptionsT], flags: argparse.Namespace) -> OptionsT:
+    """The options that the parsed flags ask for; flags not given keep the default."""
+    given = {s.name: getattr(flags, s.name, None) for s in specs(options)}
+    return options(**{name: value for name, value in given.items() if value is not None})
+
+
+def _reader(spec: Spec) -> Any:
+    def read(text: str) -> Any:
+        try:
+            value = spec.type(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text}: must be {spec.allowed}") from None
+        try:
+            spec.check(value)
+        except UserError:
+            raise argparse.ArgumentTypeError(f"{text}: must be {spec.allowed}") from None
+        return value
+
+    return read

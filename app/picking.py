@@ -1,0 +1,78 @@
+"""What lies under the pointer: a point of a surface, its texel, and the light on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.atlas.lightmap import Lightmap
+from app.render.pick import PickHit
+from app.scene.model import RGB
+
+
+@dataclass(frozen=True)
+class Picked:
+    """A picked point. Indices are the scene's and its charts'; texel and patch (column, row) in the node set; position [m], area
+    [m²]; B, E, H, r are RGB [W/m²]. A side without texels has chart and facet -1 and area 0: it only emits."""
+
+    triangle: int
+    object: str
+    material: int
+    back: bool
+    chart: int
+    facet: int
+    texel: tuple[int, int]
+    patch: tuple[int, int]
+    position: RGB
+    normal: RGB
+    area: float
+    B: RGB
+    E: RGB
+    H: RGB
+    r: RGB
+    albedo: RGB
+
+
+def picked_from_hit(lightmap: Lightmap, hit: PickHit, level: int) -> Picked:
+    """Look up the texel that was hit; ``level`` is that of the shooting patches. Waits for the GPU."""
+    scene, charts = lightmap.scene, lightmap.charts
+    material = scene.materials[hit.material]
+    normal = scene.normals_areas[0][hit.triangle] * (-1.0 if hit.back else 1.0)
+    albedo, E = np.array(material.albedo), np.pi * np.array(material.emission)
+    if hit.back and not material.double_sided:
+        albedo, E = np.zeros(3), np.zeros(3)
+    H, r, area, texel, chart = np.zeros(3), np.zeros(3), 0.0, (0, 0), -1
+    if hit.tile is not None and hit.tile_texel is not None and hit.texel is not None:
+        texel, (column, row) = hit.texel, hit.tile_texel
+        at = (hit.tile, row, column)
+        H, r = lightmap.light_at(texel)
+        area = float(lightmap.nodes.surfaces.area[at])
+        face = int(lightmap.nodes.surfaces.face[at])
+        chart = int(charts.face_chart[face]) if face >= 0 else -1
+        if lightmap.nodes.albedo_tiles is not None:
+            albedo = albedo * lightmap.nodes.albedo_tiles[at]
+        if lightmap.nodes.emission_tiles is not None:
+            E = E * lightmap.nodes.emission_tiles[at]
+    return Picked(
+        triangle=hit.triangle,
+        object=scene.objects[scene.object_ids[hit.triangle]],
+        material=hit.material,
+        back=hit.back,
+        chart=chart,
+        facet=-1 if hit.facet is None else hit.facet,
+        texel=texel,
+        patch=(texel[0] >> level, texel[1] >> level),
+        position=hit.position,
+        normal=_rgb(normal),
+        area=area,
+        B=_rgb(E + albedo * H),
+        E=_rgb(E),
+        H=_rgb(H),
+        r=_rgb(r),
+        albedo=_rgb(albedo),
+    )
+
+
+def _rgb(values: np.ndarray) -> RGB:
+    return float(values[0]), float(values[1]), float(values[2])

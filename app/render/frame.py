@@ -1,0 +1,165 @@
+"""The whole picture, top to bottom: background, surfaces, and onto the screen."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.lightmap import Lightmap
+from app.errors import UserError
+from app.gpu import Framebuffer, Gpu, Pass, Texture
+from app.render.camera import CameraView
+from app.render.false_colour import LAYER, Scale, false_colour_scale
+from app.render.options import DisplayOptions
+from app.render.pick import Picker, PickHit
+from app.render.surfaces import Rect, Surfaces
+from app.scene.model import RGB
+
+GL_DEPTH_CLAMP = 0x864F  # OpenGL 3.2: what lies before the near plane is drawn at it instead of being cut away
+
+
+class FrameRenderer:
+    """Draws frames of one lightmap after another, and answers what lies under a pixel of the last one.
+
+    Keeps its targets between frames of one size. Whoever makes it releases it.
+    """
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._background = Pass(gpu, "render/background", label="background")
+        self._picker = Picker(gpu)
+        self._surfaces: Surfaces | None = None
+        self._picture: _Picture | None = None
+        self._last: tuple[Lightmap, CameraView, tuple[int, int]] | None = None
+
+    def render(
+        self,
+        target: Framebuffer,
+        size: tuple[int, int],
+        lightmap: Lightmap,
+        view: CameraView,
+        display: DisplayOptions,
+        *,
+        ambient: RGB | None = None,
+        shooter: Rect | None = None,
+        scale: Scale | None = None,
+        samples: int = 1,
+    ) -> None:
+        """Draw into the lower left ``size`` (width, height) [px] of ``target``.
+
+        ambient: A [W/m²] for ``display.ambient``. shooter: the patch to mark for ``display.shooter``: (u, v, u, v) in
+        atlas texels. scale: of the false colour; left out, it is found from the light, which waits for the GPU.
+        samples: per pixel along each axis; with more than one, every texel is brought up to date, else in a large
+        lightmap only some, in turn. Raises GpuError for a picture larger than a texture can be.
+        """
+        layer = display.layer
+        if display.false_colour == "off":
+            scale = None
+        else:
+            layer, scale = LAYER[display.false_colour], scale or false_colour_scale(display, lightmap)
+        clip_from_local = view.clip_from_local(size[0] / size[1], lightmap.frame)
+        surfaces = self._surfaces_of(lightmap)
+        picture = self._picture_for(target, size, samples)
+
+        picture.target.clear(depth=1.0)
+        self._gpu.ctx.enable_direct(GL_DEPTH_CLAMP)
+        surfaces.draw(
+            picture.target,
+            clip_from_local,
+            layer,
+            display,
+            scale=scale,
+            ambient=ambient,
+            shooter=shooter,
+            whole=samples > 1,
+        )
+        self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
+        self._background.draw(picture.target, uniforms={"u_height_px": float(picture.size[1])}, depth=True)
+        if picture.own:
+            present = Pass(self._gpu, "render/present", defines={"SAMPLES": samples}, label="present")
+            present.draw(target, textures={"t_picture": picture.colour}, viewport=(0, 0, *size))
+        self._last = lightmap, view.copy(), size
+
+    def pick(self, x_px: float, y_px: float) -> PickHit | None:
+        """The surface under a pixel of the last frame, counted from its top left corner; None for the background."""
+        if self._last is None:
+            return None
+        lightmap, view, size = self._last
+        extent = 2.0 / np.array(size, np.float64)
+        centre = ((np.floor([x_px, y_px]) + 0.5) * extent - 1.0) * [1.0, -1.0]
+        self._gpu.ctx.enable_direct(GL_DEPTH_CLAMP)
+        hit = self._picker.pick(lightmap, view.clip_from_local(size[0] / size[1], lightmap.frame), centre, extent)
+        self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
+        return hit
+
+    def release(self) -> None:
+        for resource in (self._surfaces, self._picture, self._picker):
+            if resource is not None:
+                resource.release()
+
+    def _surfaces_of(self, lightmap: Lightmap) -> Surfaces:
+        if self._surfaces is None or self._surfaces.lightmap is not lightmap:
+            if self._surfaces:
+                self._surfaces.release()
+            self._surfaces = Surfaces(self._gpu, lightmap)
+        return self._surfaces
+
+    def _picture_for(self, target: Framebuffer, size: tuple[int, int], samples: int) -> _Picture:
+        """Where to draw: straight into a target that is a texture of this size, else into a picture of our own."""
+        attached = target.color_attachments or (None,)
+        direct = attached[0] if samples == 1 and isinstance(attached[0], Texture) and attached[0].size == size else None
+        drawn = size[0] * samples, size[1] * samples
+        known = self._picture
+        if known is None or known.size != drawn or (not known.own if direct is None else known.colour is not direct):
+            if known:
+                known.release()
+            self._picture = known = _Picture(self._gpu, drawn, direct)
+        return known
+
+
+class _Picture:
+    """An sRGB picture with depth: of our own, or a colour texture of somebody else's that is given depth."""
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int], colour: Texture | None) -> None:
+        self.size, self.own = size, colour is None
+        self.colour = colour or gpu.texture(size, 4, "f1")
+        self.depth: Texture = gpu.depth_texture(size)
+        self.target = gpu.target(self.colour, depth=self.depth)
+
+    def release(self) -> None:
+        self.target.release()
+        self.depth.release()
+        if self.own:
+            self.colour.release()
+
+
+def render_image(
+    gpu: Gpu,
+    lightmap: Lightmap,
+    view: CameraView,
+    display: DisplayOptions,
+    size: tuple[int, int],
+    *,
+    samples: int = 2,
+    ambient: RGB | None = None,
+    shooter: Rect | None = None,
+    scale: Scale | None = None,
+) -> NDArray[np.uint8]:
+    """One picture of ``size`` (width, height): (height, width, 3) u8 sRGB, top row first. The rest as in
+    ``FrameRenderer.render``. Raises UserError for a size that this GPU cannot draw."""
+    limit = gpu.limits.max_texture // samples
+    if not (1 <= min(size) and max(size) <= limit):
+        raise UserError(f"a picture of {size[0]}×{size[1]} pixels: each side must be 1 to {limit} on this GPU")
+    picture = gpu.texture(size, 4, "f1")
+    target = gpu.target(picture)
+    renderer = FrameRenderer(gpu)
+    try:
+        renderer.render(
+            target, size, lightmap, view, display, ambient=ambient, shooter=shooter, scale=scale, samples=samples
+        )
+        pixels = np.frombuffer(picture.read(), np.uint8).reshape(size[1], size[0], 4)
+    finally:
+        renderer.release()
+        target.release()
+        picture.release()
+    return np.ascontiguousarray(pixels[::-1, :, :3])

@@ -1,0 +1,29 @@
+"""The visibility map as a picture: one colour per facet, darker with distance."""
+
+from __future__ import annotations
+
+from app.gpu import Gpu, Pass, Texture
+
+
+class ItemImage:
+    """Draws the last map it was given. Whoever makes it releases it."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._pass = Pass(gpu, "render/items")
+        self._image: Texture | None = None
+
+    def draw(self, visibility: Texture) -> Texture:
+        """``visibility`` (item, depth), see shooting/visible.glsl, as an RGBA8 texture of the same size."""
+        if self._image is None or self._image.size != visibility.size:
+            self.release()
+            self._image = self._gpu.texture(visibility.size, 4, "f1")
+            self._target = self._gpu.target(self._image)
+        self._pass.draw(self._target, textures={"t_map": visibility})
+        return self._image
+
+    def release(self) -> None:
+        if self._image is not None:
+            self._target.release()
+            self._image.release()
+            self._image = None

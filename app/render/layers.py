@@ -1,0 +1,31 @@
+"""What can be shown, as a table: a layer is one file in app/shaders/render/layers and one line here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.render.options import LAYERS
+
+
+@dataclass(frozen=True)
+class Layer:
+    """shader: its file. light: the lightmap's texture that it shows as radiance, exposed; None for what is no light and
+    is shown as it is. smooth: whether its texels may be interpolated. checker: depth of the texel checker. defines:
+    those of the lightmap's that the shader declares."""
+
+    shader: str
+    light: str | None = None
+    smooth: bool = True
+    checker: float = 0.0
+    defines: tuple[str, ...] = ()
+
+
+LAYER_SHADERS = {
+    "combined": Layer("combined", "t_irradiance", defines=("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")),
+    "irradiance": Layer("light", "t_irradiance"),
+    "residual": Layer("light", "t_residual"),
+    "albedo": Layer("albedo", defines=("MATERIAL_BITS", "ALBEDO_TEXTURE")),
+    "charts": Layer("charts", smooth=False, checker=0.12, defines=("MATERIAL_BITS",)),
+    "texels": Layer("texels", smooth=False, checker=0.25, defines=("MATERIAL_BITS",)),
+}
+assert tuple(LAYER_SHADERS) == LAYERS

@@ -1,0 +1,27 @@
+"""What the picture shows and how it is developed: the display knobs of viewer and headless shot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.options import Options, option
+
+LAYERS = ("combined", "irradiance", "residual", "albedo", "charts", "texels")
+TONE_MAPS = ("clamp", "reinhard", "aces", "agx", "neutral")
+FALSE_COLOURS = ("off", "illuminance", "luminance")  # lux, cd/m²
+
+
+@dataclass(frozen=True)
+class DisplayOptions(Options):
+    layer: str = option("combined", "what is shown: B, H, r, albedo, charts or texel density", choices=LAYERS)
+    exposure: float = option(0.0, "exposure", unit="EV", minimum=-24, maximum=24)
+    tone_map: str = option("agx", "tone curve", choices=TONE_MAPS)
+    smooth: bool = option(True, "bilinear texels instead of nearest")
+    ambient: bool = option(False, "add the ambient estimate of light not yet shot (Cohen et al. 1988); display only")
+    grid: bool = option(False, "draw the texel grid and the tiles")
+    shooter: bool = option(False, "mark the patch that shot last")
+    false_colour: str = option("off", "false colour with a legend: lux or cd/m²", choices=FALSE_COLOURS)
+    false_colour_log: bool = option(True, "logarithmic false-colour scale")
+    false_colour_max: float = option(
+        0.0, "top of the false-colour scale; 0 = found from the light", unit="lux or cd/m²", minimum=0, maximum=1e9
+    )

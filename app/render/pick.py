@@ -1,0 +1,83 @@
+"""What lies under a pixel: the scene drawn once more, into that pixel alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.atlas.charts import TILE
+from app.atlas.lightmap import Lightmap
+from app.gpu import Gpu, Pass
+from app.render.surfaces import uniform_matrix
+from app.scene.model import F64
+
+
+@dataclass(frozen=True)
+class PickHit:
+    """A point of a surface.
+
+    triangle, material: of the scene. back: whether its back side is seen. position (x, y, z) [m]. None where that side
+    has no texels: facet, from 0; atlas_uv, in atlas texels; texel (column, row) in the node-set textures; tile of the
+    lightmap and tile_texel (column, row) in it.
+    """
+
+    triangle: int
+    back: bool
+    material: int
+    position: tuple[float, float, float]
+    facet: int | None = None
+    atlas_uv: tuple[float, float] | None = None
+    texel: tuple[int, int] | None = None
+    tile: int | None = None
+    tile_texel: tuple[int, int] | None = None
+
+
+class Picker:
+    """Owns the one-pixel target. Whoever makes it releases it."""
+
+    def __init__(self, gpu: Gpu) -> None:
+
+        self._textures = [gpu.texture((1, 1), 4, "u4"), gpu.texture((1, 1), 4, "f4"), gpu.texture((1, 1), 4, "f4")]
+        self._pass = Pass(gpu, "render/pick")
+        self._depth = gpu.depth_texture((1, 1))
+        self._target = gpu.target(*self._textures, depth=self._depth)
+
+    def pick(self, lightmap: Lightmap, clip_from_local: F64, centre: F64, extent: F64) -> PickHit | None:
+        """The nearest surface that a pixel sees: its centre (2,) and extent (2,) in the picture from -1 to 1, +y up.
+        Waits for the GPU."""
+        zoom = np.diag([2 / extent[0], 2 / extent[1], 1.0, 1.0])
+        zoom[:2, 3] = -centre * zoom.diagonal()[:2]
+        self._target.use()
+        self._target.clear(depth=1.0)
+        self._pass.draw(
+            self._target,
+            uniforms={"u_clip_from_local": uniform_matrix(zoom @ clip_from_local)},
+            mesh=lightmap.mesh,
+            depth=True,
+        )
+        ids, atlas, local = (
+            np.frombuffer(texture.read(), dtype)
+            for texture, dtype in zip(self._textures, (np.uint32, np.float32, np.float32), strict=True)
+        )
+        if ids[0] == 0:
+            return None
+        x, y, z = lightmap.frame.world_from_local(local[:3].astype(np.float64)).tolist()
+        hit = PickHit(int(ids[0]) - 1, bool(ids[1]), int(ids[3]), (x, y, z))
+        return hit if ids[2] == 0 else _with_texel(hit, int(ids[2]) - 1, (float(atlas[0]), float(atlas[1])), lightmap)
+
+    def release(self) -> None:
+        self._target.release()
+        self._depth.release()
+        for texture in self._textures:
+            texture.release()
+
+
+def _with_texel(hit: PickHit, facet: int, uv: tuple[float, float], lightmap: Lightmap) -> PickHit:
+    column, row = int(uv[0]), int(uv[1])
+    found = np.flatnonzero((lightmap.nodes.leaves.x == column // TILE) & (lightmap.nodes.leaves.y == row // TILE))
+    if len(found) == 0:
+        return hit
+    tile, inside = int(found[0]), (column % TILE, row % TILE)
+    texel = (tile % lightmap.columns * TILE + inside[0], tile // lightmap.columns * TILE + inside[1])
+    return PickHit(hit.triangle, hit.back, hit.material, hit.position, facet, uv, texel, tile, inside)

@@ -1,0 +1,143 @@
+"""Display texels: a layer on every texel, developed for the screen, in tiles of 18×18 that the sampler interpolates.
+
+Doing exposure, tone curve and sRGB here leaves one look-up per pixel: that is what holds 30 frames/s on a software
+rasteriser. A texel that covers nothing copies a neighbour, so that no gutter or tile border darkens the picture.
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import numpy as np
+
+from app.atlas.charts import TILE
+from app.atlas.lightmap import Lightmap
+from app.atlas.node_set import TABLE_WIDTH
+from app.gpu import Gpu, Pass, Texture
+from app.render.develop import curve
+from app.render.false_colour import Scale
+from app.render.layers import LAYER_SHADERS, Layer
+from app.render.options import DisplayOptions
+from app.scene.model import RGB
+
+BORDERED = TILE + 2
+TEXELS_PER_FRAME = 1 << 18  # that are brought up to date in one frame, where not all must be
+OUTSIDE = 0xFFFF  # a page that no atlas has
+T = TypeVar("T")
+
+
+class DisplayTexels:
+    """The display texels of one lightmap. Whoever makes it releases it."""
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
+        self._gpu, self._lightmap = gpu, lightmap
+        self.size = (lightmap.columns * BORDERED, lightmap.rows * BORDERED)
+        self._colour = gpu.texture(self.size, 4, "f1")
+        self._target = gpu.target(self._colour)
+        sides = np.array([m.double_sided for m in lightmap.scene.materials], np.uint32)
+        self._unlit = gpu.texture((len(sides), 2), 4, "f1")
+        self._unlit_target = gpu.target(self._unlit)
+        self._tables = {
+            "t_sides": gpu.texture((len(sides), 1), 1, "u4", sides.tobytes()),
+            "t_charts": self._chart_table(),
+            "t_places": self._place_table(),
+            "t_source": gpu.texture(self.size, 1, "u4"),
+        }
+        self._find_sources()
+        self._passes: dict[tuple[str, Layer, str], Pass] = {}
+        self._shown: object = None  # what all texels have been resolved for
+        self._next_row = 0
+
+    def resolve(
+        self, layer_name: str, display: DisplayOptions, *, scale: Scale | None, ambient: RGB, whole: bool
+    ) -> dict[str, Texture]:
+        """Bring the display texels up to date; the textures that surfaces bind.
+
+        Where only the light has changed and not ``whole``, at most TEXELS_PER_FRAME are, in turn.
+        """
+        layer, lightmap = LAYER_SHADERS[layer_name], self._lightmap
+        shader, uniforms = curve(display, scale, exposed=layer.light is not None)
+        shown = (layer, shader, tuple(uniforms.items()))
+        first, rows = self._band(whole or shown != self._shown)
+        self._shown = shown
+
+        uniforms |= {
+            "u_unit": lightmap.unit,
+            "u_ambient": ambient,
+            "u_target_texel": 1.0 / (lightmap.charts.density * lightmap.frame.scale),
+        }
+        names = ("t_normal_ids", "t_materials", "t_albedo", "t_emission", "t_facets")
+        textures = self._tables | lightmap.textures(*names)
+        textures |= {"t_light": lightmap.texture(layer.light)} if layer.light else {}
+        for name, target, viewport in (
+            ("unlit", self._unlit_target, (0, 0, *self._unlit.size)),
+            ("resolve", self._target, (0, first, self.size[0], rows)),
+        ):
+            resolve = self._pass(name, layer, shader)
+            bound, values = declared(resolve, textures), declared(resolve, uniforms)
+            resolve.draw(target, textures=bound, uniforms=values, viewport=viewport)
+        smooth = layer.smooth and display.smooth
+        filtering = self._gpu.ctx.LINEAR if smooth else self._gpu.ctx.NEAREST
+        self._colour.filter = (filtering, filtering)
+        return {"t_display": self._colour, "t_unlit": self._unlit, "t_places": self._tables["t_places"]}
+
+    def release(self) -> None:
+        self._target.release()
+        self._unlit_target.release()
+        for texture in (self._colour, self._unlit, *self._tables.values()):
+            texture.release()
+
+    def _band(self, whole: bool) -> tuple[int, int]:
+        """First row and number of rows to resolve now."""
+        height = self.size[1]
+        rows = height if whole else max(1, min(height, TEXELS_PER_FRAME // self.size[0]))
+        first = self._next_row if rows < height else 0
+        rows = min(rows, height - first)
+        self._next_row = (first + rows) % height
+        return first, rows
+
+    def _pass(self, name: str, layer: Layer, shader: str) -> Pass:
+        key = name, layer, shader
+        if key not in self._passes:
+            defines = self._lightmap.defines(*layer.defines)
+            slots = {"layer": f"render/layers/{layer.shader}.glsl", "curve": f"render/{shader}.glsl"}
+            self._passes[key] = Pass(self._gpu, f"render/{name}", defines=defines, slots=slots, label=name)
+        return self._passes[key]
+
+    def _chart_table(self) -> Texture:
+        """The chart of each facet (from 1), R32UI, TABLE_WIDTH wide."""
+        charts = self._lightmap.charts
+        rows = -(-(charts.facet_count + 1) // TABLE_WIDTH)
+        chart_of_facet = np.zeros(rows * TABLE_WIDTH, np.uint32)
+        chart_of_facet[charts.face_facet + 1] = charts.face_chart
+        return self._gpu.texture((TABLE_WIDTH, rows), 1, "u4", chart_of_facet.tobytes())
+
+    def _place_table(self) -> Texture:
+        """Where the first texel of each page of the atlas is among the display texels, RG32F."""
+        lightmap, leaves = self._lightmap, self._lightmap.nodes.leaves
+        width, height = (side // TILE for side in lightmap.charts.size)
+        tile = np.arange(lightmap.tiles)
+        places = np.zeros((height, width, 2), np.float32)
+        places[leaves.y, leaves.x] = np.stack([tile % lightmap.columns, tile // lightmap.columns], -1) * BORDERED + 1
+        return self._gpu.texture((width, height), 2, "f4", places.tobytes())
+
+    def _find_sources(self) -> None:
+        """Which node-set texel each display texel copies."""
+        lightmap, leaves = self._lightmap, self._lightmap.nodes.leaves
+        pages = np.full((lightmap.rows * lightmap.columns, 2), OUTSIDE, np.uint32)
+        pages[: lightmap.tiles] = np.stack([leaves.x, leaves.y], -1)
+        table = self._gpu.texture((lightmap.columns, lightmap.rows), 2, "u4", pages.tobytes())
+        target = self._gpu.target(self._tables["t_source"])
+        Pass(self._gpu, "render/source").draw(
+            target,
+            textures={"t_leaves": table} | lightmap.textures("t_pages", "t_position_area"),
+            uniforms={"u_columns": float(lightmap.columns)},
+        )
+        target.release()
+        table.release()
+
+
+def declared(program: Pass, offered: dict[str, T]) -> dict[str, T]:
+    """Those of the offered that a program made of slots declares: what it lacks is its slot's choice."""
+    names = set(program.program)
+    return {name: value for name, value in offered.items() if name in names}

@@ -1,0 +1,285 @@
+"""Scenes written by hand as TOML. Unknown keys are errors; an error names file, key and reason.
+
+    [scene]                     # name; unit = "m" | "cm" | "mm": what every length below is counted in
+    [[material]]                # name; albedo = [r, g, b]; double_sided = false
+                                # emission = [r, g, b] radiance L [W/(sr m²)], or exitance = [r, g, b] πL [W/m²]
+                                # texture = { pattern = "checker" | "stripes", colors = [[r, g, b], [r, g, b]] }
+                                #        or { image = "file beside the TOML" }, both with repeat = [across, up]
+    [[quad]]                    # material; origin, edge_u, edge_v, facing along u × v; or corners = [4 points],
+                                # counter-clockwise from the front; name
+    [[box]]                     # material; center, size; rotate_y = degrees; inside = true faces inwards;
+                                # without = ["bottom", ...] of left right bottom top back front; name
+    [[mesh]]                    # file beside the TOML (.glb .gltf .obj .ply .stl); translate, rotate = degrees about
+                                # x, then y, then z, scale = number or [x, y, z]; material to replace its own; name
+    [[procedural]]              # kind = "museum" | "grotto" | "icosphere" | "cylinder" and parameters: procedural.py
+    [[camera]]                  # name; position, target; yfov_deg = 45
+
+Colours are linear Rec.709, or one number for grey. A texture multiplies the albedo, which is then 1 unless given; it
+fills each quad and each face of a box, ``repeat`` times. +y is up.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from app.errors import SceneError
+from app.scene import shapes
+from app.scene.cameras import look_at
+from app.scene.gltf import load_gltf
+from app.scene.gltf_file import first_problem
+from app.scene.images import ImageError, path_inside, read_image
+from app.scene.meshfile import load_meshfile
+from app.scene.model import Camera, Material, Scene, Texture
+from app.scene.procedural import Procedural
+from app.scene.validate import Part, validate
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+MESH_LOADERS = {
+    ".glb": load_gltf,
+    ".gltf": load_gltf,
+    ".obj": load_meshfile,
+    ".ply": load_meshfile,
+    ".stl": load_meshfile,
+}
+
+
+def _triple(value: Any) -> Any:
+    """One number stands for three."""
+    return (value, value, value) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
+
+
+Vec3 = tuple[float, float, float]
+Part01 = Annotated[float, Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Albedo = Annotated[tuple[Part01, Part01, Part01], BeforeValidator(_triple)]
+Light = Annotated[tuple[NotNegative, NotNegative, NotNegative], BeforeValidator(_triple)]
+
+
+class Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class SceneTable(Table):
+    name: str | None = None
+    unit: Literal["m", "cm", "mm"] = "m"
+
+
+class TextureTable(Table):
+    pattern: Literal["checker", "stripes"] | None = None
+    colors: tuple[Albedo, Albedo] | None = None
+    image: str | None = None
+    repeat: tuple[Positive, Positive] = (1.0, 1.0)
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.pattern is None) == (self.image is None):
+            raise ValueError("give either pattern or image")
+        if (self.pattern is None) != (self.colors is None):
+            raise ValueError("pattern needs two colors, and image none")
+        return self
+
+
+class MaterialTable(Table):
+    name: str
+    albedo: Albedo | None = None
+    emission: Light | None = None
+    exitance: Light | None = None
+    texture: TextureTable | None = None
+    double_sided: bool = False
+
+    @model_validator(mode="after")
+    def _one_light(self) -> Self:
+        if self.emission is not None and self.exitance is not None:
+            raise ValueError("give either emission or exitance")
+        return self
+
+
+class QuadTable(Table):
+    material: str
+    origin: Vec3 | None = None
+    edge_u: Vec3 | None = None
+    edge_v: Vec3 | None = None
+    corners: tuple[Vec3, Vec3, Vec3, Vec3] | None = None
+    name: str = ""
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        given = [e is not None for e in (self.origin, self.edge_u, self.edge_v)]
+        if any(given) if self.corners is not None else not all(given):
+            raise ValueError("give either origin, edge_u and edge_v, or corners")
+        return self
+
+    def mesh(self) -> shapes.Mesh:
+        if self.corners is not None:
+            return shapes.polygon(self.corners)
+        assert self.origin is not None and self.edge_u is not None and self.edge_v is not None
+        return shapes.quad(self.origin, self.edge_u, self.edge_v)
+
+
+class BoxTable(Table):
+    material: str
+    center: Vec3
+    size: tuple[Positive, Positive, Positive]
+    rotate_y: float = 0.0
+    inside: bool = False
+    without: list[Literal["left", "right", "bottom", "top", "back", "front"]] = []
+    name: str = ""
+
+    def mesh(self) -> shapes.Mesh:
+        placed = shapes.box(self.size, self.without).transformed(
+            shapes.transform(self.center, (0.0, self.rotate_y, 0.0), 1.0)
+        )
+        return placed.flipped() if self.inside else placed
+
+
+class MeshTable(Table):
+    file: str
+    translate: Vec3 = (0.0, 0.0, 0.0)
+    rotate: Vec3 = (0.0, 0.0, 0.0)
+    scale: Annotated[Vec3, BeforeValidator(_triple)] = (1.0, 1.0, 1.0)
+    material: str | None = None
+    name: str = ""
+
+
+class CameraTable(Table):
+    name: str
+    position: Vec3
+    target: Vec3
+    yfov_deg: Annotated[float, Field(gt=0.0, lt=180.0)] = 45.0
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
+        if math.dist(self.position, self.target) == 0.0:
+            raise ValueError("position and target must differ")
+        return self
+
+
+class SceneFile(Table):
+    """A whole TOML scene."""
+
+    scene: SceneTable = SceneTable()
+    material: list[MaterialTable] = []
+    quad: list[QuadTable] = []
+    box: list[BoxTable] = []
+    mesh: list[MeshTable] = []
+    procedural: list[Procedural] = []
+    camera: list[CameraTable] = []
+
+
+@np.errstate(all="ignore")
+def load_authored(path: Path) -> Scene:
+    """Read a .toml scene. SceneError names the file, the key and the reason."""
+    try:
+        table = SceneFile.model_validate(tomllib.loads(path.read_text("utf-8")))
+    except OSError as error:
+        raise SceneError(path, f"cannot be read: {error.strerror}") from error
+    except ValidationError as error:  # before ValueError, which it is
+        raise SceneError(path, first_problem(error)) from error
+    except (ValueError, RecursionError) as error:  # not TOML, or not UTF-8
+        raise SceneError(path, f"not TOML: {' '.join(str(error).split())}") from error
+    return _Builder(path, table).scene()
+
+
+class _Builder:
+    """Turns checked tables into parts, one object each."""
+
+    def __init__(self, path: Path, table: SceneFile) -> None:
+        self.path = path
+        self.table = table
+        self.unit = UNITS[table.scene.unit]
+        self.parts: list[Part] = []
+        self.objects: list[str] = []
+        self.cameras: list[Camera] = []
+        self.warnings: list[str] = []
+        self.materials = [self._material(i, m) for i, m in enumerate(table.material)]
+        self.ids = {m.name: i for i, m in enumerate(table.material)}
+        if len(self.ids) < len(table.material):
+            raise SceneError(path, "material: two materials have the same name")
+
+    def scene(self) -> Scene:
+        for i, quad in enumerate(self.table.quad):
+            self._add(quad.name or f"quad {i + 1}", self._id(quad.material, f"quad.{i}"), quad.mesh())
+        for i, box in enumerate(self.table.box):
+            self._add(box.name or f"box {i + 1}", self._id(box.material, f"box.{i}"), box.mesh())
+        for i, generator in enumerate(self.table.procedural):
+            for name, material, mesh in generator.pieces():
+                self._add(name, self._id(material, f"procedural.{i}"), mesh)
+        for i, mesh_table in enumerate(self.table.mesh):
+            self._add_file(mesh_table, f"mesh.{i}")
+        for camera in self.table.camera:
+            eye, target = (self.unit * np.array(p) for p in (camera.position, camera.target))
+            self.cameras.append(Camera(camera.name, look_at(eye, target), math.radians(camera.yfov_deg)))
+        name = self.table.scene.name or self.path.stem
+        return validate(self.path, name, self.parts, self.objects, self.materials, self.cameras, self.warnings)
+
+    def _id(self, material: str, where: str) -> int:
+        if material not in self.ids:
+            known = ", ".join(self.ids) or "none"
+            raise SceneError(self.path, f"{where}: there is no material '{material}' (materials: {known})")
+        return self.ids[material]
+
+    def _material(self, index: int, table: MaterialTable) -> Material:
+        light = table.emission or (0.0, 0.0, 0.0)
+        if table.exitance is not None:
+            r, g, b = table.exitance
+            light = (r / math.pi, g / math.pi, b / math.pi)
+        texture = None if table.texture is None else self._texture(f"material.{index}.texture", table.texture)
+        albedo = table.albedo or ((0.5, 0.5, 0.5) if texture is None else (1.0, 1.0, 1.0))
+        return Material(table.name, albedo, light, texture, None, table.double_sided)
+
+    def _texture(self, where: str, table: TextureTable) -> Texture:
+        scale = np.diag([*table.repeat, 1.0])[:2]
+        if table.image is None:
+            assert table.pattern is not None and table.colors is not None
+            a, b = table.colors
+            rows = [[a, b], [b, a]] if table.pattern == "checker" else [[a, b]]
+            return Texture(table.pattern, np.array(rows, np.float32), bilinear=False, uv_transform=scale)
+        found = path_inside(self.path.parent, table.image)
+        if found is None:
+            raise SceneError(self.path, f"{where}: there is no picture '{table.image}' in the scene's folder")
+        try:
+            return Texture(table.image, read_image(found), uv_transform=scale)
+        except ImageError as error:
+            raise SceneError(self.path, f"{where}: '{table.image}' is not a readable picture: {error}") from error
+
+    def _add(self, name: str, material: int, mesh: shapes.Mesh) -> None:
+        self.parts.append(Part(mesh.positions * self.unit, mesh.triangles, len(self.objects), material, uv0=mesh.uv))
+        self.objects.append(name)
+
+    def _add_file(self, table: MeshTable, where: str) -> None:
+        """A mesh file's triangles with their own materials, or all with the one that is named."""
+        found = path_inside(self.path.parent, table.file)
+        if found is None:
+            raise SceneError(self.path, f"{where}.file: there is no file '{table.file}' in the scene's folder")
+        if found.suffix.lower() not in MESH_LOADERS:
+            allowed = ", ".join(MESH_LOADERS)
+            raise SceneError(self.path, f"{where}.file: '{table.file}' is none of {allowed}")
+        part = MESH_LOADERS[found.suffix.lower()](found)
+        matrix = shapes.transform(np.array(table.translate) * self.unit, table.rotate, table.scale)
+        positions = part.positions @ matrix[:3, :3].T + matrix[:3, 3]
+        order = [0, 2, 1] if np.linalg.det(matrix[:3, :3]) < 0.0 else [0, 1, 2]
+        material_ids = part.material_ids + len(self.materials)
+        if table.material is not None:
+            material_ids = np.full(len(part.triangles), self._id(table.material, f"{where}.material"))
+        else:
+            self.materials += part.materials
+        prefix = f"{table.name}: " if table.name else ""
+        self.parts.append(
+            Part(
+                positions,
+                part.triangles[:, order],
+                part.object_ids + len(self.objects),
+                material_ids,
+                None if part.uv0 is None else part.uv0[:, order],
+                None if part.uv1 is None else part.uv1[:, order],
+            )
+        )
+        self.objects += [prefix + name for name in part.objects]
+        self.warnings += [f"{table.file}: {note}" for note in part.warnings]

@@ -1,0 +1,242 @@
+"""glTF 2.0 and GLB (Khronos glTF 2.0 specification) as a Scene.
+
+Every node with a mesh becomes an object. Read: triangles, strips and fans, all component types, sparse accessors, node
+hierarchies, instances (also EXT_mesh_gpu_instancing), materials and their pictures (``gltf_materials``), TEXCOORD_0
+and 1, normals, perspective cameras. Counted and left out: points and lines, punctual lights, vertex colours, the pose
+of skins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.scene.gltf_file import GltfFile
+from app.scene.gltf_materials import UNKNOWN_ALBEDO, read_materials
+from app.scene.gltf_schema import Node, Primitive
+from app.scene.model import F64, Camera, Material, Scene
+from app.scene.validate import Part, check_triangle_count, counted, validate
+
+TRIANGLES, STRIP, FAN = 4, 5, 6
+
+
+@dataclass(frozen=True, eq=False)
+class _Shape:
+    """A primitive in its own space; ``material`` None where the file names none."""
+
+    positions: F64
+    triangles: NDArray[np.int64]
+    material: int | None
+    uv0: NDArray[Any] | None
+    uv1: NDArray[Any] | None
+    normals: NDArray[Any] | None
+
+
+@np.errstate(all="ignore")
+def load_gltf(path: Path) -> Scene:
+    """Read a .glb or .gltf file. SceneError for anything that makes it unusable."""
+    file = GltfFile(path)
+    reader = _Reader(file)
+    reader.walk()
+    materials, notes = read_materials(file, reader.used_materials)
+    if reader.unpainted:
+        materials.append(Material("no material", UNKNOWN_ALBEDO))
+    return validate(
+        path, path.stem, reader.parts, reader.objects, materials, reader.cameras, [*reader.warnings(), *notes]
+    )
+
+
+class _Reader:
+    """Walks the node tree of one file and collects parts, objects and cameras."""
+
+    def __init__(self, file: GltfFile) -> None:
+        self.file = file
+        self.parts: list[Part] = []
+        self.objects: list[str] = []
+        self.cameras: list[Camera] = []
+        self.used_materials: set[int] = set()
+        self._shapes: dict[int, list[_Shape]] = {}
+        self._triangle_count = 0
+        self.unpainted = 0  # primitives without material
+        self._not_triangles = self._coloured = self._skinned = self._lights = self._not_pinholes = 0
+
+    def warnings(self) -> list[str]:
+        notes = [
+            (self._lights, "point light", "point lights", "ignored: only surfaces emit"),
+            (self._not_triangles, "primitive", "primitives", "without triangles left out"),
+            (self._coloured, "primitive", "primitives", "with vertex colours, which are ignored"),
+            (self.unpainted, "primitive", "primitives", "without material: grey with albedo 0.5"),
+            (self._skinned, "skinned mesh", "skinned meshes", "shown without pose"),
+            (self._not_pinholes, "camera", "cameras", "without perspective left out"),
+        ]
+        return [f"{counted(n, one, many)} {text}" for n, one, many, text in notes if n]
+
+    def walk(self) -> None:
+        """Visit every node of the default scene once, parents first."""
+        document, nodes = self.file.document, self.file.document.nodes
+        if document.scenes:
+            roots = self.file.pick(document.scenes, document.scene, "scene").nodes
+        else:
+            children = {child for node in nodes for child in node.children}
+            roots = [i for i in range(len(nodes)) if i not in children]
+            if nodes and not roots:
+                raise self.file.error("the nodes form a cycle")
+        visited: set[int] = set()
+        stack = [(root, np.eye(4)) for root in reversed(roots)]
+        while stack:
+            index, world_from_parent = stack.pop()
+            node = self.file.pick(nodes, index, "node")
+            if index in visited:
+                raise self.file.error(f"node {index} is reached twice: the nodes form a cycle, or it has two parents")
+            visited.add(index)
+            world_from_node = world_from_parent @ _parent_from_node(node)
+            self._visit(index, node, world_from_node)
+            stack.extend((child, world_from_node) for child in reversed(node.children))
+
+    def _visit(self, index: int, node: Node, world_from_node: F64) -> None:
+        self._lights += node.extensions.light is not None
+        if node.camera is not None:
+            camera = self.file.pick(self.file.document.cameras, node.camera, "camera")
+            if camera.perspective is None:
+                self._not_pinholes += 1
+            else:
+                name = node.name or camera.name or f"camera {node.camera}"
+                self.cameras.append(Camera(name, world_from_node, camera.perspective.yfov))
+        if node.mesh is None:
+            return
+        mesh = self.file.pick(self.file.document.meshes, node.mesh, "mesh")
+        self._skinned += node.skin is not None
+        worlds = world_from_node @ self._instances(node)
+        self.objects.append(node.name or mesh.name or f"node {index}")
+        if node.mesh not in self._shapes:
+            read = [self._shape(p, f"mesh {node.mesh} primitive {k}") for k, p in enumerate(mesh.primitives)]
+            self._shapes[node.mesh] = [shape for shape in read if shape is not None]
+        for shape in self._shapes[node.mesh]:
+            self._triangle_count += len(worlds) * len(shape.triangles)
+            check_triangle_count(self.file.path, self._triangle_count)
+            material = len(self.file.document.materials) if shape.material is None else shape.material
+            self.parts.append(_placed(shape, worlds, len(self.objects) - 1, material))
+
+    def _instances(self, node: Node) -> F64:
+        """(k, 4, 4) node-from-instance matrices; one identity without EXT_mesh_gpu_instancing."""
+        if node.extensions.instancing is None:
+            return np.eye(4)[None]
+        attributes = node.extensions.instancing.attributes
+        kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
+        values = {name: self.file.accessor(attributes[name], kinds[name]) for name in kinds if name in attributes}
+        counts = {len(v) for v in values.values()}
+        if len(counts) != 1:
+            raise self.file.error("EXT_mesh_gpu_instancing: the attributes need the same number of elements")
+        k = counts.pop()
+        return _transforms(
+            values.get("TRANSLATION", np.zeros((k, 3))),
+            values.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (k, 1))),
+            values.get("SCALE", np.ones((k, 3))),
+        )
+
+    def _shape(self, primitive: Primitive, where: str) -> _Shape | None:
+        attributes = primitive.attributes
+        if primitive.mode < TRIANGLES or "POSITION" not in attributes:
+            self._not_triangles += 1
+            return None
+        positions = self.file.accessor(attributes["POSITION"], "VEC3")
+        count = len(positions)
+        values: list[NDArray[Any] | None] = []
+        for name, kind in (("TEXCOORD_0", "VEC2"), ("TEXCOORD_1", "VEC2"), ("NORMAL", "VEC3")):
+            value = self.file.accessor(attributes[name], kind) if name in attributes else None
+            if value is not None and len(value) != count:
+                raise self.file.error(f"{where}: {len(value)} {name} for {count} POSITION")
+            values.append(value)
+        corners = np.arange(count)
+        if primitive.indices is not None:
+            corners = self.file.accessor(primitive.indices, "SCALAR")[:, 0]
+            if corners.dtype.kind != "u":
+                raise self.file.error(f"{where}: indices must be unsigned whole numbers")
+            if len(corners) and int(corners.max()) >= count:
+                raise self.file.error(f"{where}: index {corners.max()} is out of range: there are {count} vertices")
+        if primitive.mode == TRIANGLES and len(corners) % 3:
+            raise self.file.error(f"{where}: {len(corners)} corners are no whole number of triangles")
+        if primitive.material is None:
+            self.unpainted += 1
+        else:
+            self.file.pick(self.file.document.materials, primitive.material, "material")
+            self.used_materials.add(primitive.material)
+        self._coloured += "COLOR_0" in attributes
+        return _compact(positions, _triangles(corners.astype(np.int64), primitive.mode), primitive.material, values)
+
+
+def _compact(
+    positions: NDArray[Any], triangles: NDArray[np.int64], material: int | None, values: list[NDArray[Any] | None]
+) -> _Shape:
+    """Without the vertices that no triangle uses: primitives often share one large vertex array."""
+    used = np.zeros(len(positions), bool)
+    used[triangles] = True
+    if not used.all():
+        triangles = (np.cumsum(used) - 1)[triangles]
+        positions = positions[used]
+        values = [None if v is None else v[used] for v in values]
+    return _Shape(positions.astype(np.float64), triangles, material, *values)
+
+
+def _triangles(corners: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
+    """(m, 3) triangles of a list, strip or fan of corners (glTF 2.0, 3.7.2.1)."""
+    if mode == TRIANGLES:
+        return corners.reshape(-1, 3)
+    i = np.arange(max(len(corners) - 2, 0))
+    if mode == STRIP:
+        return corners[np.stack([i, i + 1 + i % 2, i + 2 - i % 2], axis=1)]
+    return corners[np.stack([i + 1, i + 2, np.zeros_like(i)], axis=1)]
+
+
+def _parent_from_node(node: Node) -> F64:
+    if node.matrix is not None:
+        return np.array(node.matrix, np.float64).reshape(4, 4).T
+    matrix: F64 = _transforms(np.array([node.translation]), np.array([node.rotation]), np.array([node.scale]))[0]
+    return matrix
+
+
+def _transforms(translation: NDArray[Any], rotation: NDArray[Any], scale: NDArray[Any]) -> F64:
+    """(k, 4, 4) matrices of k translations, rotations (quaternions x y z w, normalised here) and scales."""
+    q = rotation.astype(np.float64)
+    length = np.linalg.norm(q, axis=1, keepdims=True)
+    x, y, z, w = np.where(length > 0.0, q / length, [0.0, 0.0, 0.0, 1.0]).T
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    matrices = np.tile(np.eye(4), (len(q), 1, 1))
+    matrices[:, :3, :3] = np.moveaxis(turn, 2, 0) * scale[:, None, :]
+    matrices[:, :3, 3] = translation
+    return matrices
+
+
+def _placed(shape: _Shape, worlds: F64, object_id: int, material: int) -> Part:
+    """The shape once for each of (k, 4, 4) matrices; mirrored copies keep their front."""
+    k, n, m = len(worlds), len(shape.positions), len(shape.triangles)
+    linear = worlds[:, :3, :3]
+    positions = np.einsum("kij,nj->kni", linear, shape.positions) + worlds[:, None, :3, 3]
+    mirrored = np.linalg.det(linear) < 0.0
+    triangles = np.where(mirrored[:, None, None], shape.triangles[:, [0, 2, 1]], shape.triangles)
+    triangles = triangles + n * np.arange(k)[:, None, None]
+    normals = None
+    if shape.normals is not None:
+        # A normal turns with the cofactor matrix, which also exists for singular transforms.
+        cofactors = np.stack([np.cross(linear[:, (i + 1) % 3], linear[:, (i + 2) % 3]) for i in range(3)], axis=1)
+        cofactors = np.where(mirrored[:, None, None], -cofactors, cofactors)
+        normals = np.einsum("kij,nj->kni", cofactors, shape.normals.astype(np.float64)).reshape(-1, 3)
+    return Part(
+        positions.reshape(-1, 3),
+        triangles.reshape(k * m, 3),
+        object_id,
+        material,
+        None if shape.uv0 is None else np.tile(shape.uv0, (k, 1)),
+        None if shape.uv1 is None else np.tile(shape.uv1, (k, 1)),
+        normals,
+    )

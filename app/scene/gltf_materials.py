@@ -1,0 +1,131 @@
+"""glTF materials as diffuse surfaces.
+
+The albedo is the base colour as it stands, also of metals: without a mirror term, what a metal reflects leaves
+diffusely. Emission is emissiveFactor × emissiveStrength [W/(sr m²)] × texture. Roughness, normal maps, alpha and vertex
+colours have no effect. A picture that cannot be read counts as white, so the factor alone is used; where the file gives
+no base colour factor either, the albedo is 0.5.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from app.scene.gltf_file import GltfFile
+from app.scene.gltf_schema import Image, TextureInfo, TextureTransform
+from app.scene.gltf_schema import Material as GltfMaterial
+from app.scene.images import ImageError, read_image
+from app.scene.model import F32, F64, RGB, Material, Texture
+from app.scene.validate import counted
+
+WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
+NEAREST = 9728
+UNKNOWN_ALBEDO: RGB = (0.5, 0.5, 0.5)
+
+
+def read_materials(file: GltfFile, used: set[int]) -> tuple[list[Material], list[str]]:
+    """All materials in order, and the warnings of the ``used`` ones; only their pictures are decoded."""
+    reader = _Reader(file)
+    materials = []
+    for i, source in enumerate(file.document.materials):
+        if i in used:
+            materials.append(reader.material(i, source))
+        else:
+            materials.append(Material(name=source.name or f"material {i}"))
+    return materials, reader.warnings([file.document.materials[i] for i in sorted(used)])
+
+
+class _Reader:
+    """Decodes each picture once and remembers what could not be had."""
+
+    def __init__(self, file: GltfFile) -> None:
+        self.file = file
+        self._pixels: dict[int, F32 | None] = {}
+        self._without_picture = 0
+        self._far_texcoords = 0
+
+    def warnings(self, used: list[GltfMaterial]) -> list[str]:
+        missing = sum(pixels is None for pixels in self._pixels.values())
+        unlit = sum(m.extensions.unlit is not None for m in used)
+        alpha = sum(m.alpha_mode != "OPAQUE" for m in used)
+        notes = [
+            (missing, "picture", "pictures", "could not be read: the material's factor is used"),
+            (self._without_picture, "texture", "textures", "without a picture that can be read: ignored"),
+            (self._far_texcoords, "texture", "textures", "with TEXCOORD_2 or higher: ignored"),
+            (unlit, "unlit material", "unlit materials", "treated as diffuse"),
+            (alpha, "material", "materials", "with alpha treated as opaque"),
+        ]
+        return [f"{counted(n, one, many)} {text}" for n, one, many, text in notes if n]
+
+    def material(self, index: int, source: GltfMaterial) -> Material:
+        rough, gloss = source.pbr_metallic_roughness, source.extensions.specular_glossiness
+        factor, info = rough.base_color_factor, rough.base_color_texture
+        if gloss is not None:
+            factor, info = gloss.diffuse_factor, gloss.diffuse_texture
+        albedo_texture = self._texture(info)
+        r, g, b, _ = factor or (1.0, 1.0, 1.0, 1.0)
+        lost = info is not None and albedo_texture is None and factor is None
+        strength = source.extensions.emissive_strength
+        k = 1.0 if strength is None else strength.emissive_strength
+        er, eg, eb = source.emissive_factor
+        emits = k * max(source.emissive_factor) > 0.0
+        return Material(
+            name=source.name or f"material {index}",
+            albedo=UNKNOWN_ALBEDO if lost else (r, g, b),
+            emission=(k * er, k * eg, k * eb),
+            albedo_texture=albedo_texture,
+            emission_texture=self._texture(source.emissive_texture) if emits else None,
+            double_sided=source.double_sided,
+        )
+
+    def _texture(self, info: TextureInfo | None) -> Texture | None:
+        if info is None:
+            return None
+        texture = self.file.pick(self.file.document.textures, info.index, "texture")
+        source = texture.source
+        if texture.extensions.webp is not None and texture.extensions.webp.source is not None:
+            source = texture.extensions.webp.source
+        if source is None:
+            self._without_picture += 1
+            return None
+        image = self.file.pick(self.file.document.images, source, "image")
+        pixels = self._image(source, image)
+        if pixels is None:
+            return None
+        transform = info.extensions.transform or TextureTransform()
+        texcoord = info.tex_coord if transform.tex_coord is None else transform.tex_coord
+        if texcoord > 1:
+            self._far_texcoords += 1
+            return None
+        made = Texture(image.name or f"image {source}", pixels, texcoord=texcoord, uv_transform=uv_transform(transform))
+        if texture.sampler is None:
+            return made
+        sampler = self.file.pick(self.file.document.samplers, texture.sampler, "sampler")
+        wrap = (WRAPS[sampler.wrap_s], WRAPS[sampler.wrap_t])
+        return dataclasses.replace(made, wrap=wrap, bilinear=sampler.mag_filter != NEAREST)
+
+    def _image(self, index: int, image: Image) -> F32 | None:
+        if index not in self._pixels:
+            data: bytes | None = None
+            if image.buffer_view is not None:
+                data = bytes(self.file.view(image.buffer_view))
+            elif image.uri is not None:
+                data = self.file.resource(image.uri)
+            try:
+                self._pixels[index] = None if data is None else read_image(data)
+            except ImageError:
+                self._pixels[index] = None
+        return self._pixels[index]
+
+
+def uv_transform(transform: TextureTransform) -> F64:
+    """(2, 3) offset · rotation · scale of KHR_texture_transform.
+
+    The rotation's sign is that of its own example and of the known implementations; the listing in its text has it the
+    other way round (KhronosGroup/glTF issue 1563).
+    """
+    c, s = math.cos(transform.rotation), math.sin(transform.rotation)
+    (sx, sy), (tx, ty) = transform.scale, transform.offset
+    return np.array([[c * sx, s * sy, tx], [-s * sx, c * sy, ty]])

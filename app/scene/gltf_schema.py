@@ -1,0 +1,209 @@
+"""The part of the glTF 2.0 JSON that is read here, as pydantic models: wrong types and values are found before use.
+
+Names are the specification's in snake case. Whatever is not listed is ignored, as the specification asks.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic.alias_generators import to_camel
+
+Index = Annotated[int, Field(ge=0, lt=2**31)]
+Size = Annotated[int, Field(ge=0, lt=2**53)]
+Vec2 = tuple[float, float]
+Vec3 = tuple[float, float, float]
+Vec4 = tuple[float, float, float, float]
+
+
+class Model(BaseModel):
+    model_config = ConfigDict(alias_generator=to_camel, extra="ignore", allow_inf_nan=False)
+
+
+class Asset(Model):
+    version: str
+
+
+class Buffer(Model):
+    uri: str | None = None
+    byte_length: Size
+
+
+class BufferView(Model):
+    buffer: Index
+    byte_offset: Size = 0
+    byte_length: Size
+    byte_stride: Annotated[int, Field(ge=0, le=252)] = 0
+
+
+class SparseIndices(Model):
+    buffer_view: Index
+    byte_offset: Size = 0
+    component_type: Literal[5121, 5123, 5125]
+
+
+class SparseValues(Model):
+    buffer_view: Index
+    byte_offset: Size = 0
+
+
+class Sparse(Model):
+    count: Index
+    indices: SparseIndices
+    values: SparseValues
+
+
+class Accessor(Model):
+    buffer_view: Index | None = None
+    byte_offset: Size = 0
+    component_type: Literal[5120, 5121, 5122, 5123, 5125, 5126]
+    normalized: bool = False
+    count: Index
+    type: Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"]
+    sparse: Sparse | None = None
+
+
+class Image(Model):
+    uri: str | None = None
+    buffer_view: Index | None = None
+    name: str = ""
+
+
+class Sampler(Model):
+    mag_filter: int = 9729
+    wrap_s: Literal[10497, 33071, 33648] = 10497
+    wrap_t: Literal[10497, 33071, 33648] = 10497
+
+
+class OtherSource(Model):
+    source: Index | None = None
+
+
+class TextureExtensions(Model):
+    webp: OtherSource | None = Field(default=None, alias="EXT_texture_webp")
+
+
+class Texture(Model):
+    sampler: Index | None = None
+    source: Index | None = None
+    extensions: TextureExtensions = TextureExtensions()
+
+
+class TextureTransform(Model):
+    offset: Vec2 = (0.0, 0.0)
+    rotation: float = 0.0
+    scale: Vec2 = (1.0, 1.0)
+    tex_coord: Index | None = None
+
+
+class TextureInfoExtensions(Model):
+    transform: TextureTransform | None = Field(default=None, alias="KHR_texture_transform")
+
+
+class TextureInfo(Model):
+    index: Index
+    tex_coord: Index = 0
+    extensions: TextureInfoExtensions = TextureInfoExtensions()
+
+
+class MetallicRoughness(Model):
+    base_color_factor: Vec4 | None = None
+    base_color_texture: TextureInfo | None = None
+
+
+class SpecularGlossiness(Model):
+    diffuse_factor: Vec4 | None = None
+    diffuse_texture: TextureInfo | None = None
+
+
+class EmissiveStrength(Model):
+    emissive_strength: Annotated[float, Field(ge=0.0)] = 1.0
+
+
+class Empty(Model):
+    pass
+
+
+class MaterialExtensions(Model):
+    emissive_strength: EmissiveStrength | None = Field(default=None, alias="KHR_materials_emissive_strength")
+    specular_glossiness: SpecularGlossiness | None = Field(default=None, alias="KHR_materials_pbrSpecularGlossiness")
+    unlit: Empty | None = Field(default=None, alias="KHR_materials_unlit")
+
+
+class Material(Model):
+    name: str = ""
+    pbr_metallic_roughness: MetallicRoughness = MetallicRoughness()
+    emissive_factor: Vec3 = (0.0, 0.0, 0.0)
+    emissive_texture: TextureInfo | None = None
+    alpha_mode: str = "OPAQUE"
+    double_sided: bool = False
+    extensions: MaterialExtensions = MaterialExtensions()
+
+
+class Primitive(Model):
+    attributes: dict[str, Index]
+    indices: Index | None = None
+    material: Index | None = None
+    mode: Annotated[int, Field(ge=0, le=6)] = 4
+
+
+class Mesh(Model):
+    name: str = ""
+    primitives: list[Primitive]
+
+
+class Instancing(Model):
+    attributes: dict[str, Index]
+
+
+class NodeExtensions(Model):
+    instancing: Instancing | None = Field(default=None, alias="EXT_mesh_gpu_instancing")
+    light: Empty | None = Field(default=None, alias="KHR_lights_punctual")
+
+
+class Node(Model):
+    name: str = ""
+    children: list[Index] = []
+    mesh: Index | None = None
+    camera: Index | None = None
+    skin: Index | None = None
+    matrix: Annotated[list[float], Field(min_length=16, max_length=16)] | None = None
+    translation: Vec3 = (0.0, 0.0, 0.0)
+    rotation: Vec4 = (0.0, 0.0, 0.0, 1.0)
+    scale: Vec3 = (1.0, 1.0, 1.0)
+    extensions: NodeExtensions = NodeExtensions()
+
+
+class Perspective(Model):
+    yfov: float
+
+
+class Camera(Model):
+    name: str = ""
+    type: str
+    perspective: Perspective | None = None
+
+
+class SceneNodes(Model):
+    name: str = ""
+    nodes: list[Index] = []
+
+
+class Document(Model):
+    """A whole glTF file without its binary data."""
+
+    asset: Asset
+    extensions_required: list[str] = []
+    scene: Index = 0
+    scenes: list[SceneNodes] = []
+    nodes: list[Node] = []
+    meshes: list[Mesh] = []
+    cameras: list[Camera] = []
+    materials: list[Material] = []
+    textures: list[Texture] = []
+    images: list[Image] = []
+    samplers: list[Sampler] = []
+    accessors: list[Accessor] = []
+    buffer_views: list[BufferView] = []
+    buffers: list[Buffer] = []

@@ -1,0 +1,86 @@
+"""Pictures as linear light: decoding with Pillow, sRGB to linear Rec.709, paths that stay inside the scene's folder.
+
+Only 8-bit sRGB pictures and 16-bit grey ones are met in practice; the sRGB curve is IEC 61966-2-1.
+"""
+
+from __future__ import annotations
+
+import io
+import urllib.parse
+import warnings
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+
+from app.scene.model import F32
+
+MAX_SIDE = 2048  # px; diffuse light is blind to finer detail, and a 4096² picture of floats takes 200 MB
+MAX_PIXELS = 16384 * 16384  # larger pictures are not decoded at all
+
+
+class ImageError(ValueError):
+    """A picture that is missing, broken or too large; the caller counts it and goes on without."""
+
+
+def linear_from_srgb(srgb: F32) -> F32:
+    """The inverse of the sRGB transfer curve, [0, 1] to [0, 1]."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def read_image(source: bytes | Path) -> F32:
+    """A picture as (h, w, 3) f32, linear Rec.709, row 0 at the top, at most MAX_SIDE px a side. ImageError if unusable.
+
+    Alpha is ignored. Larger pictures are averaged down in linear light, so that their mean stays.
+    """
+    try:
+        data = io.BytesIO(source) if isinstance(source, bytes) else io.BytesIO(source.read_bytes())
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Pillow's remarks on odd metadata; its size limit is checked here
+            with Image.open(data) as image:
+                if image.width * image.height > MAX_PIXELS:
+                    raise ImageError(f"{image.width}×{image.height} pixels are too many")
+                wide = image.mode.startswith(("I", "F"))
+                pixels = np.asarray(image if wide else image.convert("RGB"))
+    except (OSError, UnidentifiedImageError, Image.DecompressionBombError, SyntaxError, EOFError) as error:
+        raise ImageError(str(error)) from error
+    except (ValueError, TypeError, IndexError, OverflowError, MemoryError) as error:  # what Pillow's decoders leak
+        raise ImageError(str(error)) from error
+    return _shrunk(_decoded(pixels))
+
+
+def _decoded(pixels: np.ndarray[tuple[int, ...], np.dtype[np.generic]]) -> F32:
+    if pixels.ndim == 2:
+        grey = linear_from_srgb(np.clip(pixels.astype(np.float32) / 65535.0, 0.0, 1.0))
+        return np.repeat(grey[:, :, None], 3, axis=2)
+    table = linear_from_srgb(np.arange(256, dtype=np.float32) / 255.0)
+    decoded: F32 = table[pixels]
+    return decoded
+
+
+def _shrunk(pixels: F32) -> F32:
+    """Averaged over whole blocks until no side is over MAX_SIDE; an incomplete last block is left out."""
+    factor = -(-max(pixels.shape[:2]) // MAX_SIDE)
+    if factor <= 1:
+        return pixels
+    fy, fx = min(factor, pixels.shape[0]), min(factor, pixels.shape[1])
+    h, w = pixels.shape[0] // fy, pixels.shape[1] // fx
+    blocks = pixels[: h * fy, : w * fx].reshape(h, fy, w, fx, 3)
+    mean: F32 = blocks.mean(axis=(1, 3), dtype=np.float32)
+    return mean
+
+
+def path_inside(folder: Path, uri: str) -> Path | None:
+    """The existing file that a relative reference means, or None if there is none inside ``folder``.
+
+    Percent signs are decoded and backslashes accepted; absolute paths, other schemes and ways out lead nowhere.
+    """
+    text = urllib.parse.unquote(uri).replace("\\", "/").strip()
+    if not text or "\0" in text or ":" in text or text.startswith("/"):
+        return None
+    try:
+        root = folder.resolve()
+        path = (root / text).resolve()
+        return path if path.is_relative_to(root) and path.is_file() else None
+    except OSError:  # a name too long for the file system
+        return None

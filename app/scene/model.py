@@ -1,0 +1,119 @@
+"""The scene as plain data: triangles, materials, cameras. No GL, no files.
+
+Lengths are metres in a world with +y up. Colours are linear Rec.709. Emission is radiance L [W/(sr m²)], as in glTF;
+a diffuse emitter's exitance is πL [W/m²].
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
+RGB = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """An image as a material uses it.
+
+    pixels: (h, w, 3) f32, linear Rec.709, row 0 at the top, v = 0 at the top (glTF).
+    wrap: one of ``repeat``, ``mirror``, ``clamp`` for u and v.
+    uv_transform: (2, 3) f64, applied to the vertex UVs before the look-up (KHR_texture_transform).
+    """
+
+    name: str
+    pixels: F32
+    wrap: tuple[str, str] = ("repeat", "repeat")
+    bilinear: bool = True
+    texcoord: int = 0
+    uv_transform: F64 = field(default_factory=lambda: np.eye(2, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """A diffuse surface. A texture multiplies its factor; ``double_sided`` reflects and emits on both sides."""
+
+    name: str
+    albedo: RGB = (0.5, 0.5, 0.5)  # ρ [-], each in [0, 1]
+    emission: RGB = (0.0, 0.0, 0.0)  # L [W/(sr m²)], each >= 0
+    albedo_texture: Texture | None = None
+    emission_texture: Texture | None = None
+    double_sided: bool = False
+
+    @property
+    def emits(self) -> bool:
+        return max(self.emission) > 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pinhole. ``world_from_camera`` is (4, 4) f64, rigid, looking along -z with +y up; yfov in radians."""
+
+    name: str
+    world_from_camera: F64
+    yfov: float
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What every loader makes and everything else reads.
+
+    positions (n, 3) f64, triangles (m, 3) i32 counter-clockwise from the front, material_ids and object_ids (m,) i32
+    into ``materials`` and ``objects`` (names). Per corner, where the file has them: uv0, uv1 (m, 3, 2) f32 with v = 0
+    at the top, normals (m, 3, 3) f32 unit (kept for export; light transport uses geometric normals).
+    ``warnings`` are one-line counted repairs and omissions. Every value is finite, every index in range, every triangle
+    has an area: ``validate`` guarantees it.
+    """
+
+    name: str
+    positions: F64
+    triangles: I32
+    material_ids: I32
+    object_ids: I32
+    objects: tuple[str, ...]
+    materials: tuple[Material, ...]
+    cameras: tuple[Camera, ...] = ()
+    uv0: F32 | None = None
+    uv1: F32 | None = None
+    normals: F32 | None = None
+    warnings: tuple[str, ...] = ()
+    source: Path | None = None
+
+    @property
+    def corners(self) -> F64:
+        """(m, 3, 3) f64: the corner positions of each triangle."""
+        return self.positions[self.triangles]
+
+    @property
+    def normals_areas(self) -> tuple[F64, F64]:
+        """Unit geometric normals (m, 3) and areas (m,) [m²] of the triangles."""
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        cross = np.cross(b - a, c - a)
+        length = np.linalg.norm(cross, axis=1)
+        return cross / length[:, None], length / 2
+
+    @property
+    def bounds(self) -> tuple[F64, F64]:
+        """Lower and upper corner of the box around all triangles [m]."""
+        used = self.corners.reshape(-1, 3)
+        return used.min(axis=0), used.max(axis=0)
+
+    @property
+    def emits(self) -> bool:
+        """Whether any triangle has an emitting material."""
+        return any(self.materials[i].emits for i in np.unique(self.material_ids))
+
+    @property
+    def sides(self) -> NDArray[np.bool_]:
+        """(m,) whether the triangle also reflects and emits at its back."""
+        return np.array([m.double_sided for m in self.materials], bool)[self.material_ids]
+
+    def with_materials(self, materials: tuple[Material, ...]) -> Scene:
+        return dataclasses.replace(self, materials=materials)

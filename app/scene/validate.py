@@ -1,0 +1,281 @@
+"""From what a loader found to a Scene that keeps its promises: the one gate that every file passes.
+
+Repaired and counted as warnings: triangles without area, textured triangles without texture coordinates, albedo outside
+[0, 1], emission below 0, cameras that make no sense. Repaired without a word: normals that are zero or not finite.
+Refused with ``SceneError``: corners that are not finite, indices out of range, no triangle left, more than
+``MAX_TRIANGLES``, an absurd size.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import SceneError
+from app.scene.model import F64, RGB, Camera, Material, Scene, Texture
+
+MAX_TRIANGLES = 20_000_000
+EXTENT_RANGE = (1e-12, 1e12)  # m; outside of it areas leave the range of 32-bit floats by far
+# Files and GPU hold 32-bit floats: a triangle flatter than their spacing (2^-23 relative) has no shape, only rounding.
+FLATNESS = 2.0**-23
+
+Array = NDArray[Any]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Some triangles as a loader found them; nothing about them is trusted yet.
+
+    positions (n, 3) [m]; triangles (m, 3) whole numbers; object_ids and material_ids: one for all or (m,).
+    uv0, uv1, normals: per vertex (n, 2|3), per corner (m, 3, 2|3), or None; NaN where a corner has none.
+    """
+
+    positions: Array
+    triangles: Array
+    object_ids: int | Array = 0
+    material_ids: int | Array = 0
+    uv0: Array | None = None
+    uv1: Array | None = None
+    normals: Array | None = None
+
+
+def counted(count: int, one: str, many: str) -> str:
+    """``1 triangle`` or ``3 triangles``."""
+    return f"{count} {one if count == 1 else many}"
+
+
+def one_line(text: str) -> str:
+    """``text`` as a single line without control characters: names in files can hold anything."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def check_triangle_count(source: str | Path, count: int) -> None:
+    """Raise SceneError if ``count`` is more than any scene may have."""
+    if count > MAX_TRIANGLES:
+        raise SceneError(source, f"{count:,} triangles: at most {MAX_TRIANGLES:,} are allowed")
+
+
+@np.errstate(all="ignore")
+def validate(
+    source: str | Path,
+    name: str,
+    parts: Sequence[Part],
+    objects: Sequence[str],
+    materials: Sequence[Material],
+    cameras: Sequence[Camera] = (),
+    warnings: Iterable[str] = (),
+) -> Scene:
+    """Check, repair and join ``parts`` into a Scene. ``source`` names the file in errors; SceneError if unusable."""
+    notes = [one_line(w) for w in warnings]
+    total = sum(len(p.triangles) for p in parts)
+    check_triangle_count(source, total)
+    if total == 0:
+        raise SceneError(source, "no triangles")
+    for part in parts:
+        _check_part(source, part, len(objects), len(materials))
+
+    positions, triangles = _join_geometry(source, parts)
+    keep = has_area(positions, triangles)
+    kept = int(keep.sum())
+    if kept == 0:
+        raise SceneError(source, f"no triangle has an area ({total} given)")
+    if kept < total:
+        verb = "has no area and was" if total - kept == 1 else "have no area and were"
+        notes.append(f"{total - kept} of {counted(total, 'triangle', 'triangles')} {verb} dropped")
+
+    triangles = triangles[keep]
+    used = np.zeros(len(positions), bool)
+    used[triangles] = True
+    triangles = (np.cumsum(used) - 1)[triangles]
+    uvs = [_join_corners([p.uv0 for p in parts], parts, keep, 2), _join_corners([p.uv1 for p in parts], parts, keep, 2)]
+    normals = _join_corners([p.normals for p in parts], parts, keep, 3)
+    checked_materials = _check_materials(source, materials, notes)
+    material_ids = _join_ids([p.material_ids for p in parts], parts)[keep]
+    material_ids, checked_materials = _drop_unmapped_textures(uvs, material_ids, checked_materials, notes)
+
+    scene = Scene(
+        name=name,
+        positions=np.ascontiguousarray(positions[used]),
+        triangles=triangles.astype(np.int32),
+        material_ids=material_ids.astype(np.int32),
+        object_ids=_join_ids([p.object_ids for p in parts], parts)[keep].astype(np.int32),
+        objects=tuple(one_line(o) for o in objects),
+        materials=tuple(checked_materials),
+        cameras=_check_cameras(cameras, notes),
+        uv0=None if uvs[0] is None else np.nan_to_num(uvs[0], nan=0.0, posinf=0.0, neginf=0.0),
+        uv1=None if uvs[1] is None else np.nan_to_num(uvs[1], nan=0.0, posinf=0.0, neginf=0.0),
+        source=Path(source),
+    )
+    return dataclasses.replace(scene, normals=_unit_normals(scene, normals), warnings=tuple(notes))
+
+
+def has_area(positions: F64, triangles: Array) -> Bools:
+    """(m,) whether each triangle is more than a line or a point.
+
+    Its least height must exceed FLATNESS of the scene's extent, and with it of its own longest edge, which is at most
+    √3 times that. Everything is relative, so the answer does not depend on the unit.
+    """
+    low, high = positions[triangles].min(axis=(0, 1)), positions[triangles].max(axis=(0, 1))
+    extent = float((high - low).max())
+    if extent == 0.0:
+        return np.zeros(len(triangles), bool)
+    a, b, c = np.moveaxis(((positions - low) / extent)[triangles], 1, 0)
+    longest = np.maximum.reduce([np.linalg.norm(e, axis=1) for e in (b - a, c - b, a - c)])
+    twice_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    solid: Bools = twice_area > FLATNESS * longest
+    return solid
+
+
+def _check_part(source: str | Path, part: Part, object_count: int, material_count: int) -> None:
+    if len(part.triangles) == 0:
+        return
+    for what, values, count in (
+        ("index", part.triangles, len(part.positions)),
+        ("object", part.object_ids, object_count),
+        ("material", part.material_ids, material_count),
+    ):
+        low, high = int(np.min(values)), int(np.max(values))
+        if low < 0 or high >= count:
+            things = {"index": "vertices", "object": "objects", "material": "materials"}[what]
+            raise SceneError(source, f"{what} {low if low < 0 else high} is out of range: there are {count} {things}")
+
+
+def _join_geometry(source: str | Path, parts: Sequence[Part]) -> tuple[F64, NDArray[np.int64]]:
+    """All positions (n, 3) and the triangles (m, 3) that index them; SceneError where a corner is not finite."""
+    starts = np.cumsum([0, *(len(p.positions) for p in parts)])
+    positions = np.concatenate([np.asarray(p.positions, np.float64).reshape(-1, 3) for p in parts])
+    triangles = np.concatenate(
+        [np.asarray(p.triangles, np.int64).reshape(-1, 3) + start for p, start in zip(parts, starts, strict=False)]
+    )
+    finite = np.isfinite(positions).all(axis=1)
+    if not finite.all():
+        bad = int((~finite[triangles]).any(axis=1).sum())
+        if bad:
+            given = counted(len(triangles), "triangle has", "triangles have")
+            raise SceneError(source, f"{bad} of {given} a corner that is not a finite number")
+        positions = np.where(finite[:, None], positions, 0.0)
+    corners = positions[triangles]
+    extent = float((corners.max(axis=(0, 1)) - corners.min(axis=(0, 1))).max())
+    least, most = EXTENT_RANGE
+    if extent > 0.0 and not least <= extent <= most:
+        raise SceneError(source, f"the scene is {extent:.3g} m across: allowed is {least:g} m to {most:g} m")
+    return positions, triangles
+
+
+def _join_ids(ids: Sequence[int | Array], parts: Sequence[Part]) -> NDArray[np.int64]:
+    return np.concatenate(
+        [np.broadcast_to(np.asarray(i, np.int64), len(p.triangles)) for i, p in zip(ids, parts, strict=True)]
+    )
+
+
+def _join_corners(
+    values: Sequence[Array | None], parts: Sequence[Part], keep: Bools, width: int
+) -> NDArray[np.float32] | None:
+    """(m, 3, width) f32 values per kept corner, NaN where a part has none; None if no part has any."""
+    if all(v is None for v in values):
+        return None
+    joined = []
+    for value, part in zip(values, parts, strict=True):
+        if value is None:
+            joined.append(np.full((len(part.triangles), 3, width), np.nan, np.float32))
+        elif value.ndim == 3:
+            joined.append(np.asarray(value, np.float32))
+        else:
+            joined.append(np.asarray(value, np.float32)[part.triangles])
+    return np.concatenate(joined)[keep]
+
+
+def _check_materials(source: str | Path, materials: Sequence[Material], notes: list[str]) -> list[Material]:
+    checked, clamped, darkened = [], 0, 0
+    for material in materials:
+        if not all(math.isfinite(x) for x in (*material.albedo, *material.emission)):
+            raise SceneError(source, f"material '{material.name}': albedo and emission must be finite numbers")
+        albedo = _rgb(min(max(x, 0.0), 1.0) for x in material.albedo)
+        emission = _rgb(max(x, 0.0) for x in material.emission)
+        clamped += albedo != material.albedo
+        darkened += emission != material.emission
+        name = one_line(material.name)
+        checked.append(dataclasses.replace(material, name=name, albedo=albedo, emission=emission))
+    if clamped:
+        notes.append(f"{counted(clamped, 'material', 'materials')} with an albedo outside 0 to 1: clamped")
+    if darkened:
+        notes.append(f"{counted(darkened, 'material', 'materials')} with an emission below 0: set to 0")
+    return checked
+
+
+def _rgb(values: Iterable[float]) -> RGB:
+    r, g, b = (float(v) for v in values)
+    return (r, g, b)
+
+
+def _drop_unmapped_textures(
+    uvs: Sequence[Array | None], ids: NDArray[np.int64], materials: list[Material], notes: list[str]
+) -> tuple[NDArray[np.int64], list[Material]]:
+    """Give textured triangles without texture coordinates a copy of their material in its pictures' mean colours."""
+    ids, materials, unmapped = ids.copy(), list(materials), 0
+    for i, material in enumerate(tuple(materials)):
+        textures = [t for t in (material.albedo_texture, material.emission_texture) if t is not None]
+        if not textures:
+            continue
+        mine = ids == i
+        bad = np.zeros(len(ids), bool)
+        for texcoord in {t.texcoord for t in textures}:
+            uv = uvs[texcoord]
+            bad |= mine if uv is None else mine & ~np.isfinite(uv).all(axis=(1, 2))
+        if bad.any():
+            unmapped += int(bad.sum())
+            ids[bad] = len(materials)
+            albedo = _mean_colour(material.albedo, material.albedo_texture)
+            emission = _mean_colour(material.emission, material.emission_texture)
+            materials.append(Material(material.name, albedo, emission, double_sided=material.double_sided))
+    if unmapped:
+        what = counted(unmapped, "textured triangle", "textured triangles")
+        notes.append(f"{what} without texture coordinates: the picture's mean colour is used")
+    return ids, materials
+
+
+def _mean_colour(factor: RGB, texture: Texture | None) -> RGB:
+    if texture is None:
+        return factor
+    mean = texture.pixels.mean(axis=(0, 1), dtype=np.float64)
+    return _rgb(f * float(m) for f, m in zip(factor, mean, strict=True))
+
+
+def _check_cameras(cameras: Sequence[Camera], notes: list[str]) -> tuple[Camera, ...]:
+    """Make every camera rigid and its name unique; drop what is singular, not finite or has no field of view."""
+    good: list[Camera] = []
+    for camera in cameras:
+        matrix = np.asarray(camera.world_from_camera, np.float64)
+        z = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+        x = np.cross(matrix[:3, 1], z)
+        x = x / np.linalg.norm(x)
+        rigid = np.eye(4)
+        rigid[:3] = np.stack([x, np.cross(z, x), z, matrix[:3, 3]], axis=1)
+        if not np.isfinite(rigid).all() or not 0.0 < camera.yfov < math.pi:
+            continue
+        name, taken = one_line(camera.name), {c.name for c in good}
+        if name in taken:
+            name = next(f"{name} {n}" for n in range(2, len(taken) + 3) if f"{name} {n}" not in taken)
+        good.append(Camera(name, rigid, float(camera.yfov)))
+    if len(good) < len(cameras):
+        dropped = len(cameras) - len(good)
+        notes.append(f"{counted(dropped, 'camera was', 'cameras were')} dropped: singular or without a field of view")
+    return tuple(good)
+
+
+def _unit_normals(scene: Scene, normals: Array | None) -> NDArray[np.float32] | None:
+    """Corner normals of length 1; the triangle's own where the file's is missing, zero or not finite."""
+    if normals is None:
+        return None
+    unit = normals.astype(np.float64)
+    unit /= np.linalg.norm(unit, axis=2, keepdims=True)
+    flat = np.broadcast_to(scene.normals_areas[0][:, None], unit.shape)
+    return np.where(np.isfinite(unit).all(axis=2, keepdims=True), unit, flat).astype(np.float32)

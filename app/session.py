@@ -1,0 +1,363 @@
+"""One open scene and its solution: what window, headless shot, bake and bench all step.
+
+A session owns scene, charts, lightmap and solver. It knows no window and no imgui; whoever draws reads ``lightmap``.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.atlas.charts import Charts
+from app.atlas.lightmap import Lightmap
+from app.atlas.options import AtlasOptions
+from app.errors import UserError
+from app.gpu import Framebuffer, Gpu, Texture
+from app.history import History
+from app.loading import Cancelled, Loaded, Loading, load
+from app.picking import Picked, picked_from_hit
+from app.render.camera import CameraView
+from app.render.exposure import auto_exposure
+from app.render.false_colour import Scale
+from app.render.frame import FrameRenderer
+from app.render.items import ItemImage
+from app.render.options import DisplayOptions
+from app.render.surfaces import Rect
+from app.scene.model import RGB, Camera, Material, Scene
+from app.solvers import SOLVERS, EnergyBook, ShootingOptions
+from app.solvers.shooting.stages import BATCH
+
+BOOKS_EVERY = 0.5  # seconds between two looks at the energy book while shooting: it reads every texel
+
+
+@dataclass(frozen=True)
+class Stop:
+    """When a solve ends, besides when it has converged; whichever comes first."""
+
+    shots: int | None = None
+    seconds: float | None = None
+
+
+@dataclass(frozen=True)
+class Stats:
+    """Where the solution stands. residual: unshot share of the emitted power [-]; energies summed over RGB [W]."""
+
+    shots: int
+    seconds: float
+    residual: float
+    emitted: float
+    absorbed: float
+    escaped: float
+    unshot: float
+    imbalance: float
+    shots_per_second: float
+    converged: bool
+    texels: int
+    tiles: int
+    triangles: int
+    charts: int
+    memory_mib: float
+
+
+class Session:
+    """Raises UserError (SceneError, GpuError) from ``open_now``; ``open`` reports through ``message`` instead."""
+
+    def __init__(
+        self,
+        gpu: Gpu,
+        *,
+        shooting: ShootingOptions | None = None,
+        atlas: AtlasOptions | None = None,
+        display: DisplayOptions | None = None,
+        default_light: bool = False,
+    ) -> None:
+        self.gpu = gpu
+        self.shooting = shooting or ShootingOptions()
+        self.atlas = atlas or AtlasOptions()
+        self.display = display or DisplayOptions()
+        self.default_light = default_light
+        self.renderer = FrameRenderer(gpu)
+        self.items = ItemImage(gpu)
+        self.running = True
+        self.message: str | None = None
+        self.loading: Loading | None = None
+        self.load_seconds: dict[str, float] = {}
+        self.history = History()
+        self.interrupted = False
+        self._opened = False
+
+    # -- opening -------------------------------------------------------------------------------------------------------
+
+    def open(self, source: str | Path) -> None:
+        """Start to load in the background; ``poll`` swaps the scene when it is there."""
+        if self.loading is not None:
+            self.loading.cancel()
+        self.loading = Loading(source, self.atlas, default_light=self.default_light)
+
+    def open_now(self, source: str | Path, progress: Callable[[str, float], None] | None = None) -> None:
+        """Load and wait."""
+        self._swap(load(source, self.atlas, default_light=self.default_light, progress=progress))
+
+    def set_atlas(self, atlas: AtlasOptions) -> None:
+        """Cut the open scene anew, in the background."""
+        self.atlas = atlas
+        self.open(self.source)
+
+    def poll(self) -> None:
+        """Once per frame: hear from the GPU, and swap in a scene that has finished loading."""
+        if self.loading is not None and self.loading.ended:
+            ended, self.loading = self.loading, None
+            try:
+                self._swap(ended.result)
+            except Cancelled:
+                self.message = f"{ended.source}: loading stopped"
+            except UserError as error:
+                self.message = str(error)
+        if self._opened:
+            self._hear()
+
+    def _swap(self, loaded: Loaded) -> None:
+        clock = time.perf_counter()
+        lightmap = Lightmap(self.gpu, loaded.nodes, storage=self.shooting.storage)
+        solver = SOLVERS["shooting"](self.gpu, lightmap, self.shooting)
+        self.close()
+        self.lightmap, self.solver = lightmap, solver
+        self.load_seconds = loaded.seconds | {"upload": time.perf_counter() - clock}
+        self.source = self.scene.source or self.scene.name
+        self.look_through(self.scene.cameras[0])
+        self.message = None if self.scene.emits else f"{self.scene.name} has no light: try --light for a ceiling light"
+        self._opened = True
+        self._begin()
+
+    def close(self) -> None:
+        """Release the open scene; the session can open another."""
+        if self._opened:
+            self.solver.release()
+            self.lightmap.release()
+            self._opened = False
+
+    def release(self) -> None:
+        if self.loading is not None:
+            self.loading.cancel()
+        self.close()
+        self.renderer.release()
+        self.items.release()
+
+    # -- what is open --------------------------------------------------------------------------------------------------
+
+    @property
+    def opened(self) -> bool:
+        return self._opened
+
+    @property
+    def scene(self) -> Scene:
+        return self.lightmap.scene
+
+    @property
+    def charts(self) -> Charts:
+        return self.lightmap.charts
+
+    @property
+    def name(self) -> str:
+        return self.scene.name if self._opened else ""
+
+    # -- solving -------------------------------------------------------------------------------------------------------
+
+    @property
+    def converged(self) -> bool:
+        return self.solver.report.residual <= self.shooting.residual
+
+    def advance(self, *, budget_ms: float, shots: int = 1) -> int:
+        """Make up to ``shots`` shots within ``budget_ms``; returns how many. None when paused or converged."""
+        if not self._opened or not self.running or self.converged:
+            return 0
+        made, start = 0, time.perf_counter()
+        while made < shots:
+            made += self.solver.step(min(shots - made, self._batch))
+            if made < shots:
+                self.gpu.ctx.finish()
+                spent = (time.perf_counter() - start) * 1e3
+                self._batch = max(1, min(BATCH, int((budget_ms - spent) / (spent / made))))
+                if spent >= budget_ms:
+                    break
+        self.seconds += time.perf_counter() - self._last_advance if self._last_advance else 0.0
+        self._last_advance = time.perf_counter()
+        return made
+
+    def shoot_once(self) -> None:
+        """One shot, also when paused."""
+        self.solver.step(1)
+
+    def solve(self, stop: Stop, progress: Callable[[Stats], None] | None = None) -> None:
+        """Shoot until ``stop``, or until converged; ``progress`` hears of it a few times a second."""
+        told = start = time.perf_counter()
+        self.interrupted = False
+        try:
+            self._solve(stop, start, told, progress)
+        except KeyboardInterrupt:
+            self.interrupted = True
+        self.gpu.ctx.finish()
+        self.seconds = time.perf_counter() - start
+        self.settle()
+
+    def progress(self, stop: Stop) -> float:
+        """Share done of a solve: of the shots or seconds asked for, or of the decades of residual down to the threshold."""
+        residual = max(self.solver.report.residual, 1e-12)
+        shares = [np.log(min(residual, 1.0)) / np.log(min(self.shooting.residual, 0.999999))]
+        if stop.shots is not None:
+            shares.append(self.solver.shots / stop.shots)
+        if stop.seconds is not None:
+            shares.append(self.seconds / stop.seconds)
+        return float(min(max(shares), 1.0))
+
+    def _solve(self, stop: Stop, start: float, told: float, progress: Callable[[Stats], None] | None) -> None:
+        while not self.converged:
+            left = BATCH if stop.shots is None else stop.shots - self.solver.shots
+            spent = time.perf_counter() - start
+            if left <= 0 or (stop.seconds is not None and spent >= stop.seconds):
+                break
+            self.solver.step(min(BATCH, left))
+            self.seconds = time.perf_counter() - start
+            self._hear(books=False)
+            if progress and time.perf_counter() - told > 0.2:
+                told = time.perf_counter()
+                progress(self.stats)
+
+    def settle(self) -> None:
+        """Wait for the GPU and bring report, book and history up to the last shot."""
+        self.solver.poll(wait=True)
+        self._books = self.solver.books()
+        emitted = self._books.emitted.sum()
+        if emitted > 0:
+            self.history.add(self.solver.shots, self.seconds, float(self._books.unshot.sum() / emitted), self._books)
+
+    def restart(self) -> None:
+        """Forget all light and begin again."""
+        self.solver.reset()
+        self._begin()
+
+    def set_shooting(self, options: ShootingOptions) -> None:
+        """Other knobs, from the next shot on; only another storage format begins again."""
+        restart = options.storage != self.shooting.storage
+        self.shooting = options
+        if self._opened:
+            self.solver.set_options(options)
+            if restart:
+                self._begin()
+
+    def set_material(self, index: int, material: Material) -> None:
+        """Another albedo or emission: charts and texels stay, the light begins again."""
+        materials = list(self.scene.materials)
+        materials[index] = material
+        self.lightmap.set_materials(tuple(materials))
+        self.restart()
+
+    def _begin(self) -> None:
+        self.seconds, self._last_advance = 0.0, 0.0
+        self._batch = 1
+        self._books: EnergyBook = self.solver.books()
+        self._books_time = time.perf_counter()
+        self.history = History()
+        self.history.add(0, 0.0, self.solver.report.residual, self._books)
+
+    def _hear(self, books: bool = True) -> None:
+        before = self.solver.report.shots
+        report = self.solver.poll()
+        if not self.running or self.converged:
+            self._last_advance = 0.0
+        if books and report.shots != before and time.perf_counter() - self._books_time > BOOKS_EVERY:
+            self._books = self.solver.books()
+            self._books_time = time.perf_counter()
+        if report.shots != before:
+            self.history.add(report.shots, self.seconds, report.residual, self._books)
+
+    # -- what is known -------------------------------------------------------------------------------------------------
+
+    @property
+    def books(self) -> EnergyBook:
+        """The last energy book that was made."""
+        return self._books
+
+    @property
+    def stats(self) -> Stats:
+        book, lightmap = self._books, self.lightmap
+        return Stats(
+            shots=self.solver.shots,
+            seconds=self.seconds,
+            residual=self.solver.report.residual,
+            emitted=float(book.emitted.sum()),
+            absorbed=float(book.absorbed.sum()),
+            escaped=float(book.escaped.sum()),
+            unshot=float(book.unshot.sum()),
+            imbalance=book.imbalance_share,
+            shots_per_second=self.history.shots_per_second,
+            converged=self.converged,
+            texels=lightmap.texel_count,
+            tiles=lightmap.tiles,
+            triangles=len(self.scene.triangles),
+            charts=self.charts.chart_count,
+            memory_mib=sum(lightmap.memory.values()) / 2**20,
+        )
+
+    @property
+    def timings(self) -> dict[str, float]:
+        """Mean GPU milliseconds per call by pass; empty unless ``gpu.timers.enabled``."""
+        return self.gpu.timers.mean_ms()
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Every knob that shaped the solution."""
+        return {"shooting": self.shooting.as_dict(), "atlas": self.atlas.as_dict(), "light": self.default_light}
+
+    def pick(self, x_px: int, y_px: int) -> Picked | None:
+        """What surface is at that pixel of the last frame, and the light on it."""
+        hit = self.renderer.pick(x_px, y_px)
+        return None if hit is None else picked_from_hit(self.lightmap, hit, self.shooting.level)
+
+    def look_through(self, camera: Camera) -> None:
+        """Stand where a camera of the scene stands; orbit around the scene's middle from there."""
+        distance = float(np.linalg.norm(np.asarray(camera.world_from_camera)[:3, 3] - self.lightmap.frame.centre))
+        self.view = CameraView.from_camera(camera, distance)
+
+    def draw(self, target: Framebuffer, size: tuple[int, int], *, scale: Scale | None = None, samples: int = 1) -> None:
+        """The picture of the solution as it is now."""
+        self.renderer.render(
+            target,
+            size,
+            self.lightmap,
+            self.view,
+            self.display,
+            ambient=self._ambient,
+            shooter=self._shooter_rect,
+            scale=scale,
+            samples=samples,
+        )
+
+    def expose(self) -> None:
+        """Set the exposure from the light of the scene."""
+        self.display = self.display.replace(exposure=auto_exposure(self.lightmap))
+
+    @property
+    def _ambient(self) -> RGB | None:
+        """Ambient radiosity of the light not yet shot [W/m²], for display only."""
+        if not self.display.ambient:
+            return None
+        red, green, blue = self._books.ambient
+        return float(red), float(green), float(blue)
+
+    @property
+    def _shooter_rect(self) -> Rect | None:
+        """The last shooter's patch in atlas texels."""
+        shot = self.solver.last_shot
+        return (
+            None if shot is None or not self.display.shooter else self.lightmap.nodes.atlas_rect(shot.corner, shot.size)
+        )
+
+    def hemicube_image(self) -> Texture:
+        """The last shooter's visibility map, in one colour per facet."""
+        return self.items.draw(self.solver.inspect()["visibility"])

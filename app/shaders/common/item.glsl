@@ -1,0 +1,8 @@
+// Items of the visibility map: 0 is the open background, else a facet (from 1), or a side that has no texels.
+// Held as floats, exact up to 2^24, because an integer target cannot be cleared portably.
+const float OPEN = 0.0;
+const float UNCHARTED = 16777215.0;
+const float FAR = 2.0;  // the scene's diameter in the solver frame
+// Rounding of positions and of their dot products in single precision, a few 2^-24 of the scene's diameter: two surfaces that are
+// closer than this lie in one plane, and nothing nearer to the shooter can be told from its own surface.
+const float COPLANAR = 2e-6;

@@ -1,0 +1,17 @@
+// Radiance of the radiosity B = E + ρ(H + A), A being the ambient light not yet shot. [Cohen88, section 5]
+#include "common/atlas.glsl"
+#include "common/albedo.glsl"
+#include "common/exitance.glsl"
+uniform usampler2D t_normal_ids;
+uniform sampler2D t_materials;
+uniform sampler2D t_light;  // irradiance H
+uniform float u_unit;       // W/m² per stored unit
+uniform vec3 u_ambient;     // A [W/m²]
+
+vec3 layer_colour(ivec2 texel_px) {
+    uint material = material_from_ids(texelFetch(t_normal_ids, texel_px, 0).y);
+    vec3 received = texelFetch(t_light, texel_px, 0).rgb * u_unit + u_ambient;
+    return (exitance_of(t_materials, material, texel_px) + albedo_of(t_materials, material, texel_px) * received) / PI;
+}
+
+vec3 unlit_colour(int material) { return texelFetch(t_materials, ivec2(1, material), 0).rgb / PI; }

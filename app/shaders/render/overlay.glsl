@@ -1,0 +1,27 @@
+// Texel checker, texel and tile lines, and the patch that shot: all as wide as pixels, faded before they would alias.
+uniform float u_checker;  // 0 to 1
+uniform float u_grid;     // 0 to 1
+uniform vec4 u_shooter;   // atlas texels: lower corner, upper corner
+
+float line_at_integers(vec2 uv, vec2 per_px, float width_px) {
+    vec2 distance_px = abs(fract(uv - 0.5) - 0.5) / per_px;
+    return clamp(0.5 * width_px + 0.5 - min(distance_px.x, distance_px.y), 0.0, 1.0);
+}
+
+vec3 overlaid(vec3 colour, vec2 uv, vec2 texels_per_px) {
+    float texel_px = 1.0 / max(texels_per_px.x, texels_per_px.y);
+
+    vec2 square = floor(uv);
+    float dark = mix(0.5, fract((square.x + square.y) * 0.5) * 2.0, smoothstep(1.5, 3.0, texel_px));
+    colour *= 1.0 - u_checker * dark;
+
+    float texels = line_at_integers(uv, texels_per_px, 1.0) * smoothstep(3.0, 8.0, texel_px);
+    float tiles = line_at_integers(uv / 16.0, texels_per_px / 16.0, 1.6) * smoothstep(0.2, 0.5, texel_px);
+    float contrast = max(colour.r, max(colour.g, colour.b)) > 0.72 ? 0.0 : 0.95;
+    colour = mix(colour, vec3(contrast), u_grid * max(0.15 * texels, 0.35 * tiles));
+
+    vec2 outside = max(u_shooter.xy - uv, uv - u_shooter.zw) / texels_per_px;
+    float distance_px = max(outside.x, outside.y);
+    float shooter = max(clamp(2.0 - abs(distance_px), 0.0, 1.0), distance_px < 0.0 ? 0.3 : 0.0);
+    return mix(colour, vec3(1.0, 0.68, 0.15), shooter);
+}

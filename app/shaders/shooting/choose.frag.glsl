@@ -1,0 +1,138 @@
+// The shooters of a batch: column k describes the k-th strongest of the rows' strongest patches. [Coombe03, 3.4]
+//
+// The polygon is the patch's own parallelogram, so that neighbouring patches tile their surface exactly. Visibility is
+// sampled from the middle of the residual, or where part of the patch holds none (something stands on it), or the patch
+// is curved, from the lit texel nearest to that middle.
+#define LEVEL 2
+#include "common/atlas.glsl"
+#include "shooting/shooter.glsl"
+#include "shooting/belongs.glsl"
+
+const float WEAKEST = 0.1;  // a shot under a tenth of the batch's best waits for a later batch
+const float UNLIT = 0.01;   // a texel under 1 % of the patch's mean residual counts as covered by something
+const int SIZE = 1 << LEVEL;
+
+uniform sampler2D t_position_area;
+uniform usampler2D t_normal_ids;
+uniform sampler2D t_residual;
+uniform sampler2D t_facets;
+uniform sampler2D t_rows;
+uniform int u_rows;
+
+layout(location = 0) out vec4 out_row;
+
+// The (power, x, y, Σ) of the rank-th strongest row; equal powers rank by index.
+vec4 ranked_row(int rank) {
+    vec4 last = vec4(3e38);
+    int last_index = -1;
+    for (int k = 0; k <= rank; ++k) {
+        vec4 best = vec4(0.0);
+        int best_index = -1;
+        for (int i = 0; i < u_rows; ++i) {
+            vec4 row = texelFetch(t_rows, ivec2(i, 0), 0);
+            bool follows = row.x < last.x || (row.x == last.x && i > last_index);
+            if (follows && row.x > best.x) { best = row; best_index = i; }
+        }
+        last = best;
+        last_index = best_index;
+    }
+    return last;
+}
+
+vec3 facet_tangent(uint facet, int which) {
+    int entry = 2 * int(facet) + which;
+    int width = textureSize(t_facets, 0).x;
+    return texelFetch(t_facets, ivec2(entry % width, entry / width), 0).xyz;
+}
+
+Texel texel_at(ivec2 px) { return load_texel(t_position_area, t_normal_ids, px); }
+
+float residual_at(ivec2 px) {
+    vec3 r = texelFetch(t_residual, px, 0).rgb;
+    return r.r + r.g + r.b;
+}
+
+Shooter shooter_from_patch(ivec2 corner_px) {
+    // the strongest texel leads: the others shoot with it if they belong to it
+    Texel lead;
+    lead.area = 0.0;
+    float lead_power = 0.0;
+    for (int i = 0; i < SIZE * SIZE; ++i) {
+        ivec2 px = corner_px + ivec2(i % SIZE, i / SIZE);
+        Texel texel = texel_at(px);
+        float power = residual_at(px) * texel.area;
+        if (power > lead_power) { lead_power = power; lead = texel; }
+    }
+    Shooter s;
+    s.size_px = 0;
+    s.power = 0.0;
+    if (lead.area <= 0.0) return s;
+    vec3 dpdu = facet_tangent(lead.facet, 0), dpdv = facet_tangent(lead.facet, 1);
+    float reach = patch_reach(dpdu, dpdv, SIZE);
+    // the facet's own normal: the texels' packed ones tilt by 2^-15, enough to see what lies in the same plane
+    s.normal = normalize(cross(dpdu, dpdv));
+    if (dot(s.normal, lead.normal) < 0.0) s.normal = -s.normal;
+
+    vec3 area_centre = vec3(0.0), power_centre = vec3(0.0), flux = vec3(0.0);
+    float area = 0.0, power = 0.0, flat_cos = 1.0;
+    ivec2 lower = ivec2(SIZE), upper = ivec2(-1);
+    for (int i = 0; i < SIZE * SIZE; ++i) {
+        ivec2 at = ivec2(i % SIZE, i / SIZE), px = corner_px + at;
+        Texel texel = texel_at(px);
+        if (!belongs(texel, s.normal, lead.position, reach)) continue;
+        vec3 r = texelFetch(t_residual, px, 0).rgb;
+        area += texel.area;
+        flux += r * texel.area;
+        area_centre += texel.position * texel.area;
+        power_centre += texel.position * texel.area * (r.r + r.g + r.b);
+        power += texel.area * (r.r + r.g + r.b);
+        flat_cos = min(flat_cos, dot(texel.normal, s.normal));
+        lower = min(lower, at);
+        upper = max(upper, at);
+    }
+    s.area = area;
+    s.power = power;
+    s.exitance = flux / area;
+    s.centre = area_centre / area;
+    s.facet = lead.facet;
+    s.patch_px = corner_px;
+    s.size_px = SIZE;
+    s.lead = lead.position;
+    s.reach = reach;
+
+    // the covered block of texels as a parallelogram in the shooter's plane, scaled to the area that it covers
+    vec2 extent = vec2(upper - lower + 1);
+    vec3 edge_u = (dpdu - s.normal * dot(dpdu, s.normal)) * extent.x;
+    vec3 edge_v = (dpdv - s.normal * dot(dpdv, s.normal)) * extent.y;
+    if (dot(cross(edge_u, edge_v), s.normal) < 0.0) edge_v = -edge_v;
+    float scale = sqrt(area / length(cross(edge_u, edge_v)));
+    s.edge_u = edge_u * scale;
+    s.edge_v = edge_v * scale;
+
+    // shoot from the middle of the residual, or from the lit texel nearest to it
+    s.origin = power_centre / power;
+    bool whole = flat_cos > 0.99999;
+    float nearest = 3e38;
+    vec3 fallback = lead.position;
+    for (int i = 0; i < SIZE * SIZE; ++i) {
+        ivec2 px = corner_px + ivec2(i % SIZE, i / SIZE);
+        Texel texel = texel_at(px);
+        if (!belongs(texel, s.normal, lead.position, reach)) continue;
+        if (residual_at(px) * area < UNLIT * power) { whole = false; continue; }
+        vec3 offset = texel.position - s.origin;
+        if (dot(offset, offset) < nearest) { nearest = dot(offset, offset); fallback = texel.position; }
+    }
+    if (!whole) s.origin = fallback;
+    return s;
+}
+
+void main() {
+    int shot = int(gl_FragCoord.x);
+    vec4 row = ranked_row(shot);
+    Shooter s;
+    s.size_px = 0;
+    s.power = 0.0;
+    if (row.x > 0.0 && (shot == 0 || row.x >= WEAKEST * ranked_row(0).x))
+        s = shooter_from_patch(ivec2(row.yz) * SIZE);
+    out_row = s.size_px > 0 ? shooter_row(s, int(gl_FragCoord.y)) : vec4(0.0);
+}

@@ -1,0 +1,19 @@
+// Residual power of each patch, Σ r·A [stored units · solver area], sum of RGB: one texel per patch of 2^level texels.
+#define LEVEL 2
+
+uniform sampler2D t_position_area;
+uniform sampler2D t_residual;
+
+layout(location = 0) out float out_power;
+
+void main() {
+    ivec2 corner_px = ivec2(gl_FragCoord.xy) << LEVEL;
+    float power = 0.0;
+    for (int j = 0; j < (1 << LEVEL); ++j)
+        for (int i = 0; i < (1 << LEVEL); ++i) {
+            ivec2 texel_px = corner_px + ivec2(i, j);
+            vec3 r = texelFetch(t_residual, texel_px, 0).rgb;
+            power += (r.r + r.g + r.b) * texelFetch(t_position_area, texel_px, 0).w;
+        }
+    out_power = power;
+}

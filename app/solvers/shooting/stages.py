@@ -1,0 +1,109 @@
+"""The passes of a shot and what they write: everything on the GPU that ``UniformShooting`` drives."""
+
+from __future__ import annotations
+
+import math
+
+from app.atlas.charts import TILE
+from app.atlas.lightmap import Lightmap
+from app.gpu import Gpu, Pass, Texture
+from app.projections import PROJECTIONS
+from app.solvers.shooting.options import FORM_FACTORS, MAX_LEVEL, VISIBILITIES, ShootingOptions
+
+BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
+OPEN, FAR = 0.0, 2.0  # item and depth of the open background, see common/item.glsl
+SHOOTER_ROWS = 7  # rows of t_shooters, see shooter.glsl
+REPORT_TEXELS = 2 + SHOOTER_ROWS  # see report.frag.glsl
+OPEN_BLOCK = 32  # visibility texels along the edge of a block that open.frag.glsl sums
+
+
+class ShotBuffers:
+    """What a shot writes besides the lightmap and does not depend on the options."""
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
+        self.rows = gpu.texture((lightmap.rows, 1), 4, "f4")
+        self.shooters = gpu.texture((BATCH, SHOOTER_ROWS), 4, "f4")
+        self.ledger = gpu.texture((BATCH, 2), 4, "f4")
+        self.report = gpu.texture((REPORT_TEXELS, 1), 4, "f4")
+        self.books = [gpu.texture((lightmap.columns, lightmap.rows), 4, "f4") for _ in range(3)]
+        self.row_target = gpu.target(self.rows)
+        self.shooter_target = gpu.target(self.shooters)
+        self.ledger_target = gpu.target(self.ledger)
+        self.report_target = gpu.target(self.report)
+        self.books_target = gpu.target(*self.books)
+
+    def release(self) -> None:
+        release_all(self)
+
+
+class ChoiceStages:
+    """Choosing among the patches of one level."""
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, level: int) -> None:
+        self.level = level
+        self.patch_size = (lightmap.size[0] >> level, lightmap.size[1] >> level)
+        self.patches = gpu.texture(self.patch_size, 1, "f4")
+        self.patch_target = gpu.target(self.patches)
+        self.add_patches = Pass(gpu, "shooting/patches", defines={"LEVEL": level})
+        self.add_rows = Pass(gpu, "shooting/rows", defines={"ROW_PATCHES": TILE >> level})
+        self.choose = Pass(gpu, "shooting/choose", defines={"LEVEL": level} | lightmap.defines("MATERIAL_BITS"))
+
+    def release(self) -> None:
+        release_all(self)
+
+
+class ShotStages:
+    """Programs and maps that follow from the options: built anew when they change."""
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
+        self.projection = PROJECTIONS[options.projection]
+        levels = range(options.level, (MAX_LEVEL if options.coarsen else options.level) + 1)
+        self.choices = [ChoiceStages(gpu, lightmap, level) for level in levels]
+        map_size = self.projection.size(options.resolution)
+        self.map = gpu.texture(map_size, 2, "f4")  # item, depth
+        self.depth = gpu.depth_texture(map_size)
+        self.weights = gpu.texture((map_size[0] // 2, map_size[1] // 2), 1, "f4")
+        self.open_size = (map_size[0] // OPEN_BLOCK, map_size[1] // OPEN_BLOCK)  # blocks of one shot
+        self.open = gpu.texture((self.open_size[0], self.open_size[1] * BATCH), 2, "f4")
+        self.visibility_target = gpu.target(self.map, depth=self.depth)
+        self.open_target = gpu.target(self.open)
+
+        resolution = {"RESOLUTION": options.resolution}
+        bits = lightmap.defines("MATERIAL_BITS")
+        reads = {"projection": self.projection.glsl}
+        self.zero = Pass(gpu, "shooting/zero", defines=bits)
+        self.see = Pass(gpu, "shooting/visibility", defines=resolution, slots={"projection": self.projection.clip_glsl})
+        self.receive = Pass(
+            gpu,
+            "shooting/receive",
+            defines=resolution
+            | lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE")
+            | {
+                "DISC": bool(FORM_FACTORS.index(options.form_factor)),
+                "DISC_SUBDIVISION": options.discs,
+                "VISIBILITY": VISIBILITIES.index(options.visibility),
+            },
+            slots=reads,
+        )
+        self.add_open = Pass(gpu, "shooting/open", defines={"BLOCK": OPEN_BLOCK})
+        self.enter = Pass(gpu, "shooting/ledger")
+        self.tell = Pass(gpu, "shooting/report")
+        weights_target = gpu.target(self.weights)
+        Pass(gpu, "shooting/weights", defines=resolution, slots=reads).draw(weights_target)
+        weights_target.release()
+        self.add_books = Pass(gpu, "shooting/books", defines=lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"))
+
+    def choice(self, residual: float) -> ChoiceStages:
+        """The level that shoots when this share of the power is unshot. A patch twice as wide makes four times the error (of second
+        order in its width): a quarter of the power may shoot from it."""
+        return self.choices[min(int(-math.log(max(residual, 1e-12)) / math.log(4.0)), len(self.choices) - 1)]
+
+    def release(self) -> None:
+        release_all(self)
+
+
+def release_all(owner: object) -> None:
+    """Release every GL object that is an attribute of ``owner``, targets before their textures."""
+    values = [v for value in vars(owner).values() for v in (value if isinstance(value, list) else [value])]
+    for value in sorted((v for v in values if hasattr(v, "release")), key=lambda v: isinstance(v, Texture)):
+        value.release()

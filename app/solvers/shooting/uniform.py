@@ -1,0 +1,295 @@
+"""Progressive refinement radiosity over uniform texels [Coombe03, 3; Cohen88].
+
+    while not converged:
+        i    = patch with the largest residual power r_i A_i
+        see the scene from i (item buffer and depth on a hemicube)
+        r_i  = 0
+        for every texel j:  ΔH_j = r_i F_ji V_ji;  H_j += ΔH_j;  r_j += ρ_j ΔH_j
+
+The chosen shooters never leave the GPU: ``choose`` writes one column of t_shooters per shot of a batch, and every later pass
+reads it there. All chosen residuals are zeroed before the first of the batch shoots, or what one gives to another would be
+lost. The host only hears, a few steps late, how much is still unshot.
+
+Works badly where the middle of a patch sees something else than the rest of it (contact shadows): shoot from a lower level.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.atlas.lightmap import Lightmap
+from app.gpu import Framebuffer, Gpu, ReadBack, Texture
+from app.scene.model import F64
+from app.solvers.base import EnergyBook, StepReport
+from app.solvers.shooting.options import ShootingOptions
+from app.solvers.shooting.stages import BATCH, FAR, OPEN, SHOOTER_ROWS, ChoiceStages, ShotBuffers, ShotStages
+
+REPORT_LAG = 2  # read-backs in flight before the oldest is looked at
+
+
+@dataclass(frozen=True)
+class Shot:
+    """The shooter of one shot: centre [m], unit normal, area [m²], lower corner (x, y) and edge of its patch in the node set
+    [texels]."""
+
+    centre: F64
+    normal: F64
+    area: float
+    corner: tuple[int, int]
+    size: int
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What becomes of a shot, as shares of its power: received by texels, Σ A_j F_ji V_ji / A_i, sent out of the scene, and lost on
+    black sides that have no texels. Their sum should be 1."""
+
+    received: float
+    open: float
+    black: float
+    shot: Shot
+
+    @property
+    def total(self) -> float:
+        return self.received + self.open + self.black
+
+
+class UniformShooting:
+    """Shoots ``lightmap`` to convergence. Whoever makes it releases it."""
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
+        self.gpu, self.lightmap, self.options = gpu, lightmap, options
+        if lightmap.storage != options.storage:
+            lightmap.set_storage(options.storage)
+        self.buffers = ShotBuffers(gpu, lightmap)
+        self.stages = ShotStages(gpu, lightmap, options)
+        self.last_shot: Shot | None = None
+        self._reports: deque[tuple[int, ReadBack]] = deque()
+        self.reset()
+
+    # -- the solver's interface ----------------------------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Forget all light: H = 0, r = E."""
+        self.lightmap.clear()
+        self.buffers.ledger_target.clear()
+        self._drop_reports()
+        self.shots = 0
+        self._emitted = self._tile_sums()[1][:3]
+        self.report = StepReport(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
+
+    def set_options(self, options: ShootingOptions) -> None:
+        """Use other knobs from the next shot on. Another storage format starts again."""
+        restart = options.storage != self.options.storage
+        fresh = ShotStages(self.gpu, self.lightmap, options)
+        self.stages.release()
+        self.stages, self.options = fresh, options
+        if restart:
+            self.lightmap.set_storage(options.storage)
+            self.reset()
+
+    def step(self, shots: int) -> int:
+        """Make ``shots`` shots (at most BATCH), the strongest patches first. Returns how many were issued."""
+        shots = min(shots, BATCH)
+        self._choose(shots)
+        for shot in range(shots):
+            self._see(shot)
+            self._receive(self.lightmap.light_target, shot, blend="add")
+            self._look_out(shot)
+        self._book(shots)
+        self.shots += shots
+        self._tell()
+        return shots
+
+    def poll(self, *, wait: bool = False) -> StepReport:
+        """The newest report that has arrived: the state before the step that sent it; with ``wait`` that of the last step."""
+        while self._reports and (wait or len(self._reports) > REPORT_LAG):
+            shots, readback = self._reports.popleft()
+            self._hear(shots, np.frombuffer(readback.take(), np.float32).reshape(-1, 4).astype(np.float64))
+        return self.report
+
+    def books(self) -> EnergyBook:
+        """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
+        absorbed, unshot, reflectance = self._tile_sums()
+        ledger = np.frombuffer(self.buffers.ledger.read(), np.float32).reshape(2, BATCH, 4)
+        escaped, blackened = ledger[..., :3].astype(np.float64).sum(1) * self._watt
+        area = absorbed[3] / self.lightmap.unit
+        return EnergyBook(
+            self._emitted,
+            absorbed[:3] + blackened,
+            escaped,
+            unshot[:3],
+            reflectance[:3] / max(absorbed[3], 1e-300),
+            float(area),
+        )
+
+    def audit(self, patch: tuple[int, int]) -> Audit:
+        """What becomes of a shot from this patch if it shot now. Changes no light. The patch must hold some residual."""
+        rows = np.zeros((self.lightmap.rows, 4), np.float32)
+        rows[0] = 1.0, *patch, 0.0
+        self.buffers.rows.write(rows.tobytes())
+        self._describe(self.stages.choices[0], 1)
+        self._see(0)
+        scratch = [self.gpu.texture(self.lightmap.size, 4, "f4") for _ in range(2)]
+        target = self.gpu.target(*scratch)
+        target.clear()
+        self._receive(target, 0, blend=None)
+        weight = np.frombuffer(scratch[0].read(), np.float32).reshape(*scratch[0].size[::-1], 4)[..., 3]
+        area = np.frombuffer(self.lightmap.texture("t_position_area").read(), np.float32).reshape(*weight.shape, 4)[
+            ..., 3
+        ]
+        for resource in (target, *scratch):
+            resource.release()
+        self._look_out(0)
+        blocks = np.frombuffer(self.stages.open.read(), np.float32).reshape(BATCH, -1, 2)[0].astype(np.float64).sum(0)
+        shooter = np.frombuffer(self.buffers.shooters.read(), np.float32).reshape(SHOOTER_ROWS, BATCH, 4)[:, 0]
+        received = float((area.astype(np.float64) * weight).sum() / shooter[0, 3])
+        return Audit(received, float(blocks[0]), float(blocks[1]), self._shot_from_rows(shooter))
+
+    def passes(self) -> dict[str, Callable[[], None]]:
+        """Each part of a shot by itself, to be timed. They leave the light wrong: reset afterwards."""
+        return {
+            "choose": lambda: self._choose(BATCH),
+            "see": lambda: self._see(0),
+            "receive": lambda: self._receive(self.lightmap.light_target, 0, blend="add"),
+            "look out": lambda: self._look_out(0),
+            "book": lambda: self._book(BATCH),
+        }
+
+    def inspect(self) -> dict[str, Texture]:
+        """Named intermediates of the last shot."""
+        return {"visibility": self.stages.map, "shooters": self.buffers.shooters}
+
+    def release(self) -> None:
+        self._drop_reports()
+        self.stages.release()
+        self.buffers.release()
+
+    # -- one shot ------------------------------------------------------------------------------------------------------
+
+    def _choose(self, shots: int) -> None:
+        """Pick the strongest patches and zero them. [Coombe03, 3.4]"""
+        choice, buffers, lightmap = self.stages.choice(self.report.residual), self.buffers, self.lightmap
+        choice.add_patches.draw(choice.patch_target, textures=lightmap.textures("t_position_area", "t_residual"))
+        choice.add_rows.draw(
+            buffers.row_target, textures={"t_patches": choice.patches}, uniforms={"u_width": choice.patch_size[0]}
+        )
+        self._describe(choice, shots)
+        self.stages.zero.draw(
+            lightmap.residual_target,
+            textures=lightmap.textures("t_position_area", "t_normal_ids") | {"t_shooters": buffers.shooters},
+            uniforms={"u_size": lightmap.size},
+            vertices=4,
+            instances=shots,
+            strip=True,
+        )
+
+    def _describe(self, choice: ChoiceStages, shots: int) -> None:
+        """Write the shooters of the batch from the strongest patches of the rows."""
+        choice.choose.draw(
+            self.buffers.shooter_target,
+            textures=self.lightmap.textures("t_position_area", "t_normal_ids", "t_residual", "t_facets")
+            | {"t_rows": self.buffers.rows},
+            uniforms={"u_rows": self.lightmap.rows},
+            viewport=(0, 0, shots, SHOOTER_ROWS),
+        )
+
+    def _see(self, shot: int) -> None:
+        """Item buffer and depth from the shooter, all views in one draw. [Coombe03, 3.2; Cohen85]"""
+        self.stages.visibility_target.clear(OPEN, FAR, depth=1.0)
+        self.stages.see.draw(
+            self.stages.visibility_target,
+            textures={"t_shooters": self.buffers.shooters},
+            uniforms={"u_shot": shot},
+            mesh=self.lightmap.mesh,
+            instances=self.stages.projection.views,
+            depth=True,
+            clip_distances=4,
+        )
+
+    def _receive(self, target: Framebuffer, shot: int, *, blend: str | None) -> None:
+        """The shot's light on every texel that sees it. [Coombe03, eq. 1]"""
+        lightmap = self.lightmap
+        surfaces = lightmap.textures("t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_tile_bounds")
+        maps = {"t_shooters": self.buffers.shooters, "t_map": self.stages.map}
+        self.stages.receive.draw(
+            target,
+            textures=surfaces | maps,
+            uniforms={"u_shot": shot, "u_columns": lightmap.columns, "u_size": lightmap.size},
+            vertices=6,
+            instances=lightmap.tiles,
+            blend=blend,
+        )
+
+    def _look_out(self, shot: int) -> None:
+        """Add up how much of the shooter's sight leaves the scene."""
+        width, height = self.stages.open_size
+        self.stages.add_open.draw(
+            self.stages.open_target,
+            textures={"t_map": self.stages.map, "t_weights": self.stages.weights},
+            uniforms={"u_origin_px": (0, shot * height)},
+            viewport=(0, shot * height, width, height),
+        )
+
+    def _book(self, shots: int) -> None:
+        """Enter in the ledger what the batch sent out of the scene."""
+        self.stages.enter.draw(
+            self.buffers.ledger_target,
+            textures={"t_open": self.stages.open, "t_shooters": self.buffers.shooters},
+            uniforms={"u_blocks": self.stages.open_size[1]},
+            blend="add",
+            viewport=(0, 0, shots, 2),
+        )
+
+    # -- what the host hears -------------------------------------------------------------------------------------------
+
+    def _tell(self) -> None:
+        buffers = self.buffers
+        self.stages.tell.draw(
+            buffers.report_target,
+            textures={"t_rows": buffers.rows, "t_ledger": buffers.ledger, "t_shooters": buffers.shooters},
+        )
+        self._reports.append((self.shots, ReadBack(self.gpu, buffers.report_target)))
+
+    def _hear(self, shots: int, report: F64) -> None:
+        """report (2 + SHOOTER_ROWS, 4), see report.frag.glsl."""
+        emitted = self._emitted.sum()
+        residual = report[0, 0] * self._watt / emitted if emitted > 0 else 0.0
+        self.report = StepReport(shots, float(residual), report[1, :3] * self._watt)
+        if report[2 + 5, 3] > 0:
+            self.last_shot = self._shot_from_rows(report[2:])
+
+    def _shot_from_rows(self, rows: F64) -> Shot:
+        frame, corner = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3]))
+        area = float(rows[0, 3]) * frame.scale**2
+        return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, int(rows[5, 3]))
+
+    @property
+    def _watt(self) -> float:
+        """Watts in one stored unit of power: lightmap unit [W/m²] times solver area."""
+        return self.lightmap.unit * self.lightmap.frame.scale**2
+
+    def _tile_sums(self) -> tuple[F64, F64, F64]:
+        """Absorbed and unshot power [W] and Σ ρA, RGB and in the first Σ A, as books.frag.glsl adds them per tile."""
+        lightmap = self.lightmap
+        self.stages.add_books.draw(
+            self.buffers.books_target,
+            textures=lightmap.textures(
+                "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_irradiance", "t_residual"
+            ),
+        )
+        sums = [
+            np.frombuffer(t.read(), np.float32).reshape(-1, 4).astype(np.float64).sum(0) for t in self.buffers.books
+        ]
+        return sums[0] * self._watt, sums[1] * self._watt, sums[2] * self._watt
+
+    def _drop_reports(self) -> None:
+        while self._reports:
+            self._reports.popleft()[1].take()
+
+
+__all__ = ["BATCH", "Audit", "Shot", "UniformShooting"]

@@ -1,0 +1,142 @@
+"""The whole user interface: builds one frame over a session and hands back what is to be drawn. No GL, no window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from imgui_bundle import imgui, implot
+
+from app.ui import keys, layout, navigation, overlays, theme
+from app.ui.file_dialog import FileDialog
+from app.ui.state import Legend, Request, State
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+SMALLEST_STEP = 1e-4  # s: Dear ImGui wants time to pass between frames
+FPS_MEMORY = 0.9  # share of the last value in the running mean
+
+
+class Ui:
+    """Owns the Dear ImGui and ImPlot contexts; whoever makes it releases it, after the renderer of its frames.
+
+    scale: size of text and spacing, 1 on an ordinary screen. layout_file: where the places of the panels are kept
+    between runs. scenes: names or files offered in the menu. suffixes: of the files that can be opened; none: all
+    files. measured: whether numbers that depend on the machine's speed are shown.
+    """
+
+    def __init__(
+        self,
+        *,
+        scale: float = 1.0,
+        layout_file: Path | None = None,
+        scenes: Sequence[str] = (),
+        suffixes: Sequence[str] = (),
+        native_dialog: bool | None = None,
+        measured: bool = True,
+    ) -> None:
+        self._context = imgui.create_context()
+        self._plots = implot.create_context()
+        self.use()
+        io = imgui.get_io()
+        io.config_flags |= imgui.ConfigFlags_.docking_enable
+        io.config_windows_move_from_title_bar_only = True
+        io.set_ini_filename(str(layout_file) if layout_file else None)
+        theme.apply(scale)
+        self.state = State(measured=measured, scenes=tuple(scenes))
+        self._dialog = FileDialog(suffixes, native=native_dialog)
+        self._scene_name: str | None = None
+
+    def use(self) -> None:
+        """Make this interface's contexts the current ones."""
+        imgui.set_current_context(self._context)
+        implot.set_current_context(self._plots)
+
+    @property
+    def io(self) -> imgui.IO:
+        """Where the host puts events: ``add_key_event`` and the others."""
+        return imgui.get_io()
+
+    def frame(
+        self,
+        session: Session,
+        *,
+        size: tuple[float, float],
+        ratio: float,
+        seconds: float,
+        texture_id: Callable[[Any], int],
+        legend: Legend | None = None,
+    ) -> imgui.ImDrawData:
+        """Build one frame and do what it asked of the session.
+
+        size: of the window [display units]; ratio: pixels per unit; seconds: since the last frame. What the user did
+        wrong becomes a toast. Afterwards ``view_rect`` is where the 3-D view goes, and ``take_requests`` what the
+        host has to do.
+        """
+        self.use()
+        state = self.state
+        io = self.io
+        io.display_size = imgui.ImVec2(*size)
+        io.display_framebuffer_scale = imgui.ImVec2(ratio, ratio)
+        io.delta_time = max(seconds, SMALLEST_STEP)
+        state.texture_id, state.legend, state.ratio = texture_id, legend, ratio
+        state.stats = session.stats if session.opened else None
+        state.fps = FPS_MEMORY * state.fps + (1 - FPS_MEMORY) / io.delta_time if state.fps else 1 / io.delta_time
+        if session.name != self._scene_name:
+            self._scene_name = session.name
+            state.forget_scene()
+        imgui.new_frame()
+        self._build(session, io.delta_time)
+        imgui.render()
+        state.run_actions()
+        return imgui.get_draw_data()
+
+    @property
+    def view_rect(self) -> tuple[int, int, int, int]:
+        """The 3-D view (left, bottom, width, height) [px], the origin at the lower left of the window."""
+        left, top, width, height = self.state.view_px
+        ratio = self.state.ratio
+        x, x_end = round(left * ratio), round((left + width) * ratio)
+        y, y_end = round(top * ratio), round((top + height) * ratio)
+        return x, round(imgui.get_io().display_size.y * ratio) - y_end, max(x_end - x, 1), max(y_end - y, 1)
+
+    def take_requests(self) -> list[Request]:
+        """What the host has to do, once."""
+        requests, self.state.requests = self.state.requests, []
+        return requests
+
+    def release(self) -> None:
+        """Destroy the contexts."""
+        self.use()
+        implot.destroy_context(self._plots)
+        imgui.destroy_context(self._context)
+
+    def _build(self, session: Session, seconds: float) -> None:
+        state = self.state
+        keys.dispatch(session, state)
+        if state.show_ui:
+            with theme.see_through():
+                overlays.menu_bar(session, state)
+                overlays.status_bar(session, state)
+            layout.docks(state)
+            layout.panels(session, state)
+        else:
+            state.view_px = (0.0, 0.0, self.io.display_size.x, self.io.display_size.y)
+        if session.opened:
+            navigation.navigate(session, state, seconds)
+        overlays.invitation(session, state)
+        self._open_files(session)
+        overlays.legend_overlay(state.legend, state)
+        overlays.loading_overlay(session.loading)
+        overlays.toasts(session, state, seconds)
+        overlays.help_overlay(state)
+
+    def _open_files(self, session: Session) -> None:
+        if self.state.ask_for_file:
+            self.state.ask_for_file = False
+            self._dialog.open()
+        chosen = self._dialog.poll()
+        if chosen is not None:
+            self.state.act(lambda: session.open(chosen))

@@ -1,0 +1,97 @@
+"""Asks for a file: with the system's own dialog where there is one, else with a plain list of folders and files."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from imgui_bundle import imgui, portable_file_dialogs
+
+from app.ui import theme
+
+TITLE = "Open a scene"
+HELPERS = ("zenity", "kdialog", "matedialog", "qarma")  # what the system's dialog needs on Linux
+SIZE_EM = (36.0, 26.0)
+
+
+class FileDialog:
+    """Closed, or waiting for an answer. ``poll`` never blocks."""
+
+    def __init__(self, suffixes: Sequence[str], *, native: bool | None = None) -> None:
+        self._suffixes = tuple(suffixes)
+        on_linux = sys.platform not in ("win32", "darwin")
+        self._native = any(map(shutil.which, HELPERS)) if native is None and on_linux else native is not False
+        self._pending: Any = None
+        self._folder = Path.cwd()
+        self._opening = False
+
+    def open(self) -> None:
+        """Ask, from the folder of the last answer on."""
+        if not self._native:
+            self._opening = True
+        elif self._pending is None:
+            patterns = " ".join(f"*{s}" for s in self._suffixes) or "*"
+            self._pending = portable_file_dialogs.open_file(TITLE, str(self._folder), ["Scenes", patterns])
+
+    def poll(self) -> Path | None:
+        """Once per frame: the file that was chosen just now, or None."""
+        chosen = self._listed() if self._pending is None else self._answered()
+        if chosen is not None:
+            self._folder = chosen.parent
+        return chosen
+
+    def _answered(self) -> Path | None:
+        if not self._pending.ready(0):
+            return None
+        answer = self._pending.result()
+        self._pending = None
+        return Path(answer[0]) if answer else None
+
+    def _listed(self) -> Path | None:
+        if self._opening:
+            imgui.open_popup(TITLE)
+            self._opening = False
+        em = imgui.get_font_size()
+        imgui.set_next_window_size(imgui.ImVec2(SIZE_EM[0] * em, SIZE_EM[1] * em), imgui.Cond_.appearing)
+        imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.appearing, imgui.ImVec2(0.5, 0.5))
+        if not imgui.begin_popup_modal(TITLE, None, imgui.WindowFlags_.no_saved_settings)[0]:
+            return None
+        imgui.text_unformatted(str(self._folder))
+        imgui.begin_child("files", imgui.ImVec2(0, -imgui.get_frame_height_with_spacing()), imgui.ChildFlags_.borders)
+        chosen = self._entries()
+        imgui.end_child()
+        if imgui.button("Cancel") or chosen is not None or imgui.is_key_pressed(imgui.Key.escape, False):
+            imgui.close_current_popup()
+        imgui.end_popup()
+        return chosen
+
+    def _entries(self) -> Path | None:
+        chosen = None
+        if imgui.selectable(f"{theme.ICONS.ICON_FA_ARROW_UP}  ..", False, imgui.SelectableFlags_.no_auto_close_popups)[
+            0
+        ]:
+            self._folder = self._folder.parent
+        for entry in readable(self._folder, self._suffixes):
+            folder = entry.is_dir()
+            icon = theme.ICONS.ICON_FA_FOLDER if folder else theme.ICONS.ICON_FA_CUBE
+            if imgui.selectable(f"{icon}  {entry.name}", False, imgui.SelectableFlags_.no_auto_close_popups)[0]:
+                if folder:
+                    self._folder = entry
+                else:
+                    chosen = entry
+        return chosen
+
+
+def readable(folder: Path, suffixes: Sequence[str]) -> list[Path]:
+    """Folders, then files with one of ``suffixes`` (any if there are none), by name; hidden ones and a folder that
+    cannot be read give nothing.
+    """
+    try:
+        entries = [e for e in folder.iterdir() if not e.name.startswith(".")]
+        wanted = [e for e in entries if e.is_dir() or not suffixes or e.suffix.lower() in suffixes]
+        return sorted(wanted, key=lambda e: (not e.is_dir(), e.name.lower()))
+    except OSError:
+        return []

@@ -1,0 +1,113 @@
+"""The keys: one table, which the dispatcher and the help overlay both walk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+
+from app.ui.navigation import focus
+from app.ui.panels.solver import toggle
+from app.ui.state import Request, State
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+Key = imgui.Key
+ANY_POPUP = int(imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level)
+
+
+@dataclass(frozen=True)
+class Shortcut:
+    """A key (with Ctrl or ⌘ where ``control``) and what it does."""
+
+    label: str
+    help: str
+    key: imgui.Key
+    action: Callable[[Session, State], None]
+    control: bool = False
+    while_typing: bool = False
+    needs_scene: bool = False
+
+
+def _help(session: Session, state: State) -> None:
+    state.show_help = not state.show_help
+
+
+def _ui(session: Session, state: State) -> None:
+    state.show_ui = not state.show_ui
+
+
+def _reload(session: Session, state: State) -> None:
+    state.requests.append(Request.RELOAD_SHADERS)
+
+
+def _screenshot(session: Session, state: State) -> None:
+    state.requests.append(Request.SCREENSHOT)
+
+
+def _pause(session: Session, state: State) -> None:
+    toggle(session)
+
+
+def _one_shot(session: Session, state: State) -> None:
+    session.running = False
+    state.act(session.shoot_once)
+
+
+def _restart(session: Session, state: State) -> None:
+    state.act(session.restart)
+
+
+def _open(session: Session, state: State) -> None:
+    state.ask_for_file = True
+
+
+def _escape(session: Session, state: State) -> None:
+    """Close what is open above the view; with nothing open, quit."""
+    if state.show_help:
+        state.show_help = False
+    elif session.loading is not None:
+        session.loading.cancel()
+    else:
+        state.requests.append(Request.QUIT)
+
+
+SHORTCUTS = (
+    Shortcut("F1", "help on and off", Key.f1, _help, while_typing=True),
+    Shortcut("F2", "user interface on and off", Key.f2, _ui, while_typing=True),
+    Shortcut("F5", "reload shaders; a broken one keeps the last good program", Key.f5, _reload, while_typing=True),
+    Shortcut("F12", "screenshot into the current folder", Key.f12, _screenshot, while_typing=True),
+    Shortcut("Space", "run or pause", Key.space, _pause, needs_scene=True),
+    Shortcut(".", "one shot", Key.period, _one_shot, needs_scene=True),
+    Shortcut("R", "restart", Key.r, _restart, needs_scene=True),
+    Shortcut("F", "look at the picked point, or at the whole scene", Key.f, focus, needs_scene=True),
+    Shortcut("Ctrl+O", "open a scene", Key.o, _open, control=True),
+    Shortcut("Esc", "close what is open, else quit", Key.escape, _escape),
+)
+
+POINTER = (
+    ("Click", "inspect the texel"),
+    ("Left drag", "orbit"),
+    ("Right or middle drag", "pan"),
+    ("Wheel", "nearer and farther"),
+    ("W A S D Q E", "fly; Shift is faster, Ctrl slower"),
+    ("Drop a file", "open it"),
+)
+
+
+def dispatch(session: Session, state: State) -> None:
+    """Do what the keys pressed since the last frame ask for."""
+    io = imgui.get_io()
+    if imgui.is_popup_open("", ANY_POPUP):
+        modal = imgui.internal.get_top_most_popup_modal() is not None  # answers Esc itself
+        if not modal and imgui.is_key_pressed(Key.escape, False):
+            imgui.internal.close_popup_to_level(0, True)
+        return
+    for shortcut in SHORTCUTS:
+        held = io.key_ctrl or io.key_super
+        ready = (session.opened or not shortcut.needs_scene) and (not io.want_text_input or shortcut.while_typing)
+        if ready and held == shortcut.control and imgui.is_key_pressed(shortcut.key, False):
+            shortcut.action(session, state)

@@ -1,0 +1,239 @@
+"""What lies over the view: menu bar, status bar, help, progress of loading, false-colour legend, toasts."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from imgui_bundle import imgui
+
+from app.ui import theme, widgets
+from app.ui.keys import POINTER, SHORTCUTS
+from app.ui.layout import PANELS
+from app.ui.navigation import look_through
+from app.ui.state import TOAST_SECONDS, Legend, Request, State
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+ICONS = theme.ICONS
+FLOATING = int(
+    imgui.WindowFlags_.no_decoration
+    | imgui.WindowFlags_.no_docking
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_focus_on_appearing
+    | imgui.WindowFlags_.no_nav
+    | imgui.WindowFlags_.always_auto_resize
+)
+LOADING_EM = 24.0
+TOAST_EM = 34.0
+LEGEND_EM = (1.2, 13.0)  # width and height of the colour bar
+LEGEND_MARGIN_EM = 1.0
+
+
+def menu_bar(session: Session, state: State) -> None:
+    """File, View, Help."""
+    if not imgui.begin_main_menu_bar():
+        return
+    if imgui.begin_menu("File"):
+        if imgui.menu_item(f"{ICONS.ICON_FA_FOLDER_OPEN}  Open ...", "Ctrl+O", False)[0]:
+            state.ask_for_file = True
+        if imgui.begin_menu(f"{ICONS.ICON_FA_CUBES}  Scenes", bool(state.scenes)):
+            for source in state.scenes:
+                if imgui.menu_item(Path(source).stem, "", False)[0]:
+                    state.act(partial(session.open, source))
+            imgui.end_menu()
+        if imgui.menu_item(f"{ICONS.ICON_FA_CAMERA}  Screenshot", "F12", False)[0]:
+            state.requests.append(Request.SCREENSHOT)
+        imgui.separator()
+        if imgui.menu_item("Quit", "Esc", False)[0]:
+            state.requests.append(Request.QUIT)
+        imgui.end_menu()
+    if imgui.begin_menu("View"):
+        _view_menu(session, state)
+        imgui.end_menu()
+    if imgui.begin_menu("Help"):
+        if imgui.menu_item("Keys", "F1", state.show_help)[0]:
+            state.show_help = True
+        imgui.end_menu()
+    imgui.end_main_menu_bar()
+
+
+def _view_menu(session: Session, state: State) -> None:
+    for panel in PANELS:
+        clicked, shown = imgui.menu_item(panel.title, "", panel.title not in state.hidden_panels)
+        if clicked:
+            (state.hidden_panels.discard if shown else state.hidden_panels.add)(panel.title)
+    imgui.separator()
+    if imgui.begin_menu("Camera", session.opened):
+        for camera in session.scene.cameras:
+            if imgui.menu_item(camera.name, "", False)[0]:
+                look_through(session, state, camera)
+        imgui.end_menu()
+    if imgui.menu_item("Reset layout", "", False)[0]:
+        state.hidden_panels.clear()
+        state.rebuild_layout = True
+    if imgui.menu_item("Hide the interface", "F2", False)[0]:
+        state.show_ui = False
+
+
+def status_bar(session: Session, state: State) -> None:
+    """One line at the bottom of the window."""
+    flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.menu_bar
+    height = imgui.get_frame_height()
+    viewport = imgui.get_main_viewport()
+    if (
+        imgui.internal.begin_viewport_side_bar("##status", viewport, imgui.Dir.down, height, int(flags))
+        and imgui.begin_menu_bar()
+    ):
+        for text, colour in _status(session, state):
+            imgui.text_colored(imgui.ImVec4(*colour), text)
+            imgui.separator()
+        if session.message:
+            imgui.text_unformatted(session.message)
+        imgui.end_menu_bar()
+    imgui.end()
+
+
+def _status(session: Session, state: State) -> list[tuple[str, theme.RGBA]]:
+    stats = state.stats
+    if stats is None:
+        return [("no scene", theme.DIM)]
+    word, colour = (
+        ("converged", theme.GOOD)
+        if stats.converged
+        else ("running", theme.AMBER)
+        if session.running
+        else ("paused", theme.TEXT)
+    )
+    parts = [f"{stats.shots:,} shots", f"residual {widgets.percent(stats.residual)}"]
+    if state.measured:
+        parts += [f"{widgets.number(stats.shots_per_second, 3)} shots/s", f"{state.fps:.0f} fps"]
+    return [(session.name, theme.TEXT), (word, colour), *((part, theme.DIM) for part in parts)]
+
+
+def help_overlay(state: State) -> None:
+    """All keys, while F1 is on."""
+    if not state.show_help:
+        return
+    imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
+    imgui.begin("##help", None, FLOATING)
+    if imgui.begin_table("keys", 2, imgui.TableFlags_.sizing_fixed_fit):
+        for label, meaning in (*((s.label, s.help) for s in SHORTCUTS), *POINTER):
+            imgui.table_next_row()
+            imgui.table_next_column()
+            imgui.text_colored(imgui.ImVec4(*theme.AMBER), label)
+            imgui.table_next_column()
+            imgui.text_unformatted(meaning)
+        imgui.end_table()
+    imgui.end()
+
+
+def invitation(session: Session, state: State) -> None:
+    """What to do while no scene is open."""
+    if session.opened or session.loading is not None:
+        return
+    text = "Drop a scene here, or press Ctrl+O"
+    left, top, width, height = state.view_px
+    size = imgui.calc_text_size(text)
+    at = imgui.ImVec2(left + (width - size.x) / 2, top + (height - size.y) / 2)
+    imgui.get_background_draw_list().add_text(at, theme.colour_u32(theme.DIM), text)
+
+
+def loading_overlay(loading: Any) -> None:
+    """Stage, progress and a way out while a scene is loading."""
+    if loading is None:
+        return
+    imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
+    imgui.begin("##loading", None, FLOATING)
+    imgui.text_unformatted(loading.stage)
+    width = imgui.get_font_size() * LOADING_EM
+    imgui.progress_bar(min(max(loading.fraction, 0.0), 1.0), imgui.ImVec2(width, 0), f"{loading.fraction:.0%}")
+    if imgui.button("Cancel", imgui.ImVec2(width, 0)):
+        loading.cancel()
+    imgui.end()
+
+
+def toasts(session: Session, state: State, seconds: float) -> None:
+    """Short lines over the lower edge of the view, for a few seconds or until clicked."""
+    if session.message != state.last_message:
+        state.last_message = session.message
+        if session.message:
+            state.notify(session.message, error=False)
+    for toast in state.toasts:
+        toast.seconds += seconds
+    state.toasts = [t for t in state.toasts if t.seconds < TOAST_SECONDS]
+    left, top, width, height = state.view_px
+    bottom = top + height - imgui.get_font_size()
+    for index, toast in enumerate(reversed(state.toasts)):
+        imgui.set_next_window_pos(imgui.ImVec2(left + width / 2, bottom), imgui.Cond_.always, imgui.ImVec2(0.5, 1.0))
+        imgui.begin(f"##toast{index}", None, FLOATING)
+        icon = ICONS.ICON_FA_TRIANGLE_EXCLAMATION if toast.error else ICONS.ICON_FA_CIRCLE_INFO
+        imgui.text_colored(imgui.ImVec4(*(theme.BAD if toast.error else theme.AMBER)), icon)
+        imgui.same_line()
+        wrap = min(width - 4 * imgui.get_font_size(), imgui.get_font_size() * TOAST_EM)
+        imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + max(wrap, imgui.get_font_size()))
+        imgui.text_unformatted(toast.text)
+        imgui.pop_text_wrap_pos()
+        if imgui.is_window_hovered() and imgui.is_mouse_clicked(0):
+            toast.seconds = TOAST_SECONDS
+        bottom -= imgui.get_window_height() + imgui.get_style().item_spacing.y
+        imgui.end()
+
+
+def legend_overlay(legend: Legend | None, state: State) -> None:
+    """The false-colour bar with ticks and unit, at the left of the view."""
+    if legend is None or not legend.maximum > legend.minimum:
+        return
+    em = imgui.get_font_size()
+    left, top, _, height = state.view_px
+    bar_width, bar_height = LEGEND_EM[0] * em, min(LEGEND_EM[1] * em, height - 8 * em)
+    if bar_height < 4 * em:
+        return
+    margin = LEGEND_MARGIN_EM * em
+    imgui.set_next_window_pos(imgui.ImVec2(left + margin, top + margin))
+    imgui.set_next_window_bg_alpha(0.8)
+    imgui.begin("##legend", None, FLOATING | imgui.WindowFlags_.no_inputs)
+    imgui.text_unformatted(f"{legend.quantity} [{legend.unit}]")
+    imgui.dummy(imgui.ImVec2(0, em / 2))
+    corner = imgui.get_cursor_screen_pos()
+    draw_list = imgui.get_window_draw_list()
+    count = len(legend.colours)
+    for index, colour in enumerate(legend.colours):
+        y = corner.y + bar_height * (1 - (index + 1) / count)
+        box = imgui.ImVec2(corner.x, y), imgui.ImVec2(corner.x + bar_width, y + bar_height / count + 1)
+        draw_list.add_rect_filled(*box, theme.colour_u32((*colour, 1.0)))
+    for value in ticks(legend.minimum, legend.maximum, legend.logarithmic):
+        y = corner.y + bar_height * (1 - place(value, legend))
+        dash = imgui.ImVec2(corner.x + bar_width, y), imgui.ImVec2(corner.x + bar_width + em / 3, y)
+        draw_list.add_line(*dash, theme.colour_u32(theme.TEXT))
+        at = imgui.ImVec2(corner.x + bar_width + em / 2, y - em / 2)
+        draw_list.add_text(at, theme.colour_u32(theme.TEXT), f"{value:g}")
+    imgui.dummy(imgui.ImVec2(bar_width + 4.5 * em, bar_height + em / 2))
+    imgui.end()
+
+
+def place(value: float, legend: Legend) -> float:
+    """Where a value lies on the scale, 0 to 1."""
+    if legend.logarithmic:
+        return math.log(value / legend.minimum) / math.log(legend.maximum / legend.minimum)
+    return (value - legend.minimum) / (legend.maximum - legend.minimum)
+
+
+def ticks(minimum: float, maximum: float, logarithmic: bool) -> list[float]:
+    """Round values between the ends: powers of ten, or with 2 and 5 where those are few; or steps of 1, 2 or 5."""
+    if logarithmic:
+        decades = range(math.floor(math.log10(minimum)), math.ceil(math.log10(maximum)) + 1)
+        factors = (1.0,) if len(decades) > 4 else (1.0, 2.0, 5.0)
+        values = [f * 10.0**d for d in decades for f in factors]
+    else:
+        raw = (maximum - minimum) / 5
+        unit = 10.0 ** math.floor(math.log10(raw))
+        step = next(f * unit for f in (1, 2, 5, 10) if f * unit >= raw * (1 - 1e-9))
+        first = math.ceil(minimum / step - 1e-9)
+        values = [step * i for i in range(first, math.floor(maximum / step + 1e-9) + 1)]
+    slack = 1e-6 * maximum
+    return [v for v in values if minimum - slack <= v <= maximum + slack]

@@ -1,0 +1,18 @@
+"""Display: what the picture shows and how it is developed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from app.ui import widgets
+from app.ui.state import State
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+
+def draw(session: Session, state: State) -> None:
+    """The whole panel: DisplayOptions, one widget each; the false-colour scale only while it is used."""
+    plain = session.display.false_colour == "off"
+    skip = ("false_colour_log", "false_colour_max") if plain else ("tone_map", "exposure")
+    session.display = widgets.edit_options(session.display, skip=skip)

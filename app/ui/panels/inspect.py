@@ -1,0 +1,89 @@
+"""Inspect: the texel under the last click, and what the last shooter saw."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from imgui_bundle import imgui
+
+from app.ui import theme, widgets
+from app.ui.state import State
+
+if TYPE_CHECKING:
+    from app.picking import Picked
+    from app.session import Session
+
+HEMICUBE_ASPECT = 3.0  # five faces packed as 3R × R
+REFRESH_SECONDS = 0.25  # between two pictures of it
+
+
+def draw(session: Session, state: State) -> None:
+    """The whole panel."""
+    if state.picked is None:
+        widgets.wrapped("Click a surface to read its texel.", theme.DIM)
+    else:
+        _picked(session, state.picked)
+    image = _hemicube(session, state)
+    if image is not None and state.texture_id is not None:
+        widgets.section("Last shooter's hemicube")
+        width = imgui.get_content_region_avail().x
+        reference = imgui.ImTextureRef(state.texture_id(image))
+        imgui.image(reference, imgui.ImVec2(width, width / HEMICUBE_ASPECT), imgui.ImVec2(0, 1), imgui.ImVec2(1, 0))
+        widgets.tooltip("What the patch that shot last sees, one colour per surface: five faces of a cube, packed")
+
+
+def _hemicube(session: Session, state: State) -> Any:
+    """The picture of the last shot, made anew a few times a second, and whenever the textures behind it may be
+    others.
+    """
+    source = session.lightmap, session.shooting
+    state.hemicube_age += imgui.get_io().delta_time
+    if state.hemicube is None or state.hemicube[0] != source or state.hemicube_age >= REFRESH_SECONDS:
+        state.hemicube, state.hemicube_age = (source, session.hemicube_image()), 0.0
+    return state.hemicube[1]
+
+
+def _picked(session: Session, picked: Picked) -> None:
+    materials = session.scene.materials
+    material = materials[picked.material].name if picked.material < len(materials) else str(picked.material)
+    widgets.facts(
+        "place",
+        [
+            ("Object", str(picked.object)),
+            ("Material", material),
+            ("Triangle", f"{picked.triangle}{' (back)' if picked.back else ''}"),
+            ("Chart, facet", f"{picked.chart}, {picked.facet}"),
+            ("Texel", f"{picked.texel[0]}, {picked.texel[1]}"),
+            ("Patch", f"{picked.patch[0]}, {picked.patch[1]}"),
+            ("Position [m]", widgets.triple(picked.position, 3)),
+            ("Normal", widgets.triple(picked.normal, 3)),
+            ("Area [m²]", widgets.number(picked.area)),
+        ],
+    )
+    widgets.section("Light [W/m²]")
+    _light(picked)
+
+
+def _light(picked: Picked) -> None:
+    rows = (
+        ("B", picked.B, "radiosity: all light that leaves"),
+        ("E", picked.E, "exitance of its own"),
+        ("H", picked.H, "irradiance: light received"),
+        ("r", picked.r, "residual: not yet shot"),
+        ("ρ", picked.albedo, "albedo"),
+    )
+    if not imgui.begin_table("light", 4, imgui.TableFlags_.sizing_stretch_prop):
+        return
+    imgui.table_setup_column("", imgui.TableColumnFlags_.width_fixed, imgui.get_font_size())
+    for channel in ("red", "green", "blue"):
+        imgui.table_setup_column(channel)
+    imgui.table_headers_row()
+    for symbol, values, meaning in rows:
+        imgui.table_next_row()
+        imgui.table_next_column()
+        imgui.text_colored(imgui.ImVec4(*theme.AMBER), symbol)
+        widgets.tooltip(meaning)
+        for value in values:
+            imgui.table_next_column()
+            imgui.text_unformatted(widgets.number(float(value)))
+    imgui.end_table()

@@ -1,0 +1,152 @@
+"""Scene: what was loaded, and its materials, whose albedo and emission can be edited."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from imgui_bundle import imgui
+
+from app.ui import theme, widgets
+from app.ui.state import RGB, State
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+ROWS_SHOWN = 8  # of the material list before it scrolls
+SWATCH = int(imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop | imgui.ColorEditFlags_.no_border)
+PICKER = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label)
+STRONGEST = 1e5  # W/(sr m²), end of the slider: the sun's disc is brighter, lamps are not
+
+
+def draw(session: Session, state: State) -> None:
+    """The whole panel."""
+    _statistics(session, state)
+    widgets.section("Materials")
+    _list(session, state)
+    if state.material < len(session.scene.materials):
+        _editor(session, state, session.scene.materials[state.material])
+    widgets.section("Texels")
+    _atlas(session, state)
+
+
+def _statistics(session: Session, state: State) -> None:
+    """Counts in two columns, and the warnings of loading."""
+    stats = state.stats
+    assert stats is not None
+    counts = (
+        ("Triangles", f"{stats.triangles:,}", "after repair"),
+        ("Charts", f"{stats.charts:,}", "pieces of surface that unfold together"),
+        ("Texels", f"{stats.texels:,}", "that cover a surface"),
+        ("Tiles", f"{stats.tiles:,}", "of 16×16 texels"),
+        ("Density", f"{widgets.number(session.charts.density, 3)}/m", "texels per metre that was aimed at"),
+        ("Memory", f"{widgets.number(stats.memory_mib, 3)} MiB", "of the texels on the GPU"),
+    )
+    if imgui.begin_table("statistics", 4, imgui.TableFlags_.sizing_stretch_prop):
+        for label, value, meaning in counts:
+            imgui.table_next_column()
+            widgets.dim(label)
+            widgets.tooltip(f"{label}: {meaning}")
+            imgui.table_next_column()
+            imgui.text_unformatted(value)
+        imgui.end_table()
+    warnings = (*session.scene.warnings, *session.charts.warnings)
+    if warnings and imgui.tree_node(f"{len(warnings)} warning{'s' * (len(warnings) > 1)}###warnings"):
+        for warning in warnings:
+            widgets.wrapped(warning, theme.AMBER)
+        imgui.tree_pop()
+
+
+def _atlas(session: Session, state: State) -> None:
+    """How finely surfaces are cut; takes hold with the button, since it loads the scene anew."""
+    draft = session.atlas if state.atlas is None else state.atlas
+    assert state.stats is not None
+    starts = {"density": float(session.charts.density), "texels": state.stats.texels}
+    draft = state.atlas = widgets.edit_options(draft, starts=starts)
+    if draft != session.atlas and imgui.button("Cut anew", imgui.ImVec2(-1, 0)):
+        state.atlas = None
+        state.act(lambda: session.set_atlas(draft))
+
+
+def _list(session: Session, state: State) -> None:
+    materials = session.scene.materials
+    height = (
+        min(len(materials), ROWS_SHOWN) * imgui.get_text_line_height_with_spacing() + imgui.get_style().item_spacing.y
+    )
+    imgui.begin_child("materials", imgui.ImVec2(0, height))
+    clipper = imgui.ListClipper()
+    clipper.begin(len(materials))
+    while clipper.step():
+        for index in range(clipper.display_start, clipper.display_end):
+            _row(state, index, materials[index])
+    imgui.end_child()
+
+
+def _row(state: State, index: int, material: Any) -> None:
+    imgui.push_id(index)
+    side = imgui.get_text_line_height()
+    imgui.color_button("##albedo", imgui.ImVec4(*display_colour(material.albedo), 1), SWATCH, imgui.ImVec2(side, side))
+    imgui.same_line()
+    if imgui.selectable(material.name or f"material {index}", state.material == index)[0]:
+        state.material = index
+    if material.emits:
+        imgui.same_line(imgui.get_content_region_avail().x - side)
+        imgui.text_colored(imgui.ImVec4(*theme.AMBER), theme.ICONS.ICON_FA_LIGHTBULB)
+        widgets.tooltip("emits light")
+    imgui.pop_id()
+
+
+def _editor(session: Session, state: State, material: Any) -> None:
+    index = state.material
+    edited = dataclasses.replace(material, albedo=_albedo(material), emission=_emission(state, material))
+    if (edited.albedo, edited.emission) != (material.albedo, material.emission):
+        state.act(lambda: session.set_material(index, edited))
+    notes = [f"{word} texture" for word in ("albedo", "emission") if getattr(material, f"{word}_texture") is not None]
+    if material.double_sided:
+        notes.append("both sides")
+    if notes:
+        widgets.dim(", ".join(notes))
+
+
+def _albedo(material: Any) -> RGB:
+    widgets.labelled("Albedo ρ")
+    imgui.set_next_item_width(-1)
+    changed, value = imgui.color_edit3("##albedo", list(material.albedo), imgui.ColorEditFlags_.float)
+    widgets.tooltip("Diffuse reflectance, linear Rec.709, 0 to 1")
+    return rgb(min(max(float(v), 0.0), 1.0) for v in value) if changed else material.albedo
+
+
+def _emission(state: State, material: Any) -> RGB:
+    """Colour × strength. A lamp that is dimmed to nothing keeps its colour in the state."""
+    strength = max(material.emission)
+    index = state.material
+    colour: RGB = state.emission_colours.get(index, (1.0, 1.0, 1.0))
+    if strength > 0:
+        colour = rgb(v / strength for v in material.emission)
+        state.emission_colours[index] = colour
+    widgets.labelled("Emission L")
+    recoloured, value = imgui.color_edit3("##emission", list(colour), PICKER)
+    imgui.same_line()
+    imgui.set_next_item_width(-1)
+    flags = widgets.SLIDER | widgets.LOGARITHMIC
+    scaled, new_strength = imgui.slider_float("##strength", strength, 0.0, STRONGEST, "%.4g W/(sr m²)", flags)
+    widgets.tooltip("Radiance: colour times strength. Exitance is π times this. Right-click: off")
+    if imgui.is_item_hovered() and imgui.is_mouse_clicked(1):
+        scaled, new_strength = True, 0.0
+    if not (recoloured or scaled) or new_strength != new_strength:
+        return material.emission
+    top = max(value) or 1.0
+    if recoloured:
+        state.emission_colours[index] = colour = rgb(max(float(v), 0.0) / top for v in value)
+    return rgb(v * new_strength for v in colour)
+
+
+def rgb(values: Iterable[float]) -> RGB:
+    red, green, blue = values
+    return red, green, blue
+
+
+def display_colour(linear: RGB) -> RGB:
+    """Linear Rec.709 as a screen shows it (sRGB transfer, IEC 61966-2-1)."""
+    return rgb(12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055 for v in linear)

@@ -1,0 +1,112 @@
+"""Solver: run, pause, one shot, restart; how fast; the knobs; and the energy book."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+
+from app.ui import theme, widgets
+from app.ui.state import State
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+ICONS = theme.ICONS
+BAR_EM = 0.5  # height of the bars
+
+
+def draw(session: Session, state: State) -> None:
+    """The whole panel."""
+    _buttons(session, state)
+    _progress(state)
+    widgets.section("Pace")
+    state.pace = widgets.edit_options(state.pace)
+    widgets.section("Energy [W]")
+    _energy(state)
+    widgets.section("Shooting")
+    edited = widgets.edit_options(session.shooting)
+    if edited is not session.shooting:
+        state.act(lambda: session.set_shooting(edited))
+
+
+def _buttons(session: Session, state: State) -> None:
+    spacing = imgui.get_style().item_spacing.x
+    width = (imgui.get_content_region_avail().x - 2 * spacing) / 3
+    size = imgui.ImVec2(width, 0)
+    text = f"{ICONS.ICON_FA_PAUSE} Pause" if session.running else f"{ICONS.ICON_FA_PLAY} Run"
+    if imgui.button(f"{text}###run", size):
+        toggle(session)
+    widgets.tooltip("Space")
+    imgui.same_line()
+    if imgui.button("One shot", size):
+        session.running = False
+        state.act(session.shoot_once)
+    widgets.tooltip("Pause and shoot once: . (full stop)")
+    imgui.same_line()
+    if imgui.button(f"{ICONS.ICON_FA_ROTATE_LEFT} Restart", size):
+        state.act(session.restart)
+    widgets.tooltip("Forget all light and begin again: R")
+
+
+def toggle(session: Session) -> None:
+    """Run or pause."""
+    session.running = not session.running
+
+
+def _progress(state: State) -> None:
+    stats = state.stats
+    assert stats is not None
+    share = min(max(1.0 - stats.residual, 0.0), 1.0)
+    imgui.progress_bar(share, imgui.ImVec2(-1, imgui.get_font_size() * BAR_EM), "")
+    widgets.tooltip("Power that has been shot, of the power emitted")
+    left = "converged" if stats.converged else "still to shoot"
+    imgui.text_unformatted(f"{widgets.percent(stats.residual)} {left}")
+    rate = f", {widgets.number(stats.shots_per_second, 3)}/s" if state.measured and not stats.converged else ""
+    imgui.same_line()
+    right(f"{stats.shots:,} shots{rate}", theme.DIM)
+
+
+def _energy(state: State) -> None:
+    stats = state.stats
+    assert stats is not None
+    rows = [
+        ("Emitted", stats.emitted, theme.TEXT),
+        ("Absorbed", stats.absorbed, theme.ABSORBED),
+        ("Escaped", stats.escaped, theme.ESCAPED),
+        ("Residual", stats.unshot, theme.UNSHOT),
+    ]
+    _bar([(power, colour) for _, power, colour in rows[1:]], stats.emitted)
+    if imgui.begin_table("energy", 3, imgui.TableFlags_.sizing_stretch_prop):
+        for label, power, colour in rows:
+            imgui.table_next_row()
+            imgui.table_next_column()
+            imgui.text_colored(imgui.ImVec4(*colour), label)
+            imgui.table_next_column()
+            right(widgets.number(power))
+            imgui.table_next_column()
+            right(widgets.percent(power / stats.emitted if stats.emitted > 0 else 0.0))
+        imgui.end_table()
+    widgets.dim(f"books off by {widgets.percent(abs(stats.imbalance))}")
+    widgets.tooltip("Emitted must equal absorbed + escaped + residual; the difference, of the power emitted")
+
+
+def right(text: str, colour: theme.RGBA = theme.TEXT) -> None:
+    """Text that ends at the right edge of its column."""
+    imgui.set_cursor_pos_x(
+        imgui.get_cursor_pos_x() + max(0.0, imgui.get_content_region_avail().x - imgui.calc_text_size(text).x)
+    )
+    imgui.text_colored(imgui.ImVec4(*colour), text)
+
+
+def _bar(shares: list[tuple[float, theme.RGBA]], total: float) -> None:
+    """Where the emitted power is now, as one bar."""
+    width, height = imgui.get_content_region_avail().x, imgui.get_font_size() * BAR_EM
+    corner = imgui.get_cursor_screen_pos()
+    left = corner.x
+    for power, colour in shares:
+        right = min(left + width * max(power, 0.0) / total, corner.x + width) if total > 0 else left
+        box = imgui.ImVec2(left, corner.y), imgui.ImVec2(right, corner.y + height)
+        imgui.get_window_draw_list().add_rect_filled(*box, theme.colour_u32(colour))
+        left = right
+    imgui.dummy(imgui.ImVec2(width, height))

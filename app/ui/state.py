@@ -1,0 +1,126 @@
+"""What the user interface remembers between frames, and what it asks of its host. No drawing here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from typing import TYPE_CHECKING, Any
+
+from app.errors import UserError
+from app.options import Options, option
+
+if TYPE_CHECKING:
+    from app.atlas.options import AtlasOptions
+    from app.picking import Picked
+    from app.render.camera import CameraView
+    from app.session import Stats
+    from app.ui.navigation import Flight
+
+RGB = tuple[float, float, float]
+TOAST_SECONDS = 6.0
+
+
+class Request(Enum):
+    """What only the host (window or headless) can do."""
+
+    QUIT = auto()
+    SCREENSHOT = auto()
+    RELOAD_SHADERS = auto()
+
+
+@dataclass(frozen=True)
+class Pace(Options):
+    """How much is shot between two pictures."""
+
+    shots_per_frame: int = option(1, "shots between two pictures", minimum=1, maximum=256, logarithmic=True)
+    frame_budget: float = option(
+        20.0, "time per picture after which no further shot starts", unit="ms", minimum=1, maximum=90
+    )
+
+
+@dataclass(frozen=True)
+class Legend:
+    """The false-colour scale: ``colours`` from ``minimum`` to ``maximum`` [unit]."""
+
+    quantity: str
+    unit: str
+    minimum: float
+    maximum: float
+    logarithmic: bool
+    colours: tuple[RGB, ...]
+
+
+@dataclass
+class Toast:
+    """One line over the view, for a while."""
+
+    text: str
+    error: bool
+    seconds: float = 0.0
+
+
+@dataclass
+class State:
+    """Everything that belongs to the interface and not to the session.
+
+    measured: whether numbers that depend on the machine's speed are shown (off for pictures that are compared).
+    texture_id: makes a texture of the host drawable; legend: the scale of what is shown now; stats: of the session,
+    asked once per frame (None without a scene). atlas: edited, not yet applied. view_px: the 3-D view (left, top,
+    width, height) [display units].
+    """
+
+    measured: bool = True
+    scenes: tuple[str, ...] = ()
+    texture_id: Callable[[Any], int] | None = None
+    legend: Legend | None = None
+    stats: Stats | None = None
+    pace: Pace = field(default_factory=Pace)
+    show_ui: bool = True
+    show_help: bool = False
+    ask_for_file: bool = False
+    hidden_panels: set[str] = field(default_factory=set)
+    docked: set[str] = field(default_factory=set)
+    rebuild_layout: bool = False
+    view_px: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
+    ratio: float = 1.0
+    fps: float = 0.0
+    picked: Picked | None = None
+    picked_age: float = 0.0
+    picked_px: tuple[int, int] = (0, 0)
+    picked_view: CameraView | None = None
+    hemicube: tuple[object, Any] | None = None
+    hemicube_age: float = 0.0
+    drag_button: int = -1
+    flight: Flight | None = None
+    material: int = 0
+    atlas: AtlasOptions | None = None
+    emission_colours: dict[int, RGB] = field(default_factory=dict)
+    plot_over_seconds: bool = False
+    toasts: list[Toast] = field(default_factory=list)
+    last_message: str | None = None
+    requests: list[Request] = field(default_factory=list)
+    actions: list[Callable[[], object]] = field(default_factory=list)
+
+    def act(self, action: Callable[[], object]) -> None:
+        """Do this once the frame is built: what it raises cannot leave a window half drawn."""
+        self.actions.append(action)
+
+    def run_actions(self) -> None:
+        """Do what was asked for; a user's mistake becomes a toast."""
+        actions, self.actions = self.actions, []
+        for action in actions:
+            try:
+                action()
+            except UserError as error:
+                self.notify(str(error), error=True)
+
+    def notify(self, text: str, *, error: bool = False) -> None:
+        """Show one line over the view for a few seconds; a repeated one starts again."""
+        self.toasts = [t for t in self.toasts if t.text != text][-3:]
+        self.toasts.append(Toast(text, error))
+
+    def forget_scene(self) -> None:
+        """Another scene has been opened: nothing of the last one is picked or selected."""
+        self.picked, self.flight, self.atlas, self.material = None, None, None, 0
+        self.emission_colours.clear()

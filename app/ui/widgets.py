@@ -1,0 +1,201 @@
+"""Widgets that follow from declared options, and the few others that the panels share."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeVar
+
+from imgui_bundle import imgui
+
+from app.options import Options, Spec, specs
+from app.ui import theme
+
+OptionsT = TypeVar("OptionsT", bound=Options)
+
+LABEL_SHARE = 0.44  # of the panel's width
+WIDE_SPAN = 1e6  # a slider over more than this cannot be set: drag instead
+SLIDER = int(imgui.SliderFlags_.always_clamp | imgui.SliderFlags_.no_round_to_format)
+LOGARITHMIC = int(imgui.SliderFlags_.logarithmic)
+DRAG_SPEED = 0.01  # of the value per pixel
+TOOLTIP_EM = 22.0
+TOOLTIP = int(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)
+
+
+def edit_options(options: OptionsT, *, skip: Iterable[str] = (), starts: Mapping[str, Any] | None = None) -> OptionsT:
+    """One widget per declared option; returns ``options`` itself, or a checked copy where something was changed.
+
+    A right-click or double-click puts the default back. Labels of options that are not at their default are bright.
+    ``starts`` are the values that optional ones begin with when they are given one.
+    """
+    imgui.push_id(type(options).__name__)
+    changes: dict[str, Any] = {}
+    kind: Any = type(options)
+    for spec in _specs(kind):
+        if spec.name not in skip:
+            value = getattr(options, spec.name)
+            edited = edit_option(spec, value, (starts or {}).get(spec.name))
+            if edited != value:
+                changes[spec.name] = edited
+    imgui.pop_id()
+    return options.replace(**changes) if changes else options
+
+
+@functools.cache
+def _specs(options: type[Options]) -> list[Spec]:
+    return specs(options)
+
+
+def edit_option(spec: Spec, value: Any, start: Any = None) -> Any:
+    """The widget of one option; the legal value that it holds afterwards."""
+    label = title(spec.name)
+    labelled(label, changed=value != spec.default)
+    imgui.push_id(spec.name)
+    if spec.optional:
+        value = _optional(spec, value, start)
+    edited = value if value is None else _editor(spec, value)
+    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+        double = imgui.is_mouse_double_clicked(0) and spec.type in (int, float)
+        if imgui.is_mouse_clicked(1) or double:
+            edited = spec.default
+            imgui.internal.clear_active_id()
+    unit = f" [{spec.unit}]" if spec.unit else ""
+    tooltip(f"{spec.help}{unit}: {spec.allowed}\nRight-click: default ({shown(spec.default)})")
+    imgui.pop_id()
+    return edited
+
+
+def title(name: str) -> str:
+    """``shots_per_frame`` as a label: ``Shots per frame``."""
+    words = name.replace("_", " ")
+    return words[:1].upper() + words[1:]
+
+
+def shown(value: Any) -> str:
+    """A value as a tooltip names it."""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return "none" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _optional(spec: Spec, value: Any, start: Any) -> Any:
+    changed, on = imgui.checkbox("##given", value is not None)
+    if changed:
+        first = spec.default if start is None else start
+        value = (spec.type(spec.minimum or 0) if first is None else first) if on else None
+    if value is not None:
+        imgui.same_line()
+    return value
+
+
+def _editor(spec: Spec, value: Any) -> Any:
+    imgui.set_next_item_width(-1)
+    if spec.type is bool:
+        return imgui.checkbox("##value", value)[1]
+    if spec.choices:
+        index = spec.choices.index(value)
+        return spec.choices[imgui.combo("##value", index, list(spec.choices))[1]]
+    if spec.type in (int, float):
+        return _number(spec, value)
+    return imgui.input_text("##value", value)[1]
+
+
+def _number(spec: Spec, value: float) -> float:
+    """A slider where the range is one that a hand can set, else a drag. What is no number changes nothing."""
+    unit = " " + spec.unit.replace("%", "%%") if spec.unit else ""
+    text = ("%d" if spec.type is int else "%.4g") + unit
+    flags = SLIDER
+    low, high = spec.minimum, spec.maximum
+    if low is not None and high is not None and (spec.logarithmic or high - low <= WIDE_SPAN):
+        if spec.logarithmic:
+            flags |= LOGARITHMIC
+        slider: Any = imgui.slider_int if spec.type is int else imgui.slider_float
+        edited = slider("##value", value, spec.type(low), spec.type(high), text, flags)[1]
+    else:
+        biggest = 2**31 - 1 if spec.type is int else 3e38
+        drag: Any = imgui.drag_int if spec.type is int else imgui.drag_float
+        bounds = spec.type(-biggest if low is None else low), spec.type(biggest if high is None else high)
+        edited = drag("##value", value, max(abs(value), 1.0) * DRAG_SPEED, *bounds, text, flags)[1]
+    if not math.isfinite(edited) or abs(edited - value) <= 1e-6 * abs(value):  # widgets hold 32-bit floats
+        return value
+    return min(max(edited, -math.inf if low is None else low), math.inf if high is None else high)
+
+
+def labelled(text: str, *, changed: bool = False) -> None:
+    """A label in the left column; the next widget comes in the right one."""
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(imgui.ImVec4(*(theme.TEXT if changed else theme.DIM)), text)
+    imgui.same_line(imgui.get_content_region_avail().x * LABEL_SHARE + imgui.get_style().window_padding.x)
+
+
+def tooltip(text: str) -> None:
+    """Wrapped help for the last item, after a short stay."""
+    if imgui.is_item_hovered(TOOLTIP):
+        imgui.begin_tooltip()
+        imgui.push_text_wrap_pos(imgui.get_font_size() * TOOLTIP_EM)
+        imgui.text_unformatted(text)
+        imgui.pop_text_wrap_pos()
+        imgui.end_tooltip()
+
+
+def facts(name: str, rows: Sequence[tuple[str, str]]) -> None:
+    """A table of labels and values, the values wrapped at the panel's edge."""
+    if not rows or not imgui.begin_table(name, 2, imgui.TableFlags_.sizing_stretch_prop):
+        return
+    imgui.table_setup_column("label", imgui.TableColumnFlags_.width_stretch, LABEL_SHARE)
+    imgui.table_setup_column("value", imgui.TableColumnFlags_.width_stretch, 1 - LABEL_SHARE)
+    for label, value in rows:
+        imgui.table_next_row()
+        imgui.table_next_column()
+        dim(label)
+        imgui.table_next_column()
+        imgui.push_text_wrap_pos(0.0)
+        imgui.text_unformatted(value)
+        imgui.pop_text_wrap_pos()
+    imgui.end_table()
+
+
+def dim(text: str) -> None:
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.DIM))
+    imgui.text_unformatted(text)
+    imgui.pop_style_color()
+
+
+def wrapped(text: str, colour: theme.RGBA = theme.TEXT) -> None:
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*colour))
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_unformatted(text)
+    imgui.pop_text_wrap_pos()
+    imgui.pop_style_color()
+
+
+def section(text: str) -> None:
+    """A headline inside a panel."""
+    imgui.separator_text(text)
+
+
+def number(value: float, digits: int = 4) -> str:
+    """``digits`` significant ones, thousands apart, no exponent between 0.001 and a million."""
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    if 1e-3 <= abs(value) < 1e7:
+        decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+        return f"{value:,.{decimals}f}"
+    return f"{value:.{digits - 1}e}"
+
+
+def percent(fraction: float) -> str:
+    """A fraction as per cent, with more digits the smaller it is."""
+    share = fraction * 100
+    return (
+        f"{share:.1f} %"
+        if abs(share) >= 10
+        else f"{share:.2f} %"
+        if abs(share) >= 0.1 or share == 0
+        else f"{share:.4f} %"
+    )
+
+
+def triple(values: Sequence[float], digits: int = 4) -> str:
+    return "  ".join(number(float(v), digits) for v in values)

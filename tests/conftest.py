@@ -1,0 +1,56 @@
+"""Fixtures for every test: one headless context, checked for GL errors, and the flags of this suite."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+if TYPE_CHECKING:
+    from app.gpu import Gpu
+
+# What macOS lacks: Mesa gives a 4.5 context even when 4.1 is asked for
+GL41 = {
+    "MESA_GL_VERSION_OVERRIDE": "4.1",
+    "MESA_GLSL_VERSION_OVERRIDE": "410",
+    "MESA_EXTENSION_OVERRIDE": "-GL_ARB_compute_shader -GL_ARB_shader_storage_buffer_object "
+    "-GL_ARB_shader_image_load_store -GL_ARB_shading_language_420pack",
+}
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--gl41", action="store_true", help="run in an OpenGL 4.1 context, as macOS has it")
+    parser.addoption("--regenerate-screenshots", action="store_true", help="write the goldens instead of comparing")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--gl41"):
+        os.environ |= GL41
+    config.addinivalue_line("markers", "display: needs an X server or Xvfb")
+
+
+@pytest.fixture(scope="session")
+def _gpu(request: pytest.FixtureRequest) -> Iterator[Gpu]:
+    from app.gpu import headless_gpu
+
+    gpu = headless_gpu()
+    if request.config.getoption("--gl41"):
+        assert gpu.limits.gl == 410, f"--gl41 asked for 4.1, but this driver gives {gpu.limits.gl}"
+    yield gpu
+    gpu.release()
+
+
+@pytest.fixture
+def gpu(_gpu: Gpu) -> Iterator[Gpu]:
+    """A headless context. Fails on a GL error left by this test or by the one before."""
+    assert _gpu.ctx.error == "GL_NO_ERROR", "a GL error was pending before the test"
+    yield _gpu
+    assert _gpu.ctx.error == "GL_NO_ERROR"
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(2003)

@@ -1,0 +1,117 @@
+"""A session for tests of the interface: fixed numbers, no light, and a record of what was asked of it."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from app.atlas.options import AtlasOptions
+from app.render.camera import CameraView
+from app.render.options import DisplayOptions
+from app.scene.model import Material
+from app.solvers import ShootingOptions
+
+EMITTED = 34.6  # W
+MATERIALS = (
+    Material("white wall", (0.73, 0.73, 0.73)),
+    Material("red wall", (0.63, 0.06, 0.05)),
+    Material("green wall", (0.14, 0.45, 0.09)),
+    Material("lamp", (0.78, 0.78, 0.78), emission=(17.0, 12.0, 4.0)),
+)
+
+
+class FakeFrame:
+    """World and solver frame are the same."""
+
+    centre, scale = np.zeros(3), 1.0
+
+    def local_from_world(self, points: np.ndarray) -> np.ndarray:
+        return points
+
+
+class FakeHistory:
+    """Sixty shots, each of which leaves 93 % of the residual."""
+
+    shots_per_second = 212.0
+
+    def column(self, name: str) -> np.ndarray:
+        shots = np.arange(60.0)
+        residual = 0.93**shots
+        return {
+            "shots": shots,
+            "seconds": shots / 200,
+            "residual": residual,
+            "absorbed": 0.9 * (1 - residual),
+            "escaped": 0.1 * (1 - residual),
+        }[name]
+
+
+class FakeSession:
+    """What the interface uses of a session. ``calls`` lists what it was asked to do."""
+
+    def __init__(self, *, opened: bool = True) -> None:
+        self.opened, self.running, self.name, self.message = opened, True, "fake box", None
+        self.loading: SimpleNamespace | None = None
+        cameras = (SimpleNamespace(name="front", world_from_camera=np.eye(4), yfov=0.7),)
+        self.scene = SimpleNamespace(materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras)
+        self.charts = SimpleNamespace(density=40.0, warnings=())
+        self.lightmap = SimpleNamespace(frame=FakeFrame())
+        self.shooting, self.atlas, self.display = ShootingOptions(), AtlasOptions(), DisplayOptions()
+        self.view = CameraView(np.eye(4), 0.7, 2.0)
+        self.history = FakeHistory()
+        self.timings = {"shooting/visibility": 1.1, "shooting/receive": 0.7, "render/surface": 3.2, "imgui": 1.4}
+        self.image = None
+        self.picked = None
+        self.calls: list[tuple[object, ...]] = []
+
+    @property
+    def stats(self) -> SimpleNamespace:
+        energies = {"emitted": EMITTED, "absorbed": 30.1, "escaped": 3.4, "unshot": 1.1, "imbalance": 0.0002}
+        counts = {"texels": 31204, "tiles": 160, "triangles": 32, "charts": 18, "memory_mib": 7.3, "shots": 60}
+        rates = {"residual": 0.0318, "seconds": 0.3, "shots_per_second": 212.0, "converged": False}
+        return SimpleNamespace(**energies, **counts, **rates)
+
+    def poll(self) -> None:
+        pass
+
+    def advance(self, *, budget_ms: float, shots: int) -> int:
+        self.calls.append(("advance",)) if self.running else None
+        return shots if self.running else 0
+
+    def draw(self, target, size, *, scale=None, samples=1) -> None:
+        target.clear(0.2, 0.3, 0.4, 1.0)
+
+    def hemicube_image(self):
+        return self.image
+
+    def pick(self, x_px: int, y_px: int):
+        self.calls.append(("pick", x_px, y_px))
+        return self.picked
+
+    def shoot_once(self) -> None:
+        self.calls.append(("shoot_once",))
+
+    def restart(self) -> None:
+        self.calls.append(("restart",))
+
+    def open(self, source: str | Path) -> None:
+        self.calls.append(("open", str(source)))
+
+    def set_shooting(self, options: ShootingOptions) -> None:
+        self.shooting = options
+        self.calls.append(("set_shooting",))
+
+    def set_atlas(self, options: AtlasOptions) -> None:
+        self.calls.append(("set_atlas",))
+
+    def set_material(self, index: int, material: Material) -> None:
+        materials = list(self.scene.materials)
+        materials[index] = material
+        self.scene.materials = tuple(materials)
+        self.calls.append(("set_material", index, dataclasses.replace(material)))
+
+    def release(self) -> None:
+        self.calls.append(("release",))

@@ -1,0 +1,52 @@
+"""The viewer's window as ``glowtree shot --ui`` draws it, against a picture in screenshots/.
+
+Compared on the software rasteriser only; elsewhere the picture must be there and not blank. A failure leaves picture
+and difference in tests/screenshots/failed. ``pytest --regenerate-screenshots`` is the only way to change a golden.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.gpu import Gpu
+from app.headless_ui import ui_image
+from app.session import Session, Stop
+
+ROOT = Path(__file__).parent.parent.parent
+GOLDEN = ROOT / "screenshots" / "viewer.png"
+FAILED = Path(__file__).parent / "failed"
+SIZE = (1280, 720)
+SHOTS = 200
+STEP = 8  # of 255: what the last bit of a float does to a pixel after exposure and tone curve
+SHARE = (
+    0.005  # of the pixels may differ by more: a digit of a number that stands on the edge of rounding, a line of a plot
+)
+MAGNIFIED = 8
+
+
+def test_the_viewer_looks_as_it_did(gpu: Gpu, request: pytest.FixtureRequest) -> None:
+    session = Session(gpu)
+    session.open_now("cornell-box")
+    session.solve(Stop(shots=SHOTS))
+    session.expose()
+    image = ui_image(gpu, session, SIZE, measured=False)
+    session.release()
+    assert image.shape == (SIZE[1], SIZE[0], 3)
+    view = image[100:450, 400:880]
+    assert view.std() > 10 and view.max() > 150  # a lit box, not a blank
+    if not gpu.software:
+        pytest.skip("goldens are compared on the software rasteriser only")
+    if request.config.getoption("--regenerate-screenshots"):
+        Image.fromarray(image).save(GOLDEN)
+    difference = np.abs(image.astype(int) - np.asarray(Image.open(GOLDEN).convert("RGB"), int)).max(axis=-1)
+    wrong = float((difference > STEP).mean())
+    if wrong > SHARE:
+        FAILED.mkdir(exist_ok=True)
+        Image.fromarray(image).save(FAILED / GOLDEN.name)
+        magnified = np.clip(difference * MAGNIFIED, 0, 255).astype(np.uint8)
+        Image.fromarray(magnified).save(FAILED / f"{GOLDEN.stem}-difference.png")
+    assert wrong <= SHARE, f"{wrong:.2%} of the pixels differ: see {FAILED}"

@@ -1,0 +1,161 @@
+"""Curved surfaces: xatlas in a process of its own, its cache, and what happens when it fails."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import platformdirs
+import pytest
+from atlas_scenes import TURN, box_room, face_areas, moved, own_cache, scene_of
+
+import app.atlas.unwrap as unwrap_module
+from app.atlas.charts import Charts
+from app.atlas.parametrize import parametrize
+from app.atlas.sides import facets, scene_size, weld
+from app.atlas.unwrap import Unfolded, unwrap
+from app.scene import shapes
+from app.scene.model import Material, Scene
+
+__all__ = ["own_cache"]
+
+BALL = shapes.icosphere(0.5, 3)
+DRUM = shapes.cylinder(0.4, 1.2, 48)
+
+
+def _unwrap(scene: Scene, **options: float) -> Unfolded:
+    points, corners = weld(scene)
+    flat = facets(points, corners, scene.material_ids, scene_size(scene))
+    return unwrap(points, corners, scene.corners, scene.material_ids, flat, **options)
+
+
+def _areas(uv: np.ndarray) -> np.ndarray:
+    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    return (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("mesh", [BALL, DRUM], ids=["ball", "drum"])
+def test_charts_are_to_scale_and_right_handed(mesh: shapes.Mesh, scale: float) -> None:
+    scene = moved(scene_of([mesh]), TURN @ np.diag([scale, scale, scale, 1.0]))
+    unfolded = _unwrap(scene)
+    area = scene.normals_areas[1]
+    assert unfolded.by_xatlas == unfolded.chart.max() + 1 < len(scene.triangles) / 4
+    assert (_areas(unfolded.uv) > 0).all()
+    for c in range(unfolded.by_xatlas):
+        mine = unfolded.chart == c
+        # by construction; float64 sums
+        assert np.isclose(_areas(unfolded.uv[mine]).sum(), area[mine].sum(), rtol=1e-9)
+    # conformal maps of gently curved charts: a sphere cut into a few dozen charts stretches by well under half
+    assert (np.abs(np.log2(_areas(unfolded.uv) / area)) < 0.7).all()
+
+
+def test_charts_never_mix_materials_nor_objects_apart() -> None:
+    scene = scene_of([BALL, BALL.moved(3, 0, 0)], [Material("a"), Material("b")])
+    unfolded = _unwrap(scene)
+    for c in range(unfolded.chart.max() + 1):
+        assert len(np.unique(scene.material_ids[unfolded.chart == c])) == 1
+
+
+def test_a_second_run_reads_the_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scene_of([shapes.icosphere(0.5123, 2)])
+    first = _unwrap(scene)
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("started a worker")
+
+    monkeypatch.setattr(subprocess, "Popen", refuse)
+    second = _unwrap(scene)
+    assert (first.chart == second.chart).all() and (first.uv == second.uv).all()
+    with pytest.raises(AssertionError, match="started a worker"):
+        _unwrap(scene_of([shapes.icosphere(0.5123, 2).moved(0, 1, 0), DRUM]))
+
+
+def test_a_damaged_cache_file_is_made_again() -> None:
+    scene = scene_of([shapes.icosphere(0.5456, 2)])
+    first = _unwrap(scene)
+    folder = Path(platformdirs.user_cache_dir("glowtree")) / "unwrap"
+    newest = max(folder.glob("*.npz"), key=lambda p: p.stat().st_mtime_ns)
+    newest.write_bytes(newest.read_bytes()[:100])
+    assert (_unwrap(scene).uv == first.uv).all()
+    assert newest.stat().st_size > 100
+
+
+def test_the_cache_keeps_the_newest_files(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(tmp_path))
+    monkeypatch.setattr(unwrap_module, "CACHE_FILES", 2)
+    for radius in (0.3, 0.4, 0.5):
+        _unwrap(scene_of([shapes.cylinder(radius, 1.0, 12)]))
+    assert len(list((tmp_path / "unwrap").iterdir())) == 2
+
+
+def _assert_flat_pieces(scene: Scene, unfolded: Unfolded) -> None:
+    assert unfolded.by_xatlas == 0
+    # flat pieces lie in their plane: every edge keeps its length (float64)
+    lengths = np.linalg.norm(scene.corners - np.roll(scene.corners, 1, axis=1), axis=2)
+    assert np.allclose(np.linalg.norm(unfolded.uv - np.roll(unfolded.uv, 1, axis=1), axis=2), lengths, rtol=1e-6)
+    assert (_areas(unfolded.uv) > 0).all()
+
+
+def test_a_time_limit_falls_back_to_flat_pieces() -> None:
+    scene = moved(scene_of([shapes.cylinder(0.61, 1.0, 24)]), TURN)
+    unfolded = _unwrap(scene, time_limit=0.0)
+    assert unfolded.warnings == ("xatlas took longer than 0 s: every flat piece is a chart of its own",)
+    assert unfolded.chart.max() + 1 == 24 + 2  # the side's quads and two discs
+    _assert_flat_pieces(scene, unfolded)
+
+
+@pytest.mark.parametrize(
+    ("worker", "reason"),
+    [
+        ("import sys; sys.exit('no luck')", r"failed \(no luck\)"),
+        ("import os; os.abort()", r"failed \(exit code -6\)"),
+        ("pass", "wrote no charts"),
+    ],
+)
+def test_a_failing_worker_falls_back(worker: str, reason: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    start = subprocess.Popen
+    monkeypatch.setattr(
+        subprocess, "Popen", lambda command, **options: start([sys.executable, "-c", worker], **options)
+    )
+    scene = scene_of([shapes.cylinder(0.62, 1.0, 8)])
+    unfolded = _unwrap(scene)
+    assert len(unfolded.warnings) == 1
+    assert re.search(reason, unfolded.warnings[0])
+    _assert_flat_pieces(scene, unfolded)
+
+
+def test_cancelling_ends_the_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[subprocess.Popen[bytes]] = []
+    start = subprocess.Popen
+
+    def sleeper(command: object, **options: object) -> subprocess.Popen[bytes]:
+        started.append(start([sys.executable, "-c", "import time; time.sleep(60)"], **options))  # type: ignore[call-overload]
+        return started[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", sleeper)
+
+    def cancel(stage: str, share: float) -> None:
+        if stage == "unwrap":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        parametrize(scene_of([shapes.cylinder(0.63, 1.0, 8), box_room()]), progress=cancel)
+    assert started[0].poll() is not None
+
+
+def test_slivers_that_welding_flattens_keep_their_area() -> None:
+    ball = shapes.icosphere(1.0, 1)
+    far = shapes.quad((1000, 0, 0), (1, 0, 0), (0, 1, 0))
+    sliver = shapes.Mesh(
+        np.array([[0, 0, 2], [1, 0, 2], [1, 5e-5, 2.0]]), np.array([[0, 1, 2]]), np.zeros((3, 2))
+    )  # the weld is 1e-4 wide in a scene of 1 km
+    scene = scene_of([ball, far, sliver])
+    charts: Charts = parametrize(scene)
+    a, b = charts.face_uv[:, 1] - charts.face_uv[:, 0], charts.face_uv[:, 2] - charts.face_uv[:, 0]
+    assert np.isfinite(charts.face_uv).all()
+    assert (np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) > 0).all()
+    assert len(face_areas(scene, charts)) == len(charts.face_uv)

@@ -1,0 +1,148 @@
+"""The lightmap image, its gutters, the report, and that a folder of files is written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from bake_scenes import sides_charts, sides_scene
+
+import app.bake
+from app.atlas.charts import GAP
+from app.bake import prepare_directory, write_bake
+from app.bake.exr import write_irradiance
+from app.bake.gutter import GUTTER, fill_gutter
+from app.errors import UserError
+
+NAMES = ["irradiance.exr", "report.json", "scene.glb"]
+
+
+@pytest.fixture
+def inputs():
+    """scene, charts, irradiance and coverage of a small bake."""
+    scene = sides_scene()
+    charts = sides_charts(scene)
+    width, height = charts.size
+    rng = np.random.default_rng(5)
+    covered = rng.random((height, width)) < 0.5
+    irradiance = rng.lognormal(0, 5, (height, width, 3)).astype(np.float32)
+    irradiance[~covered] = np.nan  # must not matter
+    return scene, charts, irradiance, covered
+
+
+# -- image -------------------------------------------------------------------------------------------------------------
+
+
+def test_exr_reads_back_exactly(tmp_path):
+    values = np.random.default_rng(2).lognormal(0, 8, (5, 7, 3)).astype(np.float32)
+    write_irradiance(tmp_path / "e.exr", values)
+    file = OpenEXR.File(str(tmp_path / "e.exr"), separate_channels=True)
+    assert sorted(file.channels()) == ["B", "G", "R"]
+    for c, name in enumerate("RGB"):
+        np.testing.assert_array_equal(file.channels()[name].pixels, values[:, :, c])
+    header = file.header()
+    assert (header["quantity"], header["unit"]) == ("irradiance", "W/m2")
+    assert header["compression"] == OpenEXR.ZIP_COMPRESSION
+    np.testing.assert_allclose(header["chromaticities"][:2], (0.64, 0.33), rtol=1e-6)  # 32-bit floats
+
+
+def test_gutter_takes_the_nearest_texel():
+    rng = np.random.default_rng(4)
+    covered = rng.random((40, 50)) < 0.01
+    values = rng.random((40, 50, 3)).astype(np.float32)
+    filled = fill_gutter(values, covered)
+    y, x = np.nonzero(covered)
+    for row, column in np.ndindex(40, 50):
+        distance = np.hypot(y - row, x - column)
+        if distance.min() > GUTTER:
+            assert not filled[row, column].any()
+        else:
+            nearest = values[y, x][distance == distance.min()]
+            assert (filled[row, column] == nearest).all(axis=1).any()
+
+
+def test_bilinear_lookups_never_see_another_chart():
+    """Two charts as near as charts may be, one around the other: all neighbours of a chart's texels are its own."""
+    chart = np.zeros((24, 24), int)
+    chart[4:20, 4:20] = 1
+    chart[6:18, 6:18] = 0
+    chart[6 + GAP : 18 - GAP, 6 + GAP : 18 - GAP] = 2
+    filled = fill_gutter(np.repeat(chart[:, :, None], 3, 2).astype(np.float32), chart > 0)[:, :, 0]
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            neighbour = np.roll(filled, (dy, dx), (0, 1))
+            np.testing.assert_array_equal(neighbour[chart > 0], chart[chart > 0])
+
+
+# -- folder ------------------------------------------------------------------------------------------------------------
+
+
+def test_writes_three_files_and_nothing_else(tmp_path, inputs):
+    files = write_bake(tmp_path / "new" / "folder", *inputs, {"shots": 3})
+    assert sorted(p.name for p in files.scene.parent.iterdir()) == NAMES
+    _, _, irradiance, covered = inputs
+    pixels = OpenEXR.File(str(files.irradiance)).channels()["RGB"].pixels
+    np.testing.assert_array_equal(pixels[covered], irradiance[covered])
+    assert np.isfinite(pixels).all()
+    assert json.loads(files.report.read_text()) == {"shots": 3}
+
+
+def test_irradiance_that_is_not_finite_is_refused(tmp_path, inputs):
+    scene, charts, irradiance, covered = inputs
+    irradiance[tuple(np.argwhere(covered)[0])] = np.inf
+    with pytest.raises(AssertionError, match="not finite"):
+        write_bake(tmp_path, scene, charts, irradiance, covered, {})
+    assert not list(tmp_path.iterdir())
+
+
+def test_image_of_another_size_is_refused(tmp_path, inputs):
+    scene, charts, irradiance, covered = inputs
+    with pytest.raises(AssertionError, match="for an atlas of"):
+        write_bake(tmp_path, scene, charts, irradiance[1:], covered[1:], {})
+
+
+@pytest.mark.parametrize("step", ["write_irradiance", "glb_bytes", "json_text"])
+def test_failing_half_way_keeps_the_files_of_the_last_bake(tmp_path, inputs, monkeypatch, step):
+    files = write_bake(tmp_path, *inputs, {"shots": 1})
+    before = {path: path.read_bytes() for path in vars(files).values()}
+
+    def full(*args):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(app.bake, step, full)
+    with pytest.raises(UserError, match=r"cannot write the bake .No space left on device"):
+        write_bake(tmp_path, *inputs, {"shots": 2})
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_folder_that_cannot_be_made(tmp_path, inputs):
+    (tmp_path / "file").write_text("")
+    for folder in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(UserError, match="cannot write here"):
+            prepare_directory(folder)
+        with pytest.raises(UserError, match="cannot write here"):
+            write_bake(folder, *inputs, {})
+
+
+def test_exr_that_cannot_be_written_is_an_os_error(tmp_path):
+    with pytest.raises(OSError, match="nowhere"):
+        write_irradiance(tmp_path / "nowhere" / "e.exr", np.zeros((2, 2, 3), np.float32))
+
+
+# -- report ------------------------------------------------------------------------------------------------------------
+
+
+def test_report_is_the_same_file_for_equal_reports():
+    a = {"b": 1, "a": {"y": np.float32(0.5), "x": (1, 2)}, "path": Path("x.glb")}
+    b = {"path": Path("x.glb"), "a": {"x": [1, 2], "y": 0.5}, "b": np.int64(1)}
+    assert app.bake.json_text(a) == app.bake.json_text(b)
+    assert json.loads(app.bake.json_text(a)) == {"a": {"x": [1, 2], "y": 0.5}, "b": 1, "path": "x.glb"}
+
+
+def test_report_has_no_numbers_that_json_lacks():
+    text = app.bake.json_text({"residual": math.nan, "rows": np.array([1.0, np.inf])})
+    assert json.loads(text, parse_constant=pytest.fail) == {"residual": None, "rows": [1.0, None]}

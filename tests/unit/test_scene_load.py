@@ -1,0 +1,146 @@
+"""The front door: names, suffixes, the default camera and the ceiling light; and real files, where there are any."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scene_files import quad_gltf, written
+
+from app.errors import SceneError, UserError
+from app.scene.cameras import default_camera
+from app.scene.library import scene_names, scene_path
+from app.scene.load import NO_LIGHT, load_scene, with_ceiling_light
+from app.scene.model import Material, Scene
+from app.scene.shapes import Mesh, box, icosphere
+from app.scene.validate import Part, validate
+
+GREY = Material("grey")
+
+
+def scene_of(*meshes: Mesh) -> Scene:
+    return validate("x", "x", [Part(m.positions, m.triangles) for m in meshes], ["x"], [GREY])
+
+
+def test_scenes_that_come_along() -> None:
+    assert {"cornell-box", "furnace", "museum", "grotto", "two-rooms", "textured-room"} <= set(scene_names())
+    assert load_scene("furnace").source == scene_path("furnace")
+    assert load_scene(scene_path("furnace")).name == load_scene(str(scene_path("furnace"))).name
+    with pytest.raises(UserError, match="must be one of cornell-box"):
+        scene_path("castle")
+
+
+def test_suffix_may_be_upper_case(tmp_path: Path) -> None:
+    assert len(load_scene(written(tmp_path, "A.GLB", quad_gltf().glb())).triangles) == 2
+
+
+REFUSED = {
+    "cornel-box": "did you mean cornell-box?",
+    "furnace.tom": "there is no such file or scene",
+    "castle.glb": "allowed are files .glb .gltf .obj .ply .stl .toml and the scenes cornell-box",
+    ".": "is a folder",
+    "notes.txt": "unknown format '.txt'",
+    "bare": "unknown format ''",
+    "a\0b\nc": "a b c: ",
+    "x" * 5000: "is not a file name",
+}
+
+
+@pytest.mark.parametrize("source", REFUSED, ids=range(len(REFUSED)))
+def test_refused_with_what_is_allowed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, "notes.txt", "x")
+    written(tmp_path, "bare", "x")
+    with pytest.raises(SceneError) as caught:
+        load_scene(source)
+    assert REFUSED[source] in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_near_miss_of_a_file_is_suggested(tmp_path: Path) -> None:
+    written(tmp_path, "kitchen.glb", b"")
+    with pytest.raises(SceneError, match=r"did you mean kitchen\.glb"):
+        load_scene(tmp_path / "kitchn.glb")
+
+
+def test_dark_scene_says_so_and_takes_a_ceiling_light(tmp_path: Path) -> None:
+    gltf = quad_gltf()
+    gltf.json["materials"][0]["emissiveFactor"] = [0, 0, 0]
+    path = written(tmp_path, "dark.glb", gltf.glb())
+    dark = load_scene(path)
+    assert not dark.emits and dark.warnings == (NO_LIGHT,)
+    lit = load_scene(path, default_light=True)
+    assert lit.emits and lit.warnings == () and lit.objects == ("quad", "ceiling light")
+    for corners in (lit.uv0, lit.normals):
+        assert corners is not None and len(corners) == 4
+
+
+def test_lit_scene_gets_no_ceiling_light() -> None:
+    assert len(load_scene("furnace", default_light=True).triangles) == 12
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_ceiling_light_gives_its_ground_one_watt_per_square_metre(scale: float) -> None:
+    room = scene_of(box((4 * scale, 2 * scale, 8 * scale)).flipped())
+    lit = with_ceiling_light(room)
+    normals, areas = lit.normals_areas
+    lamp = lit.materials[lit.material_ids[-1]]
+    assert np.allclose(normals[-2:], [0, -1, 0]) and not lamp.double_sided
+    flux = math.pi * lamp.emission[0] * areas[-2:].sum()
+    assert flux == pytest.approx(1.0 * 32 * scale**2)
+    assert np.allclose(lit.corners[-1][:, 1], 0.98 * scale)  # the top is at 1, the height is 2
+    assert np.allclose(np.ptp(lit.corners[-2:].reshape(-1, 3), axis=0), [scale, 0, 2 * scale])
+
+
+def test_ceiling_light_of_a_flat_scene_hangs_above_it() -> None:
+    flat = scene_of(Mesh(np.array([[0, 0, 0], [4, 0, 0], [0, 0, -4]], float), np.array([[0, 1, 2]]), np.zeros((3, 2))))
+    assert np.allclose(with_ceiling_light(flat).corners[-1][:, 1], 1.0)
+
+
+def looks_at_all(scene: Scene) -> bool:
+    """Whether the default camera has every corner in its field of view (taken as a cone)."""
+    camera = default_camera(scene)
+    eye, forward = camera.world_from_camera[:3, 3], -camera.world_from_camera[:3, 2]
+    to = scene.corners.reshape(-1, 3) - eye
+    cosine = to @ forward / np.linalg.norm(to, axis=1)
+    return bool((cosine >= math.cos(camera.yfov / 2) - 1e-9).all())
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_default_camera_sees_a_whole_object_from_outside(scale: float) -> None:
+    for mesh in (box((1, 2, 3)), icosphere(1.0, 2)):
+        assert looks_at_all(scene_of(Mesh(mesh.positions * scale + 7, mesh.triangles, mesh.uv)))
+
+
+@pytest.mark.parametrize(("size", "axis"), [((4, 2, 8), 2), ((8, 2, 4), 0)])
+def test_default_camera_stands_at_the_end_of_a_room(size: tuple[float, float, float], axis: int) -> None:
+    camera = default_camera(scene_of(box(size).flipped()))
+    eye, forward = camera.world_from_camera[:3, 3], -camera.world_from_camera[:3, 2]
+    assert abs(forward[axis]) == pytest.approx(1.0)
+    assert eye[axis] * forward[axis] == pytest.approx(-3.6)  # 5 % of 8 m before the wall at -4
+
+
+def test_default_camera_looks_around_furniture_in_the_middle() -> None:
+    room, table = box((4, 4, 8)).flipped(), box((2, 2, 2)).moved(0, -1, 0)
+    eye = default_camera(scene_of(room, table)).world_from_camera[:3, 3]
+    assert (np.abs(eye) < [2, 2, 4]).all()
+
+
+def test_default_camera_looks_into_an_open_room() -> None:
+    camera = default_camera(scene_of(box((4, 3, 5), without=("front",)).flipped()))
+    eye, forward = camera.world_from_camera[:3, 3], -camera.world_from_camera[:3, 2]
+    assert np.allclose(forward, [0, 0, -1]) and eye[2] > 2.5
+
+
+REAL = os.environ.get("GLOWTREE_SCENES")
+REAL_FILES = sorted(Path(REAL).glob("*.*")) if REAL else []
+
+
+@pytest.mark.skipif(not REAL, reason="GLOWTREE_SCENES names no folder of real scenes")
+@pytest.mark.parametrize("path", [p for p in REAL_FILES if p.suffix in (".glb", ".gltf", ".obj")], ids=lambda p: p.name)
+def test_real_scene_loads(path: Path) -> None:
+    scene = load_scene(path)
+    normals, areas = scene.normals_areas
+    assert len(scene.triangles) > 0 and np.isfinite(normals).all() and (areas > 0).all() and scene.cameras
