@@ -83,7 +83,7 @@ def view(flags: argparse.Namespace) -> int:
     from platformdirs import user_config_path
 
     from app.scene.library import scene_names
-    from app.scene.load import SUFFIXES
+    from app.scene.load import LOADERS
     from app.window import run_window
 
     def make_session(gpu: Any) -> Session:
@@ -96,7 +96,7 @@ def view(flags: argparse.Namespace) -> int:
         make_session,
         size=flags.size,
         scenes=scene_names(),
-        suffixes=SUFFIXES,
+        suffixes=tuple(LOADERS),
         layout_file=layout,
         frames=flags.frames,
     )
@@ -124,8 +124,7 @@ def picture(session: Session, size: tuple[int, int]) -> np.ndarray:
         session.draw(target, size, samples=SAMPLES)
         return pixels(target, size)
     finally:
-        target.release()
-        texture.release()
+        session.gpu.release_all(target, texture)
 
 
 def report(session: Session) -> dict[str, Any]:

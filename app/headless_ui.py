@@ -91,18 +91,20 @@ class UiFrame:
         """Give back the GL objects. The interface is still usable by another renderer, or can be released."""
         self._ui.use()
         self._renderer.release()
-        if self._view is not None:
-            for resource in reversed(self._view):
-                resource.release()
+        self._release_view()
 
     def _view_of(self, width: int, height: int) -> tuple[Texture, Framebuffer]:
         if self._view is None or self._view[0].size != (width, height):
-            if self._view is not None:
-                for resource in reversed(self._view):
-                    resource.release()
+            self._release_view()
             texture = self._gpu.texture((width, height), 4, "f1")
             self._view = texture, self._gpu.target(texture)
         return self._view
+
+    def _release_view(self) -> None:
+        self._gpu.ctx.detect_framebuffer(0).use()  # moderngl binds the last one used again, and must not find it gone
+        if self._view is not None:
+            for resource in reversed(self._view):
+                resource.release()
 
     def _false_colour(self, session: Session) -> Scale | None:
         """The scale of what is shown. Finding its top reads all light back, so that is done only now and then."""

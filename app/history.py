@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from app.scene.model import F64
-from app.solvers import EnergyBook
 
 CAPACITY = 4096  # rows kept: more than a plot has pixels
 COLUMNS = ("shots", "seconds", "residual", "absorbed", "escaped")
@@ -18,14 +17,12 @@ class History:
         self._rows = np.zeros((CAPACITY, len(COLUMNS)))
         self._count = 0
 
-    def add(self, shots: int, seconds: float, residual: float, books: EnergyBook) -> None:
-        """Append a row; when full, every second row goes."""
+    def add(self, shots: int, seconds: float, residual: float, escaped: float) -> None:
+        """Append a row; what is neither unshot nor escaped was absorbed. When full, every second row goes."""
         if self._count == CAPACITY:
             self._rows[: CAPACITY // 2] = self._rows[::2]
             self._count = CAPACITY // 2
-        emitted = max(float(books.emitted.sum()), 1e-300)
-        shares = float(books.absorbed.sum()) / emitted, float(books.escaped.sum()) / emitted
-        self._rows[self._count] = shots, seconds, residual, *shares
+        self._rows[self._count] = shots, seconds, residual, 1.0 - residual - escaped, escaped
         self._count += 1
 
     def column(self, name: str) -> F64:

@@ -19,7 +19,7 @@ from app.scene.model import Scene
 Progress = Callable[[str, float], None]  # stage, share done
 
 
-class Cancelled(Exception):
+class CancelledError(Exception):
     """The user stopped it."""
 
 
@@ -75,10 +75,10 @@ class Loading:
 
     @property
     def result(self) -> Loaded:
-        """What was loaded. Raises UserError, or Cancelled."""
+        """What was loaded. Raises UserError, or CancelledError."""
         self._thread.join()
         if self._cancelled:
-            raise Cancelled
+            raise CancelledError
         if self._error is not None:
             raise self._error
         assert self._loaded is not None
@@ -91,12 +91,12 @@ class Loading:
     def _run(self, atlas: AtlasOptions, default_light: bool) -> None:
         try:
             self._loaded = load(self.source, atlas, default_light=default_light, progress=self._progress)
-        except (UserError, Cancelled, MemoryError) as error:
+        except (UserError, CancelledError, MemoryError) as error:
             self._error = UserError("not enough memory for this scene") if isinstance(error, MemoryError) else error
         except Exception as error:  # shown by the main thread, with its traceback
             self._error = error
 
     def _progress(self, stage: str, share: float) -> None:
         if self._cancelled:
-            raise Cancelled
+            raise CancelledError
         self.stage, self.fraction = stage, share

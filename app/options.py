@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import functools
 import math
 import types
 import typing
@@ -115,6 +116,12 @@ class Options:
 
 def specs(options: type[Options]) -> list[Spec]:
     """The declared options of a class, in order."""
+    hashable: Any = options
+    return _specs(hashable)
+
+
+@functools.cache
+def _specs(options: Any) -> list[Spec]:
     hints = typing.get_type_hints(options)
     out = []
     for f in dataclasses.fields(options):

@@ -19,7 +19,7 @@ from app.atlas.options import AtlasOptions
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Texture
 from app.history import History
-from app.loading import Cancelled, Loaded, Loading, load
+from app.loading import CancelledError, Loaded, Loading, load
 from app.picking import Picked, picked_from_hit
 from app.render.camera import CameraView
 from app.render.exposure import auto_exposure
@@ -89,6 +89,10 @@ class Session:
         self.load_seconds: dict[str, float] = {}
         self.history = History()
         self.interrupted = False
+        self.seconds = 0.0
+        self._last_advance = 0.0
+        self._batch = 1
+        self._books: EnergyBook
         self._opened = False
 
     # -- opening -------------------------------------------------------------------------------------------------------
@@ -114,7 +118,7 @@ class Session:
             ended, self.loading = self.loading, None
             try:
                 self._swap(ended.result)
-            except Cancelled:
+            except CancelledError:
                 self.message = f"{ended.source}: loading stopped"
             except UserError as error:
                 self.message = str(error)
@@ -232,9 +236,10 @@ class Session:
         """Wait for the GPU and bring report, book and history up to the last shot."""
         self.solver.poll(wait=True)
         self._books = self.solver.books()
-        emitted = self._books.emitted.sum()
+        emitted = float(self._books.emitted.sum())
         if emitted > 0:
-            self.history.add(self.solver.shots, self.seconds, float(self._books.unshot.sum() / emitted), self._books)
+            unshot, escaped = float(self._books.unshot.sum()) / emitted, float(self._books.escaped.sum()) / emitted
+            self.history.add(self.solver.shots, self.seconds, unshot, escaped)
 
     def restart(self) -> None:
         """Forget all light and begin again."""
@@ -260,10 +265,10 @@ class Session:
     def _begin(self) -> None:
         self.seconds, self._last_advance = 0.0, 0.0
         self._batch = 1
-        self._books: EnergyBook = self.solver.books()
+        self._books = self.solver.books()
         self._books_time = time.perf_counter()
         self.history = History()
-        self.history.add(0, 0.0, self.solver.report.residual, self._books)
+        self.history.add(0, 0.0, self.solver.report.residual, 0.0)
 
     def _hear(self, books: bool = True) -> None:
         before = self.solver.report.shots
@@ -274,7 +279,8 @@ class Session:
             self._books = self.solver.books()
             self._books_time = time.perf_counter()
         if report.shots != before:
-            self.history.add(report.shots, self.seconds, report.residual, self._books)
+            escaped = float(report.escaped.sum()) / max(float(self._books.emitted.sum()), 1e-300)
+            self.history.add(report.shots, self.seconds, report.residual, escaped)
 
     # -- what is known -------------------------------------------------------------------------------------------------
 

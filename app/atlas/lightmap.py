@@ -8,7 +8,7 @@ Node-set textures hold the leaf tiles of 16×16 texels side by side [Coombe03, 4
     t_residual       storage  r [W/m²]: exitance not yet shot
     t_albedo, t_emission      only where a material has such a texture: the factor is in the material table
 
-and tables: t_pages (tile number from 1 of each 16×16 cell of the virtual atlas), t_facets, t_materials, t_tile_bounds.
+and tables: t_pages (tile number from 1 of each 16×16 cell of the virtual atlas), t_facets, t_materials.
 The solver frame is centred on the scene and scaled by its half diagonal, so answers do not depend on unit or origin. H and r
 are stored relative to the largest exitance, which keeps half floats in range and is what 8-bit fixed point needs.
 """
@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
-from app.atlas.node_set import VERTEX_FORMAT, Frame, NodeSet
+from app.atlas.node_set import VERTEX_FORMAT, Frame, NodeSet, ScalarT
+from app.atlas.receivers import RECEIVER_FORMAT
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.scene.model import F32, F64, Material, Scene
 
@@ -42,6 +43,11 @@ class Lightmap:
         self._textures = {name: self._upload(array) for name, array in nodes.arrays.items()}
         self._emit = Pass(gpu, "lightmap/emit", defines=self.defines("MATERIAL_BITS", "EMISSION_TEXTURE"))
         self.mesh = Mesh(gpu, nodes.vertices.tobytes(), VERTEX_FORMAT)
+        self.receivers = {
+            flat: Mesh(gpu, quads.tobytes(), RECEIVER_FORMAT, per_instance=True)
+            for flat, quads in ((True, nodes.flat_spans), (False, nodes.shaped_tiles))
+            if len(quads)
+        }
         self._targets: list[Framebuffer] = []
         self.set_storage(storage)
 
@@ -81,11 +87,9 @@ class Lightmap:
 
     def set_storage(self, storage: str) -> None:
         """Choose how H and r are stored (a key of STORAGE), and start from no light."""
-        for target in self._targets:
-            target.release()
-        for name in ("t_irradiance", "t_residual"):
-            if name in self._textures:
-                self._textures[name].release()
+        light = ("t_irradiance", "t_residual")
+        self.gpu.release_all(*self._targets, *(self._textures.pop(name) for name in light if name in self._textures))
+        for name in light:
             self._textures[name] = self.gpu.texture(self.size, 4, STORAGE[storage])
         self.storage = storage
         irradiance, residual = self._textures["t_irradiance"], self._textures["t_residual"]
@@ -109,11 +113,7 @@ class Lightmap:
         )
 
     def release(self) -> None:
-        for target in self._targets:
-            target.release()
-        for texture in self._textures.values():
-            texture.release()
-        self.mesh.release()
+        self.gpu.release_all(*self._targets, *self._textures.values(), self.mesh, *self.receivers.values())
 
     # -- read-back -----------------------------------------------------------------------------------------------------
 
@@ -145,7 +145,7 @@ class Lightmap:
         """B = E + ρH of every texel (tiles, 16, 16, 3) f32 [W/m²]. Waits for the GPU."""
         return self.emission() + self.albedo() * self.irradiance()
 
-    def atlas_image(self, tiles: NDArray[np.generic]) -> NDArray[np.generic]:
+    def atlas_image(self, tiles: NDArray[ScalarT]) -> NDArray[ScalarT]:
         """Per-tile values (tiles, 16, 16, …) laid out in the virtual atlas (H, W, …), row 0 at v = 0; 0 between charts."""
         return self.nodes.atlas_image(tiles)
 

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import TILE, Charts
-from app.atlas.materials import faces_tangents, texel_colours
-from app.atlas.texels import Leaves, TexelSurfaces, texel_surfaces, uniform_leaves
+from app.atlas.materials import texel_colours
+from app.atlas.receivers import TileTexels, receivers
+from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents, texel_surfaces, uniform_leaves
 from app.errors import UserError
 from app.scene.model import F32, F64, Scene
 
 Array = NDArray[np.generic]
+ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 MAX_FACETS = (1 << 24) - 2  # item ids are held as floats, see common/item.glsl
 TABLE_WIDTH = 2048  # columns of the facet table
-NEVER_CULLED = 4.0  # thicker than the scene: diameter 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,8 @@ class Frame:
 class NodeSet:
     """Leaf tiles side by side in one rectangle of ``columns``×``rows`` tiles, and the tables that go with them.
 
-    arrays: texture name -> (height, width, components) array as the texture holds it; vertices: the triangles' vertex buffer.
+    arrays: texture name -> (height, width, components) array as the texture holds it; vertices: the triangles' vertex buffer;
+    flat_spans, shaped_tiles: the receivers, see receivers.py.
     Raises UserError where facets and materials do not fit the 32 bits of a texel's ids.
     """
 
@@ -61,6 +64,7 @@ class NodeSet:
         self.texel_count = int((self.surfaces.face >= 0).sum())  # that cover a surface
         self.albedo_tiles, self.emission_tiles = texel_colours(scene, charts, self.leaves, self.surfaces)
         self.arrays = self._texel_arrays() | self._tables()
+        self.flat_spans, self.shaped_tiles = self._receivers()
         self.vertices = _vertices(scene, charts, self.frame)
 
     def tiles_from_image(self, image: Array) -> Array:
@@ -75,7 +79,7 @@ class NodeSet:
         cells = grid.reshape(self.rows, self.columns, TILE, TILE, -1).swapaxes(1, 2)
         return np.ascontiguousarray(cells).reshape(self.rows * TILE, self.columns * TILE, -1)
 
-    def atlas_image(self, tiles: Array) -> Array:
+    def atlas_image(self, tiles: NDArray[ScalarT]) -> NDArray[ScalarT]:
         """Tiles (tiles, 16, 16, …) laid out in the virtual atlas (H, W, …), row 0 at v = 0; 0 between charts."""
         width, height = self.charts.size
         cells = np.zeros((height // TILE, width // TILE, *tiles.shape[1:]), tiles.dtype)
@@ -120,38 +124,43 @@ class NodeSet:
         return {
             "t_pages": pages,
             "t_facets": self._facet_table(),
-            "t_tile_bounds": self._tile_bounds(),
             "t_materials": self.material_table(self.scene),
         }
 
     def _facet_table(self) -> F32:
-        """(rows, TABLE_WIDTH, 4): per facet two entries, ∂p/∂u and ∂p/∂v per atlas texel (solver frame)."""
-        dpdu, dpdv = faces_tangents(self.scene, self.charts)
+        """(rows, TABLE_WIDTH, 4): per facet, from 1, two entries: ∂p/∂u and ∂p/∂v."""
         rows = -(-2 * (self.charts.facet_count + 1) // TABLE_WIDTH)
         table = np.zeros((rows * TABLE_WIDTH, 4), np.float32)
-        entry = 2 * (self.charts.face_facet + 1)
-        table[entry, :3] = dpdu / self.frame.scale
-        table[entry + 1, :3] = dpdv / self.frame.scale
+        dpdu, dpdv = self._facet_tangents()
+        table[2 : 2 * len(dpdu) + 2 : 2, :3] = dpdu
+        table[3 : 2 * len(dpdv) + 3 : 2, :3] = dpdv
         return table.reshape(rows, TABLE_WIDTH, 4)
 
-    def _tile_bounds(self) -> F32:
-        """(rows, columns·2, 4): per tile a bounding sphere (centre, radius), and its normal with the tile's half thickness
-        along it, NEVER_CULLED where its normals differ."""
-        s = self.surfaces
-        covered = (s.face >= 0)[..., None]
-        local = np.where(covered, self.frame.local_from_world(s.position), 0.0)
-        centre = local.sum((1, 2)) / np.maximum(covered.sum((1, 2)), 1)
-        offset = np.where(covered, local - centre[:, None, None], 0.0)
-        axis = np.where(covered, s.normal, 0.0).sum((1, 2))
-        axis /= np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-30)
-        aligned = np.where(covered[..., 0], np.einsum("tijc,tc->tij", s.normal, axis), 1.0).min((1, 2))
-        thickness = np.abs(np.einsum("tijc,tc->tij", offset, axis)).max((1, 2))
-        thickness = np.where(aligned > 1 - 1e-6, thickness + 1e-6, NEVER_CULLED)
-        radius = np.linalg.norm(offset, axis=-1).max((1, 2)) + 1e-6
-        table = np.zeros((self.rows * self.columns, 2, 4), np.float32)
-        table[: self.tiles, 0] = np.concatenate([centre, radius[:, None]], -1)
-        table[: self.tiles, 1] = np.concatenate([axis, thickness[:, None]], -1)
-        return table.reshape(self.rows, self.columns * 2, 4)
+    def _receivers(self) -> tuple[F32, F32]:
+        s, charts = self.surfaces, self.charts
+        dpdu, dpdv = self._facet_tangents()
+        material = np.zeros(charts.facet_count, np.int32)
+        material[charts.face_facet] = self.scene.material_ids[charts.face_triangle]
+        return receivers(
+            TileTexels(
+                position=self.frame.local_from_world(s.position),
+                normal=s.normal,
+                area=s.area / self.frame.scale**2,
+                facet=np.where(s.face >= 0, charts.face_facet[s.face], -1).astype(np.int32),
+                dpdu=dpdu,
+                dpdv=dpdv,
+                material=material,
+                x=self.leaves.x,
+                y=self.leaves.y,
+                columns=self.columns,
+            )
+        )
+
+    def _facet_tangents(self) -> tuple[F64, F64]:
+        """∂p/∂u and ∂p/∂v of each facet (facets, 3), solver frame per atlas texel."""
+        out = np.zeros((2, self.charts.facet_count, 3))
+        out[:, self.charts.face_facet] = faces_tangents(self.scene, self.charts)
+        return out[0] / self.frame.scale, out[1] / self.frame.scale
 
 
 def octahedral(normals: NDArray[np.floating]) -> NDArray[np.uint32]:
@@ -184,4 +193,4 @@ def _vertices(scene: Scene, charts: Charts, frame: Frame) -> Array:
     return data.reshape(-1)
 
 
-__all__ = ["VERTEX_FORMAT", "F64", "Frame", "NodeSet", "octahedral"]
+__all__ = ["VERTEX_FORMAT", "Frame", "NodeSet", "ScalarT", "octahedral"]

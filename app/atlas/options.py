@@ -11,5 +11,7 @@ MAX_TEXELS = 16_000_000
 
 @dataclass(frozen=True)
 class AtlasOptions(Options):
-    density: float | None = option(None, "texels per metre; unset: from --texels", unit="1/m", minimum=1e-9, maximum=1e9)
+    density: float | None = option(
+        None, "texels per metre; unset: from --texels", unit="1/m", minimum=1e-9, maximum=1e9
+    )
     texels: int | None = option(None, "texels in all; unset: chosen from the scene", minimum=1, maximum=MAX_TEXELS)

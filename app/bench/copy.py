@@ -19,6 +19,5 @@ def copy_bandwidth(gpu: Gpu, size: tuple[int, int], repeats: int = 15) -> float:
         gpu.ctx.copy_framebuffer(targets[1], targets[0])
         gpu.ctx.finish()
         times.append(time.perf_counter() - start)
-    for resource in (*targets, source, sink):
-        resource.release()
+    gpu.release_all(*targets, source, sink)
     return 2 * 16 * size[0] * size[1] / statistics.median(times)

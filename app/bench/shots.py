@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from app.atlas.lightmap import Lightmap
 from app.atlas.options import AtlasOptions
 from app.bench.copy import copy_bandwidth
 from app.console import Console
 from app.gpu import Gpu, gpu_context
 from app.loading import load
-from app.atlas.lightmap import Lightmap
 from app.options import from_flags
 from app.solvers import ShootingOptions, UniformShooting
 from app.solvers.shooting.stages import BATCH

@@ -1,6 +1,6 @@
 """moderngl, and nothing about light: context, shaders, passes, timers."""
 
-from moderngl import Framebuffer, Texture
+from moderngl import Buffer, Framebuffer, Texture
 
 from app.gpu.context import Gpu, Limits, gpu_context, headless_gpu
 from app.gpu.passes import Mesh, Pass
@@ -8,6 +8,7 @@ from app.gpu.readback import ReadBack
 from app.gpu.shader import ShaderError, ShaderLibrary
 
 __all__ = [
+    "Buffer",
     "Framebuffer",
     "Gpu",
     "Limits",

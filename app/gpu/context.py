@@ -64,6 +64,10 @@ class Gpu:
         texture.repeat_x = texture.repeat_y = False
         return texture
 
+    def buffer(self, size: int) -> moderngl.Buffer:
+        """So many bytes, to be written by the GPU or the host."""
+        return self.ctx.buffer(reserve=size)
+
     def depth_texture(self, size: tuple[int, int]) -> moderngl.Texture:
         """A depth map to draw into and to read as numbers (no comparison)."""
         texture = self.ctx.depth_texture(size)
@@ -74,6 +78,13 @@ class Gpu:
     def target(self, *colour: moderngl.Texture, depth: moderngl.Texture | None = None) -> moderngl.Framebuffer:
         return self.ctx.framebuffer(list(colour), depth)
 
+    def release_all(self, *resources: Any) -> None:
+        """Release targets, textures and buffers, targets first. moderngl goes back to the target it bound last, even one that is
+        gone: bind the default one before."""
+        self.ctx.detect_framebuffer(0).use()
+        for resource in sorted(resources, key=lambda r: not isinstance(r, moderngl.Framebuffer)):
+            resource.release()
+
     def release(self) -> None:
         self.shaders.release()
         self.timers.release()
@@ -82,7 +93,8 @@ class Gpu:
 def headless_gpu() -> Gpu:
     """A context without any window: EGL, or the platform's own where there is no EGL. Raises GpuError."""
     reasons = []
-    for backend in ({"backend": "egl"}, {}):
+    backends: tuple[dict[str, Any], ...] = ({"backend": "egl"}, {})
+    for backend in backends:
         try:
             return Gpu(moderngl.create_context(standalone=True, require=GL_REQUIRED, **backend))
         except GpuError:

@@ -42,7 +42,11 @@ class Pass:
     def _bind(self) -> None:
         self.program = self.gpu.shaders.program(self.name, self._defines, self._slots)
         self._generation = self.gpu.shaders.generation
-        members = {n: self.program[n] for n in self.program if isinstance(self.program[n], moderngl.Uniform)}
+        members: dict[str, Any] = {n: self.program[n] for n in self.program}
+        self._blocks = {n: m for n, m in members.items() if isinstance(m, moderngl.UniformBlock)}
+        for binding, block in enumerate(self._blocks.values()):
+            block.binding = binding
+        members = {n: m for n, m in members.items() if isinstance(m, moderngl.Uniform)}
         # GL types of samplers are the only ones that are bound to a unit
         self._samplers = {n: i for i, n in enumerate(sorted(n for n in members if n.startswith("t_")))}
         self._uniforms = {n: u for n, u in members.items() if not n.startswith("t_")}
@@ -55,6 +59,7 @@ class Pass:
         *,
         textures: Mapping[str, moderngl.Texture] | None = None,
         uniforms: Mapping[str, Any] | None = None,
+        blocks: Mapping[str, tuple[moderngl.Buffer, int, int]] | None = None,
         mesh: Mesh | None = None,
         vertices: int = 3,
         instances: int = 1,
@@ -65,18 +70,22 @@ class Pass:
         lines: bool = False,
         clip_distances: int = 0,
     ) -> None:
-        """Draw once into ``target``. Without a mesh, ``vertices`` without attributes. Raises ShaderError on a wrong name."""
+        """Draw once into ``target``. Without a mesh, ``vertices`` without attributes. A block is (buffer, offset, size in bytes).
+        Raises ShaderError on a wrong name."""
         if self._generation != self.gpu.shaders.generation:
             self._bind()
         self._check("texture", set(textures or {}), set(self._samplers))
         self._check("uniform", set(uniforms or {}), set(self._uniforms))
+        self._check("block", set(blocks or {}), set(self._blocks))
+        for name, (buffer, offset, size) in (blocks or {}).items():
+            buffer.bind_to_uniform_block(self._blocks[name].binding, offset=offset, size=size)
         for name, texture in (textures or {}).items():
             texture.use(self._samplers[name])
         for name, value in (uniforms or {}).items():
             self._uniforms[name].value = value
         ctx = self.gpu.ctx
         target.use()
-        target.viewport = viewport or (0, 0, *target.size)
+        target.viewport = viewport or (0, 0, *target.size)  # type: ignore[assignment]  # its stub says two numbers
         flags = (moderngl.BLEND if blend else 0) | (moderngl.DEPTH_TEST if depth else 0)
         ctx.enable_only(flags | moderngl.PROGRAM_POINT_SIZE)
         if blend:
@@ -89,7 +98,11 @@ class Pass:
                 array = self.gpu.shaders.attributeless(self.program)
                 array.render(mode, vertices=vertices, instances=instances)
             else:
-                mesh.vertex_array(self.program).render(mode, instances=instances)
+                array = mesh.vertex_array(self.program)
+                if mesh.per_instance:
+                    array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=mesh.count)
+                else:
+                    array.render(mode, instances=instances)
         for plane in range(clip_distances):
             ctx.disable_direct(GL_CLIP_DISTANCE0 + plane)
 
@@ -101,12 +114,15 @@ class Pass:
 
 
 class Mesh:
-    """An interleaved vertex buffer: ``attributes`` maps names to moderngl formats (``3f``, ``2u``), in order."""
+    """An interleaved vertex buffer: ``attributes`` maps names to moderngl formats (``3f``, ``2u``), in order. With
+    ``per_instance`` one element is one instance of a quad, which the vertex shader makes from ``gl_VertexID`` 0 to 3."""
 
-    def __init__(self, gpu: Gpu, data: bytes, attributes: Mapping[str, str]) -> None:
+    def __init__(self, gpu: Gpu, data: bytes, attributes: Mapping[str, str], *, per_instance: bool = False) -> None:
         self._ctx = gpu.ctx
         self.buffer = gpu.ctx.buffer(data)
         self.attributes = dict(attributes)
+        self.per_instance = per_instance
+        self.count = len(data) // sum(int(f[0]) * 4 for f in attributes.values())
         self._arrays: list[tuple[moderngl.Program, moderngl.VertexArray]] = []
 
     def vertex_array(self, program: moderngl.Program) -> moderngl.VertexArray:
@@ -118,6 +134,7 @@ class Mesh:
         if missing := wanted - set(self.attributes):
             raise ShaderError(f"mesh has no attribute {', '.join(sorted(missing))}")
         layout = " ".join(f if n in wanted else f"{int(f[0]) * 4}x" for n, f in self.attributes.items())
+        layout += " /i" if self.per_instance else ""
         names = [n for n in self.attributes if n in wanted]
         array = self._ctx.vertex_array(program, [(self.buffer, layout, *names)])
         self._arrays.append((program, array))

@@ -13,6 +13,7 @@ from app.render.false_colour import LAYER, Scale, false_colour_scale
 from app.render.options import DisplayOptions
 from app.render.pick import Picker, PickHit
 from app.render.surfaces import Rect, Surfaces
+from app.render.targets import release_targets
 from app.scene.model import RGB
 
 GL_DEPTH_CLAMP = 0x864F  # OpenGL 3.2: what lies before the near plane is drawn at it instead of being cut away
@@ -121,13 +122,13 @@ class _Picture:
     """An sRGB picture with depth: of our own, or a colour texture of somebody else's that is given depth."""
 
     def __init__(self, gpu: Gpu, size: tuple[int, int], colour: Texture | None) -> None:
-        self.size, self.own = size, colour is None
+        self._gpu, self.size, self.own = gpu, size, colour is None
         self.colour = colour or gpu.texture(size, 4, "f1")
         self.depth: Texture = gpu.depth_texture(size)
         self.target = gpu.target(self.colour, depth=self.depth)
 
     def release(self) -> None:
-        self.target.release()
+        release_targets(self._gpu, self.target)
         self.depth.release()
         if self.own:
             self.colour.release()
@@ -160,6 +161,6 @@ def render_image(
         pixels = np.frombuffer(picture.read(), np.uint8).reshape(size[1], size[0], 4)
     finally:
         renderer.release()
-        target.release()
+        release_targets(gpu, target)
         picture.release()
     return np.ascontiguousarray(pixels[::-1, :, :3])

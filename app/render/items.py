@@ -24,6 +24,5 @@ class ItemImage:
 
     def release(self) -> None:
         if self._image is not None:
-            self._target.release()
-            self._image.release()
+            self._gpu.release_all(self._target, self._image)
             self._image = None

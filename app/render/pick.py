@@ -10,6 +10,7 @@ from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, Pass
 from app.render.surfaces import uniform_matrix
+from app.render.targets import release_targets
 from app.scene.model import F64
 
 
@@ -39,7 +40,7 @@ class Picker:
     def __init__(self, gpu: Gpu) -> None:
 
         self._textures = [gpu.texture((1, 1), 4, "u4"), gpu.texture((1, 1), 4, "f4"), gpu.texture((1, 1), 4, "f4")]
-        self._pass = Pass(gpu, "render/pick")
+        self._gpu, self._pass = gpu, Pass(gpu, "render/pick")
         self._depth = gpu.depth_texture((1, 1))
         self._target = gpu.target(*self._textures, depth=self._depth)
 
@@ -67,7 +68,7 @@ class Picker:
         return hit if ids[2] == 0 else _with_texel(hit, int(ids[2]) - 1, (float(atlas[0]), float(atlas[1])), lightmap)
 
     def release(self) -> None:
-        self._target.release()
+        release_targets(self._gpu, self._target)
         self._depth.release()
         for texture in self._textures:
             texture.release()

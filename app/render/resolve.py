@@ -18,6 +18,7 @@ from app.render.develop import curve
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS, Layer
 from app.render.options import DisplayOptions
+from app.render.targets import release_targets
 from app.scene.model import RGB
 
 BORDERED = TILE + 2
@@ -82,8 +83,7 @@ class DisplayTexels:
         return {"t_display": self._colour, "t_unlit": self._unlit, "t_places": self._tables["t_places"]}
 
     def release(self) -> None:
-        self._target.release()
-        self._unlit_target.release()
+        release_targets(self._gpu, self._target, self._unlit_target)
         for texture in (self._colour, self._unlit, *self._tables.values()):
             texture.release()
 
@@ -133,7 +133,7 @@ class DisplayTexels:
             textures={"t_leaves": table} | lightmap.textures("t_pages", "t_position_area"),
             uniforms={"u_columns": float(lightmap.columns)},
         )
-        target.release()
+        release_targets(self._gpu, target)
         table.release()
 
 

@@ -23,7 +23,7 @@ class Screen:
     """A Dear ImGui context, a renderer and a target; ``show`` draws frames of what ``build`` builds."""
 
     def __init__(self, gpu: Gpu, ratio: int = 1) -> None:
-        self.ratio = ratio
+        self.gpu, self.ratio = gpu, ratio
         self.context = imgui.create_context()
         imgui.set_current_context(self.context)
         self.io = imgui.get_io()
@@ -47,6 +47,7 @@ class Screen:
 
     def release(self) -> None:
         self.renderer.release()
+        self.gpu.ctx.detect_framebuffer(0).use()  # moderngl would bind the last one again
         self.target.release()
         self.texture.release()
         imgui.destroy_context(self.context)

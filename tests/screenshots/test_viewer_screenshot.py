@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.gpu import Gpu
+from app.gpu import gpu_context
 from app.headless_ui import ui_image
 from app.session import Session, Stop
 
@@ -28,17 +28,19 @@ SHARE = (
 MAGNIFIED = 8
 
 
-def test_the_viewer_looks_as_it_did(gpu: Gpu, request: pytest.FixtureRequest) -> None:
-    session = Session(gpu)
-    session.open_now("cornell-box")
-    session.solve(Stop(shots=SHOTS))
-    session.expose()
-    image = ui_image(gpu, session, SIZE, measured=False)
-    session.release()
+def test_the_viewer_looks_as_it_did(request: pytest.FixtureRequest) -> None:
+    with gpu_context() as gpu:
+        session = Session(gpu)
+        session.open_now("cornell-box")
+        session.solve(Stop(shots=SHOTS))
+        session.expose()
+        image = ui_image(gpu, session, SIZE, measured=False)
+        session.release()
+        software = gpu.software
     assert image.shape == (SIZE[1], SIZE[0], 3)
     view = image[100:450, 400:880]
     assert view.std() > 10 and view.max() > 150  # a lit box, not a blank
-    if not gpu.software:
+    if not software:
         pytest.skip("goldens are compared on the software rasteriser only")
     if request.config.getoption("--regenerate-screenshots"):
         Image.fromarray(image).save(GOLDEN)

@@ -19,10 +19,12 @@ __all__ = ["own_cache"]
 LEFT_TO_RIGHT = (0, 0, 0), (4, 0, 0), (0, 4, 0)
 
 
-def _picture(scene: Scene, texels: int) -> tuple[F32, np.ndarray, TexelSurfaces, tuple[F32 | None, F32 | None]]:
+def _picture(
+    scene: Scene, texels: int, level: int = 0
+) -> tuple[F32, np.ndarray, TexelSurfaces, tuple[F32 | None, F32 | None]]:
     """Albedo and position of the texels of the last object, and everything."""
     charts = parametrize(scene, texels=texels)
-    leaves = uniform_leaves(charts)
+    leaves = uniform_leaves(charts, level)
     surfaces = texel_surfaces(scene, charts, leaves)
     albedo, emission = texel_colours(scene, charts, leaves, surfaces)
     mine = (surfaces.face >= 0) & (scene.object_ids[charts.face_triangle[surfaces.face]] == len(scene.objects) - 1)
@@ -80,10 +82,11 @@ def test_fine_detail_averages_to_its_mean(size: tuple[int, int], texels: int) ->
     assert np.abs(albedo.mean(axis=0) - pixels.mean(axis=(0, 1))).max() < 0.02  # 81 repeats against the grid
 
 
-def test_a_checker_keeps_its_mean_and_its_corners() -> None:
+@pytest.mark.parametrize(("texels", "level"), [(40_000, 0), (600, 3)])
+def test_a_checker_keeps_its_mean_and_its_corners(texels: int, level: int) -> None:
     checker = np.indices((8, 8)).sum(axis=0) % 2
     pixels = np.repeat(checker[..., None], 3, axis=2).astype(np.float32)
-    fine, position, *_ = _picture(_textured(Texture("checker", pixels, bilinear=False)), 40_000)
+    fine, position, *_ = _picture(_textured(Texture("checker", pixels, bilinear=False)), texels, level)
     column, row = (position[:, 0] * 2).astype(int), ((4 - position[:, 1]) * 2).astype(int)
     inside = (np.abs(np.mod(position[:, :2] * 2, 1) - 0.5) < 0.4).all(axis=1)
     assert (fine[inside, 0] == (row + column)[inside] % 2).all()

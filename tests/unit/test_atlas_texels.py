@@ -177,7 +177,7 @@ def test_leaves_are_the_tiles_that_are_covered_row_by_row() -> None:
         assert (x[used] == leaves.x).all() and (y[used] == leaves.y).all()
 
 
-def test_the_face_of_a_texel_has_the_largest_share() -> None:
+def test_a_texel_sums_all_its_triangles() -> None:
     scene = scene_of([box_room(), split_grid(shapes.quad((-1, -1, 0), (2, 0, 0), (0, 2, 0)), 3, 1)])
     charts = parametrize(scene, texels=1)
     surfaces = texel_surfaces(scene, charts, uniform_leaves(charts))
@@ -185,6 +185,17 @@ def test_the_face_of_a_texel_has_the_largest_share() -> None:
     assert on_sheet.sum() == 1  # six triangles in one texel, and its centroid in the middle
     assert np.allclose(surfaces.position[on_sheet], (0, 0, 0), atol=1e-12)
     assert np.isclose(surfaces.area[on_sheet].item(), 4.0)
+
+
+@pytest.mark.parametrize("larger_first", [True, False])
+def test_the_largest_share_decides_in_any_order(larger_first: bool) -> None:
+    large, small = shapes.quad((0, 0, 0), (1.9, 0, 0), (0, 2, 0)), shapes.quad((1.9, 0, 0), (0.1, 0, 0), (0, 2, 0))
+    pieces = [large, small] if larger_first else [small, large]
+    scene = scene_of([box_room().moved(0, 0, 1), *pieces])
+    charts = parametrize(scene, texels=1)
+    surfaces = texel_surfaces(scene, charts, uniform_leaves(charts))
+    owner = scene.object_ids[charts.face_triangle[surfaces.face[surfaces.face >= 0]]]
+    assert (1 if larger_first else 2) in owner and (2 if larger_first else 1) not in owner
 
 
 def test_speed() -> None:

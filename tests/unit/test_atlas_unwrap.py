@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import platformdirs
 import pytest
-from atlas_scenes import TURN, box_room, face_areas, moved, own_cache, scene_of
+from atlas_scenes import TURN, box_room, face_areas, moved, own_cache, scene_of, split_grid
 
 import app.atlas.unwrap as unwrap_module
 from app.atlas.charts import Charts
@@ -51,6 +52,20 @@ def test_charts_are_to_scale_and_right_handed(mesh: shapes.Mesh, scale: float) -
         assert np.isclose(_areas(unfolded.uv[mine]).sum(), area[mine].sum(), rtol=1e-9)
     # conformal maps of gently curved charts: a sphere cut into a few dozen charts stretches by well under half
     assert (np.abs(np.log2(_areas(unfolded.uv) / area)) < 0.7).all()
+
+
+def test_a_stretched_page_is_undone() -> None:
+    scene = moved(scene_of([split_grid(shapes.quad((0, 0, 0), (2, 0, 0), (0, 1, 0)), 4, 3)]), TURN)
+    flat = np.linalg.inv(TURN[:3, :3]) @ (scene.corners - TURN[:3, 3])[..., None]
+    page = flat[..., :2, 0] * (-300.0, 50.0) + (1000.0, 7.0)  # mirrored, too
+    chart, uv = unwrap_module._to_scale(np.zeros(24, np.int32), page, scene.corners)
+    assert (chart == 0).all()
+    expected = flat[..., :2, 0]
+    assert np.allclose(uv - uv[0, 0], expected - expected[0, 0], atol=1e-9)  # float64
+    page[5] = page[5, 0]
+    page[7] = page[7, ::-1]
+    chart, _ = unwrap_module._to_scale(np.zeros(24, np.int32), page, scene.corners)
+    assert np.flatnonzero(chart < 0).tolist() == [5, 7]  # without area, and turned over
 
 
 def test_charts_never_mix_materials_nor_objects_apart() -> None:
@@ -142,9 +157,11 @@ def test_cancelling_ends_the_worker(monkeypatch: pytest.MonkeyPatch) -> None:
         if stage == "unwrap":
             raise KeyboardInterrupt
 
+    begin = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         parametrize(scene_of([shapes.cylinder(0.63, 1.0, 8), box_room()]), progress=cancel)
     assert started[0].poll() is not None
+    assert time.monotonic() - begin < 30  # the worker would have slept for 60 s
 
 
 def test_slivers_that_welding_flattens_keep_their_area() -> None:

@@ -42,7 +42,7 @@ KNOWN = [
     ("neutral", 0.5, 0.46, 1e-12),
     # peak 1.24 becomes 1 - 0.24² / (1.24 + 0.24 - 0.76) = 0.92
     ("neutral", 1.28, 0.92, 1e-12),
-    # AgX puts mid grey at half of its display's power curve of 2.2; the polynomial is off by 2e-3 there (mean square 3.7e-6)
+    # AgX puts mid grey at half of its power curve; the polynomial is off by 2e-3 (mean square 3.7e-6)
     ("agx", 0.18, 0.5**2.2, 4e-3),
     # x = 1: (1.0245786 - 0.000090537) / (1.416679 + 0.238081), input 0.6 because of the factor 1/0.6; 5-digit matrices
     ("aces", 0.6, 0.619116, 2e-4),

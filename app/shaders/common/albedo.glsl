@@ -5,10 +5,14 @@
 uniform sampler2D t_albedo;
 #endif
 
-vec3 albedo_of(sampler2D materials, uint material, ivec2 texel_px) {
-    vec3 rho = texelFetch(materials, ivec2(0, int(material)), 0).rgb;
+vec3 albedo_texture(ivec2 texel_px) {
 #if ALBEDO_TEXTURE
-    rho *= texelFetch(t_albedo, texel_px, 0).rgb;
+    return texelFetch(t_albedo, texel_px, 0).rgb;
+#else
+    return vec3(1.0);
 #endif
-    return rho;
+}
+
+vec3 albedo_of(sampler2D materials, uint material, ivec2 texel_px) {
+    return texelFetch(materials, ivec2(0, int(material)), 0).rgb * albedo_texture(texel_px);
 }

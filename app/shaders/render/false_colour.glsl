@@ -1,7 +1,7 @@
 // A number per pixel as a colour: viridis (van der Walt and Smith, CC0), sixth-order fit by Matt Zucker (CC0). The radiance
 // becomes luminous by Radiance's white efficacy of 179 lm/W [Ward94]: app/render/false_colour.py gives u_per_radiance.
 uniform float u_per_radiance;  // what is measured per W/(sr m²)
-uniform vec2 u_range;          // lowest and highest value, its unit
+uniform vec2 u_range;          // lowest and highest value; a linear scale begins at 0
 uniform float u_logarithmic;   // 0 or 1
 
 vec3 viridis(float x) {
@@ -17,7 +17,7 @@ vec3 viridis(float x) {
 
 vec3 develop(vec3 radiance) {
     float value = dot(radiance, LUMINANCE) * u_per_radiance;
-    float linear = (value - u_range.x) / (u_range.y - u_range.x);
+    float linear = value / u_range.y;
     float decades = log2(max(value, 1e-20) / max(u_range.x, 1e-20)) / log2(u_range.y / max(u_range.x, 1e-20));
     return decode_srgb(clamp(viridis(clamp(mix(linear, decades, u_logarithmic), 0.0, 1.0)), 0.0, 1.0));
 }

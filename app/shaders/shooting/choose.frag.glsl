@@ -1,4 +1,4 @@
-// The shooters of a batch: column k describes the k-th strongest of the rows' strongest patches. [Coombe03, 3.4]
+// The shooters of a batch: row k describes the k-th strongest of the rows' strongest patches. [Coombe03, 3.4]
 //
 // The polygon is the patch's own parallelogram, so that neighbouring patches tile their surface exactly. Visibility is
 // sampled from the middle of the residual, or where part of the patch holds none (something stands on it), or the patch
@@ -127,12 +127,12 @@ Shooter shooter_from_patch(ivec2 corner_px) {
 }
 
 void main() {
-    int shot = int(gl_FragCoord.x);
+    int shot = int(gl_FragCoord.y);
     vec4 row = ranked_row(shot);
     Shooter s;
     s.size_px = 0;
     s.power = 0.0;
     if (row.x > 0.0 && (shot == 0 || row.x >= WEAKEST * ranked_row(0).x))
         s = shooter_from_patch(ivec2(row.yz) * SIZE);
-    out_row = s.size_px > 0 ? shooter_row(s, int(gl_FragCoord.y)) : vec4(0.0);
+    out_row = s.size_px > 0 ? shooter_row(s, int(gl_FragCoord.x)) : vec4(0.0);
 }

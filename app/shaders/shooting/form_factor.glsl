@@ -1,11 +1,10 @@
 // Form factor F from a point (position, normal) to the shooter's polygon, without visibility.
 #define DISC 0
 #define DISC_SUBDIVISION 1
+#define NEAR_FIELD 0
+#include "shooting/far_field.glsl"
 
 const float TWO_PI = 6.28318530717958647692;
-// Where the longest edge is below this share of the distance (squared: 1/8), four Gauss points replace the closed form: F is then
-// right within 0.15 % on average, without bias (4e-5). See tests/gpu/test_form_factor.py.
-const float FAR_RATIO = 0.125;
 const float GAUSS = 0.28867513459481287;  // 1 / (2 √3): two-point rule on [-1/2, 1/2]
 
 // Lambert's contour sum, one edge: the angle under which it is seen, times the height of its normal. [Lambert1760; Baum89]
@@ -75,12 +74,14 @@ float disc_form_factor(vec3 centre, vec3 normal, float height, Shooter s) {
 float form_factor(vec3 position, vec3 normal, Shooter s) {
     vec3 centre = s.centre - position;
     float height = -dot(centre, s.normal);
-    if (height <= 0.0) return 0.0;
 #if DISC
-    return disc_form_factor(centre, normal, height, s);
+    float F = disc_form_factor(centre, normal, height, s);
+#elif NEAR_FIELD
+    // near the receiver, yet perhaps far from this texel
+    float F = in_far_field(s, dot(centre, centre)) ? far_form_factor(centre, normal, height, s)
+                                                   : polygon_form_factor(centre, normal, s);
 #else
-    float longest = max(dot(s.edge_u, s.edge_u), dot(s.edge_v, s.edge_v));
-    if (longest < FAR_RATIO * dot(centre, centre)) return far_form_factor(centre, normal, height, s);
-    return max(polygon_form_factor(centre, normal, s), 0.0);
+    float F = far_form_factor(centre, normal, height, s);
 #endif
+    return height > 0.0 ? max(F, 0.0) : 0.0;
 }

@@ -1,26 +1,70 @@
-// One quad per tile. A tile that the shooter's plane or its own plane hides entirely is not drawn.
-#include "common/tiles.glsl"
-#include "shooting/shooter.glsl"
+// One quad per receiver: a span of flat tiles, whose texels follow from its corner and edges, or a tile of any shape, whose
+// texels are read. What the shooter's plane or the receiver's own hides entirely is not drawn; nor is, in the near-field
+// pass, what lies in the far field, and the other way round.
+#define FLAT 1
+#define NEAR_FIELD 0
+#include "common/item.glsl"
+#include "common/atlas.glsl"
+#include "shooting/shooter_block.glsl"
+#include "shooting/far_field.glsl"
 
-uniform sampler2D t_shooters;
-uniform sampler2D t_tile_bounds;
-uniform int u_shot;
-uniform int u_columns;  // tiles in a row of the node set
-uniform vec2 u_size;    // of the node set [texels]
+uniform vec2 u_size;  // of the node set [texels]
+#if FLAT
+uniform sampler2D t_materials;
+#endif
 
-flat out Shooter v_shooter;
+in vec4 in_rect;  // corner and size in the node set [texels]
+in vec4 in_a;     // FLAT: position of the corner, facet     else: centre and radius of a bounding sphere
+in vec4 in_b;     // FLAT: ∂p/∂u per texel, material         else: mean normal, half thickness along it
+in vec4 in_c;     // FLAT: ∂p/∂v per texel, 0                else: 0
 
-bool hidden(Shooter s, vec4 sphere, vec4 plane) {
-    if (s.size_px == 0 || dot(sphere.xyz - s.centre, s.normal) < -sphere.w) return true;
-    float reach = 0.5 * (abs(dot(s.edge_u, plane.xyz)) + abs(dot(s.edge_v, plane.xyz)));
-    return dot(s.centre - sphere.xyz, plane.xyz) + reach < -plane.w;
+#if FLAT
+out vec3 v_position;
+flat out vec3 v_normal;
+flat out float v_facet;
+flat out vec3 v_albedo;
+#endif
+
+float support(Shooter s, vec3 axis) { return 0.5 * (abs(dot(s.edge_u, axis)) + abs(dot(s.edge_v, axis))); }
+
+#if FLAT
+bool hidden(Shooter s, vec3 normal, vec3 u, vec3 v) {
+    vec3 middle = in_a.xyz + 0.5 * (u + v) - s.centre;
+    float height = dot(middle, s.normal) + 0.5 * (abs(dot(u, s.normal)) + abs(dot(v, s.normal)));
+    return height <= COPLANAR || support(s, normal) - dot(middle, normal) <= COPLANAR;
 }
 
+float squared_distance(Shooter s, vec3 u, vec3 v) {
+    vec3 d = s.centre - in_a.xyz;  // u and v are orthogonal: charts of flat tiles are rectangles
+    float a = clamp(dot(d, u) / dot(u, u), 0.0, 1.0), b = clamp(dot(d, v) / dot(v, v), 0.0, 1.0);
+    vec3 nearest = d - a * u - b * v;
+    return dot(nearest, nearest);
+}
+#else
+bool hidden(Shooter s) {
+    if (dot(in_a.xyz - s.centre, s.normal) + in_a.w <= COPLANAR) return true;
+    return dot(s.centre - in_a.xyz, in_b.xyz) + support(s, in_b.xyz) + in_b.w <= COPLANAR;
+}
+
+float squared_distance(Shooter s) {
+    float d = max(distance(s.centre, in_a.xyz) - in_a.w, 0.0);
+    return d * d;
+}
+#endif
+
 void main() {
-    ivec2 tile = ivec2(gl_InstanceID % u_columns, gl_InstanceID / u_columns);
-    v_shooter = load_shooter(t_shooters, u_shot);
-    vec4 sphere = texelFetch(t_tile_bounds, tile * ivec2(2, 1), 0);
-    vec4 plane = texelFetch(t_tile_bounds, tile * ivec2(2, 1) + ivec2(1, 0), 0);
-    gl_Position = tile_corner(tile, u_size);
-    if (hidden(v_shooter, sphere, plane)) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+    Shooter s = this_shooter();
+    vec2 at = in_rect.zw * vec2(gl_VertexID & 1, gl_VertexID >> 1);
+    gl_Position = vec4((in_rect.xy + at) / u_size * 2.0 - 1.0, 0.0, 1.0);
+#if FLAT
+    vec3 u = in_b.xyz * in_rect.z, v = in_c.xyz * in_rect.w;
+    v_normal = normalize(cross(in_b.xyz, in_c.xyz));
+    v_position = in_a.xyz + at.x * in_b.xyz + at.y * in_c.xyz;
+    v_facet = in_a.w;
+    v_albedo = texelFetch(t_materials, ivec2(0, int(in_b.w)), 0).rgb;
+    bool drawn = !hidden(s, v_normal, u, v) && in_far_field(s, squared_distance(s, u, v)) != bool(NEAR_FIELD);
+#else
+    bool drawn = !hidden(s) && in_far_field(s, squared_distance(s)) != bool(NEAR_FIELD);
+#endif
+    if (s.size_px == 0 || !drawn) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }

@@ -19,6 +19,6 @@ void main() {
         out_report = vec4(0.0);
         for (int shot = 0; shot < textureSize(t_ledger, 0).x; ++shot) out_report += texelFetch(t_ledger, ivec2(shot, 0), 0);
     } else {
-        out_report = texelFetch(t_shooters, ivec2(0, entry - 2), 0);
+        out_report = texelFetch(t_shooters, ivec2(entry - 2, 0), 0);
     }
 }

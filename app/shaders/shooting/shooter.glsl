@@ -1,4 +1,4 @@
-// The record of one shooter, made by choose.frag.glsl: a column of t_shooters. See app/solvers/shooting/uniform.py.
+// The record of one shooter, made by choose.frag.glsl: a row of t_shooters. See app/solvers/shooting/uniform.py.
 struct Shooter {
     vec3 origin;     // where visibility is sampled from, solver frame
     float area;      // A_i, solver frame
@@ -17,13 +17,22 @@ struct Shooter {
 
 const int SHOOTER_ROWS = 7;
 
-Shooter load_shooter(sampler2D shooters, int shot) {
-    vec4 r0 = texelFetch(shooters, ivec2(shot, 0), 0), r1 = texelFetch(shooters, ivec2(shot, 1), 0);
-    vec4 r2 = texelFetch(shooters, ivec2(shot, 2), 0), r3 = texelFetch(shooters, ivec2(shot, 3), 0);
-    vec4 r4 = texelFetch(shooters, ivec2(shot, 4), 0), r5 = texelFetch(shooters, ivec2(shot, 5), 0);
-    vec4 r6 = texelFetch(shooters, ivec2(shot, 6), 0);
-    ivec2 patch_px = ivec2(r3.w, r4.w);
-    return Shooter(r0.xyz, r0.w, r1.xyz, uint(r1.w), r2.xyz, r2.w, r3.xyz, r4.xyz, r5.xyz, patch_px, int(r5.w), r6.xyz, r6.w);
+Shooter shooter_from_rows(vec4 rows[SHOOTER_ROWS]) {
+    Shooter s;
+    s.origin = rows[0].xyz;
+    s.area = rows[0].w;
+    s.normal = rows[1].xyz;
+    s.facet = uint(rows[1].w);
+    s.centre = rows[2].xyz;
+    s.power = rows[2].w;
+    s.edge_u = rows[3].xyz;
+    s.edge_v = rows[4].xyz;
+    s.patch_px = ivec2(rows[3].w, rows[4].w);
+    s.exitance = rows[5].xyz;
+    s.size_px = int(rows[5].w);
+    s.lead = rows[6].xyz;
+    s.reach = rows[6].w;
+    return s;
 }
 
 vec4 shooter_row(Shooter s, int row) {
@@ -34,6 +43,12 @@ vec4 shooter_row(Shooter s, int row) {
     if (row == 4) return vec4(s.edge_v, float(s.patch_px.y));
     if (row == 5) return vec4(s.exitance, float(s.size_px));
     return vec4(s.lead, s.reach);
+}
+
+Shooter load_shooter(sampler2D shooters, int shot) {
+    vec4 rows[SHOOTER_ROWS];
+    for (int row = 0; row < SHOOTER_ROWS; ++row) rows[row] = texelFetch(shooters, ivec2(row, shot), 0);
+    return shooter_from_rows(rows);
 }
 
 // Rows are the shooter's axes: +z its normal, +x along its first edge.

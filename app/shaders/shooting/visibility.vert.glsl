@@ -1,9 +1,6 @@
 // The scene as the shooter sees it: every view of the projection in one draw, one instance each. [Coombe03, 3.2]
 #include <projection>
-#include "shooting/shooter.glsl"
-
-uniform sampler2D t_shooters;
-uniform int u_shot;
+#include "shooting/shooter_block.glsl"
 
 in vec3 in_position;
 in uvec4 in_ids;
@@ -11,7 +8,7 @@ in uvec4 in_ids;
 flat out uvec2 v_facets;
 
 void main() {
-    Shooter s = load_shooter(t_shooters, u_shot);
+    Shooter s = this_shooter();
     project(gl_InstanceID, (in_position - s.origin) * world_axes(s));
     v_facets = in_ids.xy;
     // the shooter's own polygon is edge-on: nothing of it may cover the rim

@@ -6,13 +6,15 @@ import math
 
 from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
-from app.gpu import Gpu, Pass, Texture
+from app.gpu import Gpu, Pass
 from app.projections import PROJECTIONS
-from app.solvers.shooting.options import FORM_FACTORS, MAX_LEVEL, VISIBILITIES, ShootingOptions
+from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 
 BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
 OPEN, FAR = 0.0, 2.0  # item and depth of the open background, see common/item.glsl
 SHOOTER_ROWS = 7  # rows of t_shooters, see shooter.glsl
+BLOCK_BYTES = 256  # no driver asks for a coarser uniform block alignment
+BLOCK_ROWS = BLOCK_BYTES // 16  # columns of t_shooters
 REPORT_TEXELS = 2 + SHOOTER_ROWS  # see report.frag.glsl
 OPEN_BLOCK = 32  # visibility texels along the edge of a block that open.frag.glsl sums
 
@@ -21,8 +23,10 @@ class ShotBuffers:
     """What a shot writes besides the lightmap and does not depend on the options."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
+        self._gpu = gpu
         self.rows = gpu.texture((lightmap.rows, 1), 4, "f4")
-        self.shooters = gpu.texture((BATCH, SHOOTER_ROWS), 4, "f4")
+        self.shooters = gpu.texture((BLOCK_ROWS, BATCH), 4, "f4")
+        self.shooter_blocks = gpu.buffer(BATCH * BLOCK_BYTES)  # the same, as uniforms
         self.ledger = gpu.texture((BATCH, 2), 4, "f4")
         self.report = gpu.texture((REPORT_TEXELS, 1), 4, "f4")
         self.books = [gpu.texture((lightmap.columns, lightmap.rows), 4, "f4") for _ in range(3)]
@@ -33,14 +37,14 @@ class ShotBuffers:
         self.books_target = gpu.target(*self.books)
 
     def release(self) -> None:
-        release_all(self)
+        release_all(self._gpu, self)
 
 
 class ChoiceStages:
     """Choosing among the patches of one level."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, level: int) -> None:
-        self.level = level
+        self._gpu, self.level = gpu, level
         self.patch_size = (lightmap.size[0] >> level, lightmap.size[1] >> level)
         self.patches = gpu.texture(self.patch_size, 1, "f4")
         self.patch_target = gpu.target(self.patches)
@@ -49,14 +53,14 @@ class ChoiceStages:
         self.choose = Pass(gpu, "shooting/choose", defines={"LEVEL": level} | lightmap.defines("MATERIAL_BITS"))
 
     def release(self) -> None:
-        release_all(self)
+        release_all(self._gpu, self)
 
 
 class ShotStages:
     """Programs and maps that follow from the options: built anew when they change."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
-        self.projection = PROJECTIONS[options.projection]
+        self._gpu, self.projection = gpu, PROJECTIONS[options.projection]
         levels = range(options.level, (MAX_LEVEL if options.coarsen else options.level) + 1)
         self.choices = [ChoiceStages(gpu, lightmap, level) for level in levels]
         map_size = self.projection.size(options.resolution)
@@ -73,37 +77,42 @@ class ShotStages:
         reads = {"projection": self.projection.glsl}
         self.zero = Pass(gpu, "shooting/zero", defines=bits)
         self.see = Pass(gpu, "shooting/visibility", defines=resolution, slots={"projection": self.projection.clip_glsl})
-        self.receive = Pass(
-            gpu,
-            "shooting/receive",
-            defines=resolution
-            | lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE")
-            | {
-                "DISC": bool(FORM_FACTORS.index(options.form_factor)),
-                "DISC_SUBDIVISION": options.discs,
-                "VISIBILITY": VISIBILITIES.index(options.visibility),
-            },
-            slots=reads,
-        )
+        self.receive = {
+            (flat, near): self._receive(gpu, lightmap, options, flat=flat, near=near)
+            for flat in lightmap.receivers
+            for near in (False, True)
+        }
         self.add_open = Pass(gpu, "shooting/open", defines={"BLOCK": OPEN_BLOCK})
         self.enter = Pass(gpu, "shooting/ledger")
         self.tell = Pass(gpu, "shooting/report")
         weights_target = gpu.target(self.weights)
         Pass(gpu, "shooting/weights", defines=resolution, slots=reads).draw(weights_target)
-        weights_target.release()
+        gpu.release_all(weights_target)
         self.add_books = Pass(gpu, "shooting/books", defines=lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"))
 
+    def _receive(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, flat: bool, near: bool) -> Pass:
+        defines: dict[str, object] = {
+            "FLAT": flat,
+            "NEAR_FIELD": near,
+            "RESOLUTION": options.resolution,
+            "DISC": options.form_factor == "disc",
+            "DISC_SUBDIVISION": options.discs,
+            "VISIBILITY": VISIBILITIES.index(options.visibility),
+        }
+        defines |= lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE")
+        label = f"shooting/receive {'flat' if flat else 'shaped'} {'near' if near else 'far'}"
+        return Pass(gpu, "shooting/receive", defines=defines, slots={"projection": self.projection.glsl}, label=label)
+
     def choice(self, residual: float) -> ChoiceStages:
-        """The level that shoots when this share of the power is unshot. A patch twice as wide makes four times the error (of second
-        order in its width): a quarter of the power may shoot from it."""
+        """The level that shoots when this share of the power is unshot. A patch twice as wide makes four times the error
+        (of second order in its width): a quarter of the power may shoot from it."""
         return self.choices[min(int(-math.log(max(residual, 1e-12)) / math.log(4.0)), len(self.choices) - 1)]
 
     def release(self) -> None:
-        release_all(self)
+        release_all(self._gpu, self)
 
 
-def release_all(owner: object) -> None:
-    """Release every GL object that is an attribute of ``owner``, targets before their textures."""
+def release_all(gpu: Gpu, owner: object) -> None:
+    """Release every texture, buffer and target that is an attribute of ``owner``, or what those own that can be released."""
     values = [v for value in vars(owner).values() for v in (value if isinstance(value, list) else [value])]
-    for value in sorted((v for v in values if hasattr(v, "release")), key=lambda v: isinstance(v, Texture)):
-        value.release()
+    gpu.release_all(*(v for v in values if hasattr(v, "release") and v is not gpu))

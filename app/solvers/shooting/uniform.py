@@ -22,11 +22,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
-from app.gpu import Framebuffer, Gpu, ReadBack, Texture
+from app.gpu import Buffer, Framebuffer, Gpu, ReadBack, Texture
 from app.scene.model import F64
 from app.solvers.base import EnergyBook, StepReport
 from app.solvers.shooting.options import ShootingOptions
-from app.solvers.shooting.stages import BATCH, FAR, OPEN, SHOOTER_ROWS, ChoiceStages, ShotBuffers, ShotStages
+from app.solvers.shooting.stages import (
+    BATCH,
+    BLOCK_BYTES,
+    FAR,
+    OPEN,
+    SHOOTER_ROWS,
+    ChoiceStages,
+    ShotBuffers,
+    ShotStages,
+)
 
 REPORT_LAG = 2  # read-backs in flight before the oldest is looked at
 
@@ -45,8 +54,8 @@ class Shot:
 
 @dataclass(frozen=True)
 class Audit:
-    """What becomes of a shot, as shares of its power: received by texels, Σ A_j F_ji V_ji / A_i, sent out of the scene, and lost on
-    black sides that have no texels. Their sum should be 1."""
+    """What becomes of a shot, as shares of its power: received by texels, Σ A_j F_ji V_ji / A_i, sent out of the scene, and
+    lost on black sides that have no texels. Their sum should be 1."""
 
     received: float
     open: float
@@ -142,11 +151,10 @@ class UniformShooting:
         area = np.frombuffer(self.lightmap.texture("t_position_area").read(), np.float32).reshape(*weight.shape, 4)[
             ..., 3
         ]
-        for resource in (target, *scratch):
-            resource.release()
+        self.gpu.release_all(target, *scratch)
         self._look_out(0)
         blocks = np.frombuffer(self.stages.open.read(), np.float32).reshape(BATCH, -1, 2)[0].astype(np.float64).sum(0)
-        shooter = np.frombuffer(self.buffers.shooters.read(), np.float32).reshape(SHOOTER_ROWS, BATCH, 4)[:, 0]
+        shooter = np.frombuffer(self.buffers.shooters.read(), np.float32).reshape(BATCH, -1, 4)[0]
         received = float((area.astype(np.float64) * weight).sum() / shooter[0, 3])
         return Audit(received, float(blocks[0]), float(blocks[1]), self._shot_from_rows(shooter))
 
@@ -195,16 +203,16 @@ class UniformShooting:
             textures=self.lightmap.textures("t_position_area", "t_normal_ids", "t_residual", "t_facets")
             | {"t_rows": self.buffers.rows},
             uniforms={"u_rows": self.lightmap.rows},
-            viewport=(0, 0, shots, SHOOTER_ROWS),
+            viewport=(0, 0, SHOOTER_ROWS, shots),
         )
+        self.buffers.shooter_target.read_into(self.buffers.shooter_blocks, components=4, dtype="f4")
 
     def _see(self, shot: int) -> None:
         """Item buffer and depth from the shooter, all views in one draw. [Coombe03, 3.2; Cohen85]"""
         self.stages.visibility_target.clear(OPEN, FAR, depth=1.0)
         self.stages.see.draw(
             self.stages.visibility_target,
-            textures={"t_shooters": self.buffers.shooters},
-            uniforms={"u_shot": shot},
+            blocks=self._shooter_block(shot),
             mesh=self.lightmap.mesh,
             instances=self.stages.projection.views,
             depth=True,
@@ -214,16 +222,20 @@ class UniformShooting:
     def _receive(self, target: Framebuffer, shot: int, *, blend: str | None) -> None:
         """The shot's light on every texel that sees it. [Coombe03, eq. 1]"""
         lightmap = self.lightmap
-        surfaces = lightmap.textures("t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_tile_bounds")
-        maps = {"t_shooters": self.buffers.shooters, "t_map": self.stages.map}
-        self.stages.receive.draw(
-            target,
-            textures=surfaces | maps,
-            uniforms={"u_shot": shot, "u_columns": lightmap.columns, "u_size": lightmap.size},
-            vertices=6,
-            instances=lightmap.tiles,
-            blend=blend,
-        )
+        shaped = lightmap.textures("t_position_area", "t_normal_ids")
+        for (flat, _), receive in self.stages.receive.items():
+            textures = lightmap.textures("t_materials", "t_albedo") | {"t_map": self.stages.map}
+            receive.draw(
+                target,
+                textures=textures if flat else textures | shaped,
+                uniforms={"u_size": lightmap.size},
+                blocks=self._shooter_block(shot),
+                mesh=lightmap.receivers[flat],
+                blend=blend,
+            )
+
+    def _shooter_block(self, shot: int) -> dict[str, tuple[Buffer, int, int]]:
+        return {"ShooterBlock": (self.buffers.shooter_blocks, shot * BLOCK_BYTES, SHOOTER_ROWS * 16)}
 
     def _look_out(self, shot: int) -> None:
         """Add up how much of the shooter's sight leaves the scene."""

@@ -1,0 +1,162 @@
+"""Scenes of quads for the tests of the solver, and their solutions as plain arrays of the texels that cover a surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from app.atlas.lightmap import Lightmap
+from app.atlas.parametrize import parametrize
+from app.gpu import Gpu
+from app.scene.model import F64, Material, Scene
+from app.solvers import SOLVERS, EnergyBook, ShootingOptions, UniformShooting
+from app.solvers.shooting.uniform import BATCH, Audit
+
+UNIT_SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])  # faces +z
+ENOUGH = 20_000  # shots: a solve that needs more does not converge
+
+
+def quads_scene(quads: ArrayLike, materials: Sequence[Material], ids: Sequence[int] | None = None) -> Scene:
+    """Rectangles (n, 4, 3) of two triangles each, every one an object; ids (n,) of their materials."""
+    corners = np.asarray(quads, np.float64)
+    count = len(corners)
+    return Scene(
+        name="quads",
+        positions=corners.reshape(-1, 3),
+        triangles=(4 * np.arange(count)[:, None, None] + [[0, 1, 2], [0, 2, 3]]).reshape(-1, 3).astype(np.int32),
+        material_ids=np.repeat(np.zeros(count) if ids is None else ids, 2).astype(np.int32),
+        object_ids=np.repeat(np.arange(count), 2).astype(np.int32),
+        objects=tuple(f"quad {k}" for k in range(count)),
+        materials=tuple(materials),
+    )
+
+
+def grey(albedo: float, exitance: float = 0.0, *, double_sided: bool = False) -> Material:
+    """A grey material; exitance E [W/m²], not radiance."""
+    return Material("grey", (albedo,) * 3, (exitance / np.pi,) * 3, double_sided=double_sided)
+
+
+def room(size: ArrayLike = (1.0, 1.0, 1.0)) -> F64:
+    """The six walls (6, 4, 3) of a closed room, fronts inward: floor, ceiling (y), then x, then z."""
+    quads = []
+    for axis in (1, 0, 2):
+        for side in (0.0, 1.0):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            corners = np.zeros((4, 3))
+            corners[:, axis] = side
+            corners[:, u], corners[:, v] = (0, 1, 1, 0), (0, 0, 1, 1)
+            quads.append(corners if side == 0.0 else corners[::-1])
+    return np.array(quads) * np.asarray(size, np.float64)
+
+
+def table_room() -> Scene:
+    """A closed room 4 × 3 × 4 with a lamp under the ceiling and a table, on whose both sides light falls: direct light,
+    shadow and colour bleeding. Every edge is a multiple of 1/4, so that the same density always gives the same texels."""
+    lamp = [[1.5, 2.75, 1.5], [2.5, 2.75, 1.5], [2.5, 2.75, 2.5], [1.5, 2.75, 2.5]]  # faces down
+    table = [[0.5, 1.0, 0.5], [0.5, 1.0, 2.5], [2.0, 1.0, 2.5], [2.0, 1.0, 0.5]]  # faces up
+    materials = (
+        grey(0.6),
+        Material("red", (0.7, 0.2, 0.1)),
+        grey(0.2, 20.0),
+        grey(0.5, double_sided=True),
+    )
+    return quads_scene([*room((4.0, 3.0, 4.0)), lamp, table], materials, [0, 0, 1, 0, 0, 0, 2, 3])
+
+
+@dataclass
+class Solution:
+    """A lightmap with its solver. position (n, 3) [m], normal (n, 3), area (n,) [m²] and object (n,) of the texels that cover a
+    surface; ``H`` and ``r`` (n, 3) [W/m²] are read from the GPU anew."""
+
+    lightmap: Lightmap
+    solver: UniformShooting
+
+    def __post_init__(self) -> None:
+        surfaces = self.lightmap.nodes.surfaces
+        self._covered = surfaces.area > 0
+        self.position, self.normal = surfaces.position[self._covered], surfaces.normal[self._covered]
+        self.area: F64 = surfaces.area[self._covered]
+        triangle = self.lightmap.charts.face_triangle[surfaces.face[self._covered]]
+        self.object = self.lightmap.scene.object_ids[triangle]
+
+    @property
+    def H(self) -> F64:
+        return self.lightmap.irradiance()[self._covered].astype(np.float64)
+
+    @property
+    def r(self) -> F64:
+        return self.lightmap.residual()[self._covered].astype(np.float64)
+
+    @property
+    def B(self) -> F64:
+        return self.lightmap.radiosity()[self._covered].astype(np.float64)
+
+    @property
+    def albedo(self) -> F64:
+        return self.lightmap.albedo()[self._covered].astype(np.float64)
+
+    @property
+    def book(self) -> EnergyBook:
+        return self.solver.books()
+
+    def means(self, values: F64) -> F64:
+        """(objects, 3) area-weighted means, the two sides of an object together."""
+        weights = np.bincount(self.object, self.area)
+        return np.stack([np.bincount(self.object, self.area * v) / weights for v in values.T], -1)
+
+    def shoot(self, shots: int = ENOUGH) -> None:
+        """Up to so many shots more, or until converged."""
+        last = self.solver.shots + shots
+        while self.solver.shots < last and self.solver.report.residual > self.solver.options.residual:
+            self.solver.step(min(BATCH, last - self.solver.shots))
+            self.solver.poll()
+        self.solver.poll(wait=True)
+        assert self.solver.shots < ENOUGH, "did not converge"
+
+    def light_up(self) -> None:
+        """Give every texel the same residual, so that any patch can shoot."""
+        width, height = self.lightmap.size
+        self.lightmap.texture("t_residual").write(np.ones((height, width, 4), np.float32).tobytes())
+
+    def patches(self) -> NDArray[np.int64]:
+        """(p, 2) column and row of every patch of the shooting level that covers a surface."""
+        level = self.solver.options.level
+        area = self.lightmap.nodes.image_from_tiles(self.lightmap.nodes.surfaces.area[..., None])[..., 0]
+        height, width = (side >> level for side in area.shape)
+        covered = area.reshape(height, 1 << level, width, 1 << level).sum((1, 3)) > 0
+        return np.argwhere(covered)[:, ::-1]
+
+    def audits(self) -> list[Audit]:
+        """What becomes of a shot from each patch. Spoils the residual."""
+        self.light_up()
+        return [self.solver.audit((int(x), int(y))) for x, y in self.patches()]
+
+    def release(self) -> None:
+        self.solver.release()
+        self.lightmap.release()
+
+
+def begin(
+    gpu: Gpu,
+    scene: Scene,
+    *,
+    texels: int | None = None,
+    density: float | None = None,
+    solver: str = "shooting",
+    **options: object,
+) -> Solution:
+    """The scene before the first shot. options: of ShootingOptions."""
+    charts = parametrize(scene, texels=texels, density=density)
+    shooting = ShootingOptions().replace(**options)
+    lightmap = Lightmap.of(gpu, scene, charts, storage=shooting.storage)
+    return Solution(lightmap, SOLVERS[solver](gpu, lightmap, shooting))
+
+
+def solve(gpu: Gpu, scene: Scene, **options: object) -> Solution:
+    """``begin`` and shoot until converged."""
+    solution = begin(gpu, scene, **options)  # type: ignore[arg-type]
+    solution.shoot()
+    return solution
