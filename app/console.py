@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -12,29 +13,38 @@ from rich.console import Console as RichConsole
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 Tell = Callable[[str, float], None]  # what is being done, share done
+PATIENCE = 1.0  # seconds without a bar: what is over by then needs none
 
 
 class Console:
-    """Progress and warnings go to stderr, the result to stdout: as text, or as JSON with ``quiet``."""
+    """Progress and warnings go to stderr, the result to stdout: as text, or as JSON (which holds the warnings too)."""
 
-    def __init__(self, *, quiet: bool = False) -> None:
-        self._quiet = quiet
+    def __init__(self, *, as_json: bool = False) -> None:
+        self._as_json = as_json
         self._rich = RichConsole(stderr=True)
 
     @contextlib.contextmanager
     def progress(self, title: str) -> Iterator[Tell]:
-        """A bar while inside, gone afterwards; nothing where stderr is no terminal."""
-        if self._quiet or not self._rich.is_terminal:
+        """A bar while inside, gone afterwards; nothing where stderr is no terminal that can redraw a line."""
+        if not self._rich.is_interactive:
             yield lambda text, share: None
             return
         columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn()
-        with Progress(*columns, console=self._rich, transient=True) as bar:
-            task = bar.add_task(title, total=1.0)
+        bar = Progress(*columns, console=self._rich, transient=True, redirect_stdout=False, redirect_stderr=False)
+        task = bar.add_task(title, total=1.0)
+        start = threading.Timer(PATIENCE, bar.start)
+        start.daemon = True
+        start.start()
+        try:
             yield lambda text, share: bar.update(task, description=f"{title}: {text}", completed=share)
+        finally:
+            start.cancel()
+            start.join()  # else a bar could appear that nobody stops
+            bar.stop()
 
     def warn(self, text: str) -> None:
-        if not self._quiet:
+        if not self._as_json:
             print(f"glowtree: note: {text}", file=sys.stderr)
 
     def result(self, values: dict[str, Any], text: str) -> None:
-        print(json.dumps(values, indent=2) if self._quiet else text)
+        print(json.dumps(values, indent=2, allow_nan=False) if self._as_json else text)

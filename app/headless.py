@@ -29,7 +29,7 @@ SAMPLES = 2  # per pixel along each axis: smooth edges
 def shot(flags: argparse.Namespace) -> int:
     """Solve and save a picture."""
     _writable_file(flags.output)
-    console = Console(quiet=flags.json)
+    console = Console(as_json=flags.json)
     with gpu_context() as gpu:
         session = _solved(Session(gpu, **session_options(flags)), flags, console)
         _choose_camera(session, flags.camera)
@@ -49,7 +49,7 @@ def shot(flags: argparse.Namespace) -> int:
 def bake(flags: argparse.Namespace) -> int:
     """Solve and write scene.glb, irradiance.exr and report.json."""
     prepare_directory(flags.output)
-    console = Console(quiet=flags.json)
+    console = Console(as_json=flags.json)
     with gpu_context() as gpu:
         session = _solved(Session(gpu, **session_options(flags)), flags, console)
         clock = time.perf_counter()

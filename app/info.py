@@ -19,7 +19,7 @@ BYTES_PER_TEXEL = {"position, area": 16, "normal, ids": 8, "irradiance": 16, "re
 
 def info(flags: argparse.Namespace) -> int:
     """Print triangles, charts, texels and memory."""
-    console = Console(quiet=flags.json)
+    console = Console(as_json=flags.json)
     with console.progress("reading") as tell:
         scene, charts, _ = read_and_unfold(flags.scene, from_flags(AtlasOptions, flags), flags.light, tell)
     area = float(scene.normals_areas[1][charts.face_triangle].sum())

@@ -24,7 +24,7 @@ from app.scene.model import F64, I32, Scene
 
 Progress = Callable[[str, float], None]
 
-TEXELS_PER_FACE = 32
+TEXELS_PER_FACE = 8
 DEFAULT_TEXELS = (32_000, 2_000_000)  # from a plain room to what two cores still shoot at interactive rates
 MAX_TEXELS = 1 << 24
 WHOLE_PATCHES_FROM = 6  # texels: shorter sides of rectangles are not rounded to whole patches
@@ -58,7 +58,7 @@ def parametrize(
 ) -> Charts:
     """Unfold the lit sides of a scene into an atlas.
 
-    density [texels/m], or texels: how many to aim at; by default 32 for each lit side, within 32 000 and 2 million.
+    density [texels/m], or texels: how many to aim at; by default 8 for each lit side, within 32 000 and 2 million.
     Rectangles are made of whole patches, so that a small number of texels is met only roughly, and below one
     texel per chart not at all. time_limit [s] for xatlas. progress(stage, share) is called from time to time and may
     raise to cancel.

@@ -16,7 +16,7 @@ from app.gpu.context import Gpu
 from app.gpu.shader import ShaderError
 
 GL_CLIP_DISTANCE0 = 0x3000
-BLEND: dict[str, tuple[int, ...]] = {
+BLEND: dict[str, Any] = {
     "add": (moderngl.ONE, moderngl.ONE),
     "over": (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA),
 }
@@ -85,7 +85,7 @@ class Pass:
             self._uniforms[name].value = value
         ctx = self.gpu.ctx
         target.use()
-        target.viewport = viewport or (0, 0, *target.size)  # type: ignore[assignment]  # its stub says two numbers
+        target.viewport = viewport or (0, 0, *target.size)
         flags = (moderngl.BLEND if blend else 0) | (moderngl.DEPTH_TEST if depth else 0)
         ctx.enable_only(flags | moderngl.PROGRAM_POINT_SIZE)
         if blend:

@@ -45,13 +45,14 @@ class FrameRenderer:
         shooter: Rect | None = None,
         scale: Scale | None = None,
         samples: int = 1,
+        whole: bool = True,
     ) -> None:
         """Draw into the lower left ``size`` (width, height) [px] of ``target``.
 
         ambient: A [W/m²] for ``display.ambient``. shooter: the patch to mark for ``display.shooter``: (u, v, u, v) in
         atlas texels. scale: of the false colour; left out, it is found from the light, which waits for the GPU.
-        samples: per pixel along each axis; with more than one, every texel is brought up to date, else in a large
-        lightmap only some, in turn. Raises GpuError for a picture larger than a texture can be.
+        samples: per pixel along each axis. whole: show all light as it is now; False bounds the work of a frame, a large
+        lightmap is then brought up to date over several. Raises GpuError for a picture larger than a texture can be.
         """
         layer = display.layer
         if display.false_colour == "off":
@@ -72,7 +73,7 @@ class FrameRenderer:
             scale=scale,
             ambient=ambient,
             shooter=shooter,
-            whole=samples > 1,
+            whole=whole,
         )
         self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
         self._background.draw(picture.target, uniforms={"u_height_px": float(picture.size[1])}, depth=True)

@@ -22,7 +22,7 @@ from app.render.targets import release_targets
 from app.scene.model import RGB
 
 BORDERED = TILE + 2
-TEXELS_PER_FRAME = 1 << 18  # that are brought up to date in one frame, where not all must be
+TEXELS_PER_FRAME = 1 << 17  # that are brought up to date in one frame, where not all must be
 OUTSIDE = 0xFFFF  # a page that no atlas has
 T = TypeVar("T")
 
@@ -35,6 +35,7 @@ class DisplayTexels:
         self.size = (lightmap.columns * BORDERED, lightmap.rows * BORDERED)
         self._colour = gpu.texture(self.size, 4, "f1")
         self._target = gpu.target(self._colour)
+        self._target.clear()
         sides = np.array([m.double_sided for m in lightmap.scene.materials], np.uint32)
         self._unlit = gpu.texture((len(sides), 2), 4, "f1")
         self._unlit_target = gpu.target(self._unlit)
@@ -43,10 +44,12 @@ class DisplayTexels:
             "t_charts": self._chart_table(),
             "t_places": self._place_table(),
             "t_source": gpu.texture(self.size, 1, "u4"),
+            "t_leaves": self._leaf_table(),
         }
-        self._find_sources()
+        self._find_sources = Pass(gpu, "render/source")
+        self._source_target = gpu.target(self._tables["t_source"])
+        self._sourced_rows = 0
         self._passes: dict[tuple[str, Layer, str], Pass] = {}
-        self._shown: object = None  # what all texels have been resolved for
         self._next_row = 0
 
     def resolve(
@@ -54,14 +57,11 @@ class DisplayTexels:
     ) -> dict[str, Texture]:
         """Bring the display texels up to date; the textures that surfaces bind.
 
-        Where only the light has changed and not ``whole``, at most TEXELS_PER_FRAME are, in turn.
+        If not ``whole``, TEXELS_PER_FRAME of them, in turn.
         """
         layer, lightmap = LAYER_SHADERS[layer_name], self._lightmap
         shader, uniforms = curve(display, scale, exposed=layer.light is not None)
-        shown = (layer, shader, tuple(uniforms.items()))
-        first, rows = self._band(whole or shown != self._shown)
-        self._shown = shown
-
+        first, rows = self._band(whole)
         uniforms |= {
             "u_unit": lightmap.unit,
             "u_ambient": ambient,
@@ -83,17 +83,26 @@ class DisplayTexels:
         return {"t_display": self._colour, "t_unlit": self._unlit, "t_places": self._tables["t_places"]}
 
     def release(self) -> None:
-        release_targets(self._gpu, self._target, self._unlit_target)
+        release_targets(self._gpu, self._target, self._unlit_target, self._source_target)
         for texture in (self._colour, self._unlit, *self._tables.values()):
             texture.release()
 
     def _band(self, whole: bool) -> tuple[int, int]:
-        """First row and number of rows to resolve now."""
+        """First row and number of rows to resolve now; their sources are there."""
         height = self.size[1]
         rows = height if whole else max(1, min(height, TEXELS_PER_FRAME // self.size[0]))
         first = self._next_row if rows < height else 0
         rows = min(rows, height - first)
-        self._next_row = (first + rows) % height
+        end = first + rows
+        if end > self._sourced_rows:
+            self._find_sources.draw(
+                self._source_target,
+                textures={"t_leaves": self._tables["t_leaves"]} | self._lightmap.textures("t_pages", "t_position_area"),
+                uniforms={"u_columns": float(self._lightmap.columns)},
+                viewport=(0, self._sourced_rows, self.size[0], end - self._sourced_rows),
+            )
+            self._sourced_rows = end
+        self._next_row = end % height
         return first, rows
 
     def _pass(self, name: str, layer: Layer, shader: str) -> Pass:
@@ -121,20 +130,12 @@ class DisplayTexels:
         places[leaves.y, leaves.x] = np.stack([tile % lightmap.columns, tile // lightmap.columns], -1) * BORDERED + 1
         return self._gpu.texture((width, height), 2, "f4", places.tobytes())
 
-    def _find_sources(self) -> None:
-        """Which node-set texel each display texel copies."""
+    def _leaf_table(self) -> Texture:
+        """The page of each tile of the node set, RG32UI; OUTSIDE where the node set has room for more tiles."""
         lightmap, leaves = self._lightmap, self._lightmap.nodes.leaves
         pages = np.full((lightmap.rows * lightmap.columns, 2), OUTSIDE, np.uint32)
         pages[: lightmap.tiles] = np.stack([leaves.x, leaves.y], -1)
-        table = self._gpu.texture((lightmap.columns, lightmap.rows), 2, "u4", pages.tobytes())
-        target = self._gpu.target(self._tables["t_source"])
-        Pass(self._gpu, "render/source").draw(
-            target,
-            textures={"t_leaves": table} | lightmap.textures("t_pages", "t_position_area"),
-            uniforms={"u_columns": float(lightmap.columns)},
-        )
-        release_targets(self._gpu, target)
-        table.release()
+        return self._gpu.texture((lightmap.columns, lightmap.rows), 2, "u4", pages.tobytes())
 
 
 def declared(program: Pass, offered: dict[str, T]) -> dict[str, T]:

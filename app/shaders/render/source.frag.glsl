@@ -11,7 +11,8 @@ uniform float u_columns;
 layout(location = 0) out uint out_source;
 
 const ivec2 NEIGHBOURS[9] = ivec2[](
-    ivec2(0, 0), ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1), ivec2(1, 1), ivec2(-1, 1), ivec2(1, -1), ivec2(-1, -1));
+    ivec2(0, 0), ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1),
+    ivec2(1, 1), ivec2(-1, 1), ivec2(1, -1), ivec2(-1, -1));
 
 uint source_at(ivec2 atlas_px) {
     ivec2 page = atlas_px >> 4;

@@ -19,7 +19,7 @@ class ShootingOptions(Options):
 
     level: int = option(2, "mip level that shoots: patches of 2^level texels squared", minimum=0, maximum=MAX_LEVEL)
     coarsen: bool = option(
-        True, "one level up each time the residual falls to a quarter: weak light needs no fine patches"
+        True, "shoot from a level higher once the strongest patch is weak: faint light needs no fine patches"
     )
     residual: float = option(
         1e-3, "converged when this share of the emitted power is unshot", minimum=1e-9, maximum=1, logarithmic=True

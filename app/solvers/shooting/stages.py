@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, Pass
@@ -102,11 +100,6 @@ class ShotStages:
         defines |= lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE")
         label = f"shooting/receive {'flat' if flat else 'shaped'} {'near' if near else 'far'}"
         return Pass(gpu, "shooting/receive", defines=defines, slots={"projection": self.projection.glsl}, label=label)
-
-    def choice(self, residual: float) -> ChoiceStages:
-        """The level that shoots when this share of the power is unshot. A patch twice as wide makes four times the error
-        (of second order in its width): a quarter of the power may shoot from it."""
-        return self.choices[min(int(-math.log(max(residual, 1e-12)) / math.log(4.0)), len(self.choices) - 1)]
 
     def release(self) -> None:
         release_all(self._gpu, self)

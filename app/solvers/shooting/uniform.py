@@ -37,6 +37,9 @@ from app.solvers.shooting.stages import (
     ShotStages,
 )
 
+# With ``coarsen``, a shot should carry this share of the emitted power: about 4096 shots for each time that all light is
+# reflected, whatever the scene's size. Measured on the Cornell box: a quarter of the shots, error 1.8 % -> 2.4 %.
+FAINT = 2.0**-12
 REPORT_LAG = 2  # read-backs in flight before the oldest is looked at
 
 
@@ -77,7 +80,7 @@ class UniformShooting:
         self.buffers = ShotBuffers(gpu, lightmap)
         self.stages = ShotStages(gpu, lightmap, options)
         self.last_shot: Shot | None = None
-        self._reports: deque[tuple[int, ReadBack]] = deque()
+        self._reports: deque[tuple[int, ChoiceStages, ReadBack]] = deque()
         self.reset()
 
     # -- the solver's interface ----------------------------------------------------------------------------------------
@@ -87,6 +90,7 @@ class UniformShooting:
         self.lightmap.clear()
         self.buffers.ledger_target.clear()
         self._drop_reports()
+        self._choice = self.stages.choices[0]
         self.shots = 0
         self._emitted = self._tile_sums()[1][:3]
         self.report = StepReport(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
@@ -97,6 +101,7 @@ class UniformShooting:
         fresh = ShotStages(self.gpu, self.lightmap, options)
         self.stages.release()
         self.stages, self.options = fresh, options
+        self._choice = fresh.choices[0]
         if restart:
             self.lightmap.set_storage(options.storage)
             self.reset()
@@ -117,8 +122,8 @@ class UniformShooting:
     def poll(self, *, wait: bool = False) -> StepReport:
         """The newest report that has arrived: the state before the step that sent it; with ``wait`` that of the last step."""
         while self._reports and (wait or len(self._reports) > REPORT_LAG):
-            shots, readback = self._reports.popleft()
-            self._hear(shots, np.frombuffer(readback.take(), np.float32).reshape(-1, 4).astype(np.float64))
+            shots, choice, readback = self._reports.popleft()
+            self._hear(shots, choice, np.frombuffer(readback.take(), np.float32).reshape(-1, 4).astype(np.float64))
         return self.report
 
     def books(self) -> EnergyBook:
@@ -181,7 +186,7 @@ class UniformShooting:
 
     def _choose(self, shots: int) -> None:
         """Pick the strongest patches and zero them. [Coombe03, 3.4]"""
-        choice, buffers, lightmap = self.stages.choice(self.report.residual), self.buffers, self.lightmap
+        choice, buffers, lightmap = self._choice, self.buffers, self.lightmap
         choice.add_patches.draw(choice.patch_target, textures=lightmap.textures("t_position_area", "t_residual"))
         choice.add_rows.draw(
             buffers.row_target, textures={"t_patches": choice.patches}, uniforms={"u_width": choice.patch_size[0]}
@@ -265,12 +270,15 @@ class UniformShooting:
             buffers.report_target,
             textures={"t_rows": buffers.rows, "t_ledger": buffers.ledger, "t_shooters": buffers.shooters},
         )
-        self._reports.append((self.shots, ReadBack(self.gpu, buffers.report_target)))
+        self._reports.append((self.shots, self._choice, ReadBack(self.gpu, buffers.report_target)))
 
-    def _hear(self, shots: int, report: F64) -> None:
-        """report (2 + SHOOTER_ROWS, 4), see report.frag.glsl."""
+    def _hear(self, shots: int, choice: ChoiceStages, report: F64) -> None:
+        """report (2 + SHOOTER_ROWS, 4), see report.frag.glsl; choice: the level that it is about."""
         emitted = self._emitted.sum()
         residual = report[0, 0] * self._watt / emitted if emitted > 0 else 0.0
+        faint = report[0, 1] * self._watt < FAINT * emitted
+        if faint and choice is self._choice and choice is not self.stages.choices[-1]:
+            self._choice = self.stages.choices[self.stages.choices.index(choice) + 1]
         self.report = StepReport(shots, float(residual), report[1, :3] * self._watt)
         if report[2 + 5, 3] > 0:
             self.last_shot = self._shot_from_rows(report[2:])
@@ -301,7 +309,7 @@ class UniformShooting:
 
     def _drop_reports(self) -> None:
         while self._reports:
-            self._reports.popleft()[1].take()
+            self._reports.popleft()[-1].take()
 
 
 __all__ = ["BATCH", "Audit", "Shot", "UniformShooting"]

@@ -1,0 +1,138 @@
+"""The gallery: pictures of the scenes as ``glowtree shot`` draws them, against those in screenshots/.
+
+Compared on the software rasteriser only, whose arithmetic is the same everywhere; elsewhere the picture must be there,
+finite and not blank. A failure leaves picture and magnified difference in tests/screenshots/failed.
+``pytest --regenerate-screenshots`` is the only way to change a golden.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.atlas.options import AtlasOptions
+from app.gpu import Gpu
+from app.headless import picture
+from app.render.options import DisplayOptions
+from app.session import Session, Stop
+from app.solvers import ShootingOptions
+
+ROOT = Path(__file__).parent.parent.parent
+GOLDENS = ROOT / "screenshots"
+FAILED = Path(__file__).parent / "failed"
+WIDE, SQUARE = (640, 360), (400, 400)
+STEP = 3  # of 255: rounding to 8 bits, and what another LLVM's rounding of exp and log does after the tone curve
+SHARE = 0.005  # of the pixels may differ by more: a texel whose visibility test was decided by the last bit of a float
+MAGNIFIED = 8
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One golden. shots: taken when so many have been made; None: at the end. exposure [EV]; None: automatic."""
+
+    name: str
+    shots: int | None = None
+    camera: int = 0
+    exposure: float | None = None
+    display: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Reel:
+    """Pictures of one solve of one scene, in the order in which the light gets there."""
+
+    scene: str
+    texels: int
+    residual: float
+    pictures: tuple[Picture, ...]
+    size: tuple[int, int] = WIDE
+
+
+CORNELL_EV = 1.0  # one exposure for the whole series, so that it shows the light coming in
+REELS = (
+    Reel(
+        "cornell-box",
+        30_000,
+        2e-3,
+        (
+            Picture("light-after-20-shots", 20, exposure=CORNELL_EV),
+            Picture("light-after-200-shots", 200, exposure=CORNELL_EV),
+            Picture("layer-residual", 200, display={"layer": "residual"}),
+            Picture("cornell-box", exposure=CORNELL_EV),
+            Picture("layer-irradiance", display={"layer": "irradiance"}),
+            Picture("layer-charts", display={"layer": "charts"}),
+            Picture("layer-texels", display={"layer": "texels", "grid": True}),
+        ),
+        SQUARE,
+    ),
+    Reel("textured-room", 30_000, 5e-3, (Picture("textured-room"),)),
+    Reel(
+        "two-rooms",
+        30_000,
+        5e-3,
+        (
+            Picture("two-rooms"),
+            Picture("two-rooms-lit", camera=1),
+            Picture("false-colour-lux", display={"false_colour": "illuminance"}),
+        ),
+    ),
+    Reel("museum", 100_000, 1e-2, (Picture("museum"), Picture("museum-aisle", camera=1))),
+    Reel("grotto", 150_000, 2e-2, (Picture("grotto"),)),
+)
+
+
+@pytest.mark.parametrize("reel", REELS, ids=lambda reel: reel.scene)
+def test_the_gallery_looks_as_it_did(gpu: Gpu, reel: Reel, request: pytest.FixtureRequest) -> None:
+    regenerate = request.config.getoption("--regenerate-screenshots")
+    options = ShootingOptions(residual=reel.residual)
+    session = Session(gpu, shooting=options, atlas=AtlasOptions(texels=reel.texels))
+    try:
+        session.open_now(reel.scene)
+        images = {taken.name: _taken(session, taken, reel.size) for taken in reel.pictures}
+    finally:
+        session.release()
+    for name, image in images.items():
+        assert image.shape == (reel.size[1], reel.size[0], 3)
+        assert image.std() > 10 and image.max() > 100, f"{name} is blank"
+    if not gpu.software:
+        pytest.skip("goldens are compared on the software rasteriser only")
+    wrong = {}
+    for name, image in images.items():
+        if regenerate:
+            Image.fromarray(image).save(GOLDENS / f"{name}.png", optimize=True)
+        share = _differing(name, image)
+        if share > SHARE:
+            wrong[name] = f"{share:.2%}"
+    assert not wrong, f"so many pixels differ: {wrong}; see {FAILED}"
+
+
+def _taken(session: Session, taken: Picture, size: tuple[int, int]) -> np.ndarray[Any, Any]:
+    session.solve(Stop(shots=taken.shots))
+    session.look_through(session.scene.cameras[taken.camera])
+    session.display = DisplayOptions(**taken.display)
+    if taken.exposure is None:
+        session.expose()
+    else:
+        session.display = session.display.replace(exposure=taken.exposure)
+    return picture(session, size)
+
+
+def _differing(name: str, image: np.ndarray[Any, Any]) -> float:
+    """The share of pixels that differ from the golden; beyond SHARE, picture and difference are kept to look at."""
+    golden = np.asarray(Image.open(GOLDENS / f"{name}.png").convert("RGB"), int)
+    difference = np.abs(image.astype(int) - golden).max(axis=-1)
+    share = float((difference > STEP).mean())
+    paths = FAILED / f"{name}.png", FAILED / f"{name}-difference.png"
+    if share > SHARE:
+        FAILED.mkdir(exist_ok=True)
+        Image.fromarray(image).save(paths[0])
+        Image.fromarray(np.clip(difference * MAGNIFIED, 0, 255).astype(np.uint8)).save(paths[1])
+    else:
+        for stale in paths:
+            stale.unlink(missing_ok=True)
+    return share
