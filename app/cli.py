@@ -7,12 +7,16 @@ and exit code 2; Ctrl-C ends early, keeps what is there, and exits with 130.
 from __future__ import annotations
 
 import argparse
+import difflib
+import os
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from app import __version__
+from app.atlas.lightmap import STORAGE
 from app.atlas.options import AtlasOptions
 from app.errors import UserError
 from app.options import add_flags
@@ -23,7 +27,18 @@ DEFAULT_SCENE = "cornell-box"
 
 
 class Parser(argparse.ArgumentParser):
-    """argparse, with errors on one line."""
+    """argparse, with errors on one line. A flag must be written out, and one that is unknown is named with the nearest."""
+
+    def __init__(self, **keywords: Any) -> None:
+        super().__init__(**keywords, allow_abbrev=False)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        flags, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            known = re.findall(r"--[\w-]+", self.format_usage())
+            close = difflib.get_close_matches(unknown[0].split("=")[0], known, n=1)
+            self.error(f"unknown argument {unknown[0]}" + (f"; did you mean {close[0]}?" if close else ""))
+        return flags, unknown
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
@@ -34,13 +49,21 @@ def run(arguments: list[str]) -> int:
     flags = build_parser().parse_args(arguments or ["view"])
     command: Callable[[argparse.Namespace], int] = flags.command
     try:
-        return command(flags)
+        code = command(flags)
+        sys.stdout.flush()
+        return code
     except UserError as error:
         print(f"glowtree: {error}", file=sys.stderr)
         return 2
+    except MemoryError:
+        print("glowtree: not enough memory: ask for fewer --texels", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
-        print("glowtree: stopped", file=sys.stderr)
+        print("glowtree: stopped, nothing was written", file=sys.stderr)
         return 130
+    except BrokenPipeError:  # whoever read stdout has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
 
 
 def build_parser() -> Parser:
@@ -49,8 +72,9 @@ def build_parser() -> Parser:
     commands = parser.add_subparsers(required=True, metavar="command", parser_class=Parser)
 
     view = _scene_command(commands, "view", _view, "open the viewer", optional=True)
+    add_flags(view, ShootingOptions)
     view.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="window size (default 1280x720)")
-    view.add_argument("--frames", type=int, metavar="N", help="close after N frames (for tests)")
+    view.add_argument("--frames", type=_positive(int), metavar="N", help="close after N frames (for tests)")
     add_flags(view, DisplayOptions)
 
     shot = _scene_command(commands, "shot", _shot, "solve without a window and save a picture")
@@ -58,24 +82,32 @@ def build_parser() -> Parser:
     shot.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="picture size (default 1280x720)")
     shot.add_argument("--camera", metavar="NAME", help="a camera of the scene (default: its first)")
     shot.add_argument("--ui", action="store_true", help="draw the viewer's panels too")
+    _json_flag(shot)
+    add_flags(shot, ShootingOptions)
     _stop_flags(shot)
     add_flags(shot, DisplayOptions)
 
     bake = _scene_command(commands, "bake", _bake, "solve and write scene.glb, irradiance.exr and report.json")
     bake.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write")
+    _json_flag(bake)
+    add_flags(bake, ShootingOptions)
     _stop_flags(bake)
 
-    _scene_command(commands, "info", _info, "what a scene would take, before any work")
+    info = _scene_command(commands, "info", _info, "what a scene would take, before any work")
+    _json_flag(info)
+    info.add_argument(
+        "--storage", choices=tuple(STORAGE), default=ShootingOptions().storage, help="as for shot and bake"
+    )
 
     bench = commands.add_parser("bench", help="measure", description="Measure on this machine.")
     benches = bench.add_subparsers(required=True, metavar="what", parser_class=Parser)
     shots = benches.add_parser("shots", help="milliseconds per shot, by pass, at the papers' sizes")
-    shots.add_argument("--json", action="store_true", help="print JSON")
+    _json_flag(shots)
     add_flags(shots, ShootingOptions)
     shots.set_defaults(command=_bench_shots)
 
     doctor = commands.add_parser("doctor", help="what this machine has, and what is missing")
-    doctor.add_argument("--json", action="store_true", help="print JSON")
+    _json_flag(doctor)
     doctor.set_defaults(command=_doctor)
     return parser
 
@@ -95,11 +127,13 @@ def _scene_command(
     else:
         parser.add_argument("scene", help=scene_help)
     parser.add_argument("--light", action="store_true", help="add a ceiling light")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of text")
     add_flags(parser, AtlasOptions)
-    add_flags(parser, ShootingOptions)
     parser.set_defaults(command=command)
     return parser
+
+
+def _json_flag(parser: Parser) -> None:
+    parser.add_argument("--json", action="store_true", help="print JSON instead of text")
 
 
 def _stop_flags(parser: Parser) -> None:

@@ -17,10 +17,10 @@ PATIENCE = 1.0  # seconds without a bar: what is over by then needs none
 
 
 class Console:
-    """Progress and warnings go to stderr, the result to stdout: as text, or as JSON (which holds the warnings too)."""
+    """Progress and warnings go to stderr, the result to stdout: as text, or, ``quiet``, as JSON that holds the warnings too."""
 
-    def __init__(self, *, as_json: bool = False) -> None:
-        self._as_json = as_json
+    def __init__(self, *, quiet: bool = False) -> None:
+        self._quiet = quiet
         self._rich = RichConsole(stderr=True)
 
     @contextlib.contextmanager
@@ -43,8 +43,8 @@ class Console:
             bar.stop()
 
     def warn(self, text: str) -> None:
-        if not self._as_json:
+        if not self._quiet:
             print(f"glowtree: note: {text}", file=sys.stderr)
 
     def result(self, values: dict[str, Any], text: str) -> None:
-        print(json.dumps(values, indent=2, allow_nan=False) if self._as_json else text)
+        print(json.dumps(values, indent=2, allow_nan=False) if self._quiet else text)

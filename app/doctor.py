@@ -51,5 +51,5 @@ def doctor(flags: argparse.Namespace) -> int:
     values["missing"] = missing
     text = "\n".join(f"{name:>18}  {value}" for name, value in values.items() if name != "missing")
     verdict = "\n".join(missing) if missing else "Everything that is needed is there."
-    Console(as_json=flags.json).result(values, f"{text}\n\n{verdict}")
+    Console(quiet=flags.json).result(values, f"{text}\n\n{verdict}")
     return 2 if missing else 0

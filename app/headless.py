@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
+import contextlib
+import itertools
+import os
+import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,23 +20,30 @@ from app.atlas.options import AtlasOptions
 from app.bake import prepare_directory, write_bake
 from app.console import Console
 from app.errors import UserError
-from app.gpu import gpu_context
+from app.gpu import Gpu, gpu_context
 from app.headless_ui import pixels, ui_image
 from app.options import from_flags
+from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
+from app.scene.load import NO_LIGHT
 from app.session import Session, Stop
 from app.solvers import ShootingOptions
 
 SAMPLES = 2  # per pixel along each axis: smooth edges
 
 
-def shot(flags: argparse.Namespace) -> int:
-    """Solve and save a picture."""
-    _writable_file(flags.output)
-    console = Console(as_json=flags.json)
+def shot(flags: argparse.Namespace, note: str | None = None) -> int:
+    """Solve and save a picture. note: what else the user should know. Raises UserError."""
+    _check_file(flags.output)
+    console = Console(quiet=flags.json)
     with gpu_context() as gpu:
-        session = _solved(Session(gpu, **session_options(flags)), flags, console)
+        session = Session(gpu, **session_options(flags))
+        check_size(gpu, flags.size)
+        _open(session, flags.scene, console, note)
+        if flags.ui or LAYER_SHADERS[session.display.layer].light is not None:
+            _check_light(session)
         _choose_camera(session, flags.camera)
+        _solve(session, flags, console)
         if flags.exposure is None:
             session.expose()
         if flags.ui:
@@ -47,11 +58,13 @@ def shot(flags: argparse.Namespace) -> int:
 
 
 def bake(flags: argparse.Namespace) -> int:
-    """Solve and write scene.glb, irradiance.exr and report.json."""
-    prepare_directory(flags.output)
-    console = Console(as_json=flags.json)
-    with gpu_context() as gpu:
-        session = _solved(Session(gpu, **session_options(flags)), flags, console)
+    """Solve and write scene.glb, irradiance.exr and report.json. Raises UserError."""
+    console = Console(quiet=flags.json)
+    with _folder(flags.output), gpu_context() as gpu:
+        session = Session(gpu, **session_options(flags))
+        _open(session, flags.scene, console)
+        _check_light(session)
+        _solve(session, flags, console)
         clock = time.perf_counter()
         lightmap = session.lightmap
         irradiance = lightmap.atlas_image(lightmap.irradiance())
@@ -66,15 +79,17 @@ def bake(flags: argparse.Namespace) -> int:
 
 
 def view_or_shot(flags: argparse.Namespace) -> int:
-    """Open the viewer; without a display, render the same headless and say where."""
+    """Open the viewer; without a display, render the same headless and say where. Raises UserError for no such scene."""
+    from app.scene.load import scene_file
     from app.window import no_display
+
+    scene_file(flags.scene)
 
     if reason := no_display():
         flags.output = Path(f"{Path(flags.scene).stem}.png")
         flags.shots = flags.time = flags.camera = None
-        flags.ui = True
-        print(f"glowtree: {reason}: rendering headless to {flags.output}", file=sys.stderr)
-        return shot(flags)
+        flags.ui, flags.json = True, False
+        return shot(flags, f"no window can be opened here ({reason}): rendering to {flags.output} instead")
     return view(flags)
 
 
@@ -87,7 +102,7 @@ def view(flags: argparse.Namespace) -> int:
     from app.window import run_window
 
     def make_session(gpu: Any) -> Session:
-        session = Session(gpu, **session_options(flags))
+        session = Session(gpu, **session_options(flags), expose_on_open=flags.exposure is None)
         session.open(flags.scene)
         return session
 
@@ -115,9 +130,7 @@ def session_options(flags: argparse.Namespace) -> dict[str, Any]:
 
 def picture(session: Session, size: tuple[int, int]) -> np.ndarray:
     """(height, width, 3) u8 sRGB of the session as it is, top row first. Raises UserError for sizes beyond the GPU's."""
-    limit = session.gpu.limits.max_texture // SAMPLES
-    if max(size) > limit:
-        raise UserError(f"--size {size[0]}x{size[1]}: at most {limit} pixels along a side on this GPU")
+    check_size(session.gpu, size)
     texture = session.gpu.texture(size, 4, "f1")
     target = session.gpu.target(texture)
     try:
@@ -125,6 +138,13 @@ def picture(session: Session, size: tuple[int, int]) -> np.ndarray:
         return pixels(target, size)
     finally:
         session.gpu.release_all(target, texture)
+
+
+def check_size(gpu: Gpu, size: tuple[int, int]) -> None:
+    """Raise UserError for a picture whose samples do not fit a texture of this GPU."""
+    limit = gpu.limits.max_texture // SAMPLES
+    if max(size) > limit:
+        raise UserError(f"--size {size[0]}x{size[1]}: at most {limit} pixels along a side on this GPU")
 
 
 def report(session: Session) -> dict[str, Any]:
@@ -156,19 +176,25 @@ def report(session: Session) -> dict[str, Any]:
     }
 
 
-def _solved(session: Session, flags: argparse.Namespace, console: Console) -> Session:
+def _open(session: Session, scene: str, console: Console, note: str | None = None) -> None:
     with console.progress("loading") as tell:
-        session.open_now(flags.scene, tell)
-    for warning in (*session.scene.warnings, *session.charts.warnings):
+        session.open_now(scene, tell)
+    for warning in (*([note] if note else []), *session.scene.warnings, *session.charts.warnings):
         console.warn(warning)
-    if session.message:
-        console.warn(session.message)
+
+
+def _solve(session: Session, flags: argparse.Namespace, console: Console) -> None:
     stop = Stop(shots=flags.shots, seconds=flags.time)
     with console.progress("shooting") as tell:
         session.solve(
             stop, lambda stats: tell(f"{stats.shots} shots, {stats.residual:.3%} unshot", session.progress(stop))
         )
-    return session
+
+
+def _check_light(session: Session) -> None:
+    """Raise UserError where there is nothing to solve."""
+    if not session.scene.emits:
+        raise UserError(f"{session.source}: {NO_LIGHT}")
 
 
 def _choose_camera(session: Session, name: str | None) -> None:
@@ -176,23 +202,48 @@ def _choose_camera(session: Session, name: str | None) -> None:
         return
     cameras = {camera.name: camera for camera in session.scene.cameras}
     if name not in cameras:
-        raise UserError(f"--camera {name}: {session.name} has {', '.join(cameras)}")
+        raise UserError(f"--camera {name}: must be one of {', '.join(cameras)}")
     session.look_through(cameras[name])
 
 
-def _writable_file(path: Path) -> None:
+def _check_file(path: Path) -> None:
     """Raise UserError now rather than after the work."""
     if path.is_dir() or path.suffix.lower() != ".png":
         raise UserError(f"-o {path}: must be a .png file")
     if not path.parent.is_dir():
         raise UserError(f"-o {path}: the folder {path.parent} does not exist")
+    if path.exists() and not os.access(path, os.W_OK):
+        raise UserError(f"-o {path}: cannot be written")
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise UserError(f"-o {path}: cannot be written: {error.strerror or error}") from None
 
 
 def _save_png(path: Path, image: np.ndarray) -> None:
+    """Beside its name first, so that a picture is whole or not there."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        Image.fromarray(image).save(path)
+        Image.fromarray(image).save(partial, format="PNG")
+        partial.replace(path)
     except OSError as error:
-        raise UserError(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise UserError(f"-o {path}: cannot be written: {error.strerror or error}") from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def _folder(path: Path) -> Iterator[None]:
+    """A folder that can be written to; what was made of it is gone again if nothing came of it. Raises UserError."""
+    made = list(itertools.takewhile(lambda folder: not folder.exists(), (path, *path.parents)))
+    prepare_directory(path)
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):  # not empty: that is the normal case
+            for folder in made:
+                folder.rmdir()
 
 
 def _summary(result: dict[str, Any]) -> str:
@@ -203,4 +254,4 @@ def _summary(result: dict[str, Any]) -> str:
     )
 
 
-__all__ = ["bake", "picture", "report", "shot", "view", "view_or_shot"]
+__all__ = ["bake", "check_size", "picture", "report", "shot", "view", "view_or_shot"]

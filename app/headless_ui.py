@@ -5,6 +5,7 @@ The window draws every frame with it; a headless shot with ``--ui`` draws one.
 
 from __future__ import annotations
 
+import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,10 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from app.atlas.charts import TILE
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, ShaderError, Texture
 from app.gpu.imgui import ImguiRenderer
 from app.render.false_colour import Scale, colour_map, false_colour_scale
+from app.render.resolve import BORDERED, TEXELS_PER_FRAME
+from app.sampled import top_of_scale
 from app.ui import theme
 from app.ui.app import Ui
 from app.ui.state import Legend, Request
@@ -24,6 +28,7 @@ from app.ui.state import Legend, Request
 if TYPE_CHECKING:
     from app.session import Session
 
+FRAME_TEXELS = TEXELS_PER_FRAME / (BORDERED / TILE) ** 2  # of the lightmap, that a frame brings up to date
 LEGEND_COLOURS = 48
 SCALE_SHARE = 0.05  # of the time may go into finding the false-colour scale
 SCALE_SECONDS = 0.5  # between two searches, at least
@@ -36,10 +41,12 @@ SCREENSHOT = "glowtree-{:04d}.png"
 class UiFrame:
     """Owns the interface's renderer and the target of the 3-D view; borrows the interface. Whoever makes it releases
     it.
+
+    samples: of the view, per pixel along each axis. whole: show all light as it is now; False bounds the work of a frame.
     """
 
-    def __init__(self, gpu: Gpu, ui: Ui, *, samples: int = 1) -> None:
-        self._gpu, self._ui, self._samples = gpu, ui, samples
+    def __init__(self, gpu: Gpu, ui: Ui, *, samples: int = 1, whole: bool = True) -> None:
+        self._gpu, self._ui, self._samples, self._whole = gpu, ui, samples, whole
         ui.use()
         self._renderer = ImguiRenderer(gpu)
         self._present = Pass(gpu, "imgui/present")
@@ -70,7 +77,7 @@ class UiFrame:
         left, bottom, width, height = self._ui.view_rect
         texture, view_target = self._view_of(width, height)
         if session.opened:
-            session.draw(view_target, (width, height), scale=scale, samples=self._samples)
+            session.draw(view_target, (width, height), scale=scale, samples=self._samples, whole=self._whole)
         else:
             view_target.clear(*theme.PANEL)
         target.use()
@@ -87,6 +94,13 @@ class UiFrame:
             self._reload()
         return [r for r in requests if r is not Request.RELOAD_SHADERS]
 
+    def frames_to_show(self, session: Session) -> int:
+        """How many frames it takes until a change is seen everywhere."""
+        if self._whole or not session.opened:
+            return WARM_UP
+        width, height = session.lightmap.size
+        return WARM_UP + math.ceil(width * height / FRAME_TEXELS)
+
     def release(self) -> None:
         """Give back the GL objects. The interface is still usable by another renderer, or can be released."""
         self._ui.use()
@@ -101,10 +115,9 @@ class UiFrame:
         return self._view
 
     def _release_view(self) -> None:
-        self._gpu.ctx.detect_framebuffer(0).use()  # moderngl binds the last one used again, and must not find it gone
         if self._view is not None:
-            for resource in reversed(self._view):
-                resource.release()
+            self._gpu.release_all(*self._view)
+            self._view = None
 
     def _false_colour(self, session: Session) -> Scale | None:
         """The scale of what is shown. Finding its top reads all light back, so that is done only now and then."""
@@ -114,7 +127,8 @@ class UiFrame:
         asked = (session.lightmap, display.false_colour, display.false_colour_log, display.false_colour_max)
         now = time.perf_counter()
         if self._scale is None or asked != self._scale_of or (now >= self._scale_due and not display.false_colour_max):
-            self._scale = false_colour_scale(display, session.lightmap)
+            top = display.false_colour_max or top_of_scale(session.lightmap, display.false_colour)
+            self._scale = false_colour_scale(display.replace(false_colour_max=top), session.lightmap)
             self._scale_of = asked
             cost = time.perf_counter() - now
             self._scale_due = now + max(SCALE_SECONDS, cost / SCALE_SHARE)
@@ -155,8 +169,7 @@ def ui_image(gpu: Gpu, session: Session, size: tuple[int, int], *, measured: boo
     finally:
         frame.release()
         ui.release()
-        target.release()
-        texture.release()
+        gpu.release_all(target, texture)
 
 
 def pixels(target: Framebuffer, size: tuple[int, int]) -> NDArray[np.uint8]:

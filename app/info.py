@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 import argparse
+import math
 from typing import Any
 
-import numpy as np
-
-from app.atlas.charts import TILE
+from app.atlas.charts import TILE, Charts
+from app.atlas.lightmap import STORAGE
 from app.atlas.options import AtlasOptions
 from app.atlas.texels import uniform_leaves
 from app.console import Console
 from app.loading import read_and_unfold
 from app.options import from_flags
+from app.scene.model import Scene
 
-BYTES_PER_TEXEL = {"position, area": 16, "normal, ids": 8, "irradiance": 16, "residual": 16}
+SURFACE_BYTES = 24  # per texel: position and area, normal and ids
+TEXTURE_BYTES = 8  # per texel, for albedo and for emission
+FACET_BYTES = 32
+PAGE_BYTES = 4  # per cell of TILE×TILE texels of the atlas
+LEVELS = TILE.bit_length() - 1  # from tiles down to texels
 
 
 def info(flags: argparse.Namespace) -> int:
     """Print triangles, charts, texels and memory."""
-    console = Console(as_json=flags.json)
+    console = Console(quiet=flags.json)
     with console.progress("reading") as tell:
         scene, charts, _ = read_and_unfold(flags.scene, from_flags(AtlasOptions, flags), flags.light, tell)
-    area = float(scene.normals_areas[1][charts.face_triangle].sum())
-    leaves = uniform_leaves(charts)
-    texel_bytes = sum(BYTES_PER_TEXEL.values()) + 8 * _textured(scene)
+    tiles = len(uniform_leaves(charts))
     lower, upper = scene.bounds
     values: dict[str, Any] = {
         "scene": scene.name,
@@ -39,18 +42,29 @@ def info(flags: argparse.Namespace) -> int:
         "charts": charts.chart_count,
         "unfolded_by": charts.method,
         "texels_per_metre": charts.density,
-        "texels": int(np.round(area * charts.density**2)),
-        "tiles": len(leaves),
+        "texels": len(uniform_leaves(charts, LEVELS)),
+        "tiles": tiles,
         "atlas": list(charts.size),
-        "memory_mib": len(leaves) * TILE * TILE * texel_bytes / 2**20,
+        "memory_mib": _memory(scene, charts, tiles, flags.storage) / 2**20,
         "warnings": [*scene.warnings, *charts.warnings],
     }
-    lines = [f"{name.replace('_', ' '):>20}  {_text(value)}" for name, value in values.items() if value != []]
+    rows = [(name, value) for name, value in values.items() if name != "warnings"]
+    rows += [("warning", warning) for warning in values["warnings"]]
+    lines = [f"{name.replace('_', ' '):>20}  {_text(value)}" for name, value in rows]
     console.result(values, "\n".join(lines))
     return 0
 
 
-def _textured(scene: Any) -> int:
+def _memory(scene: Scene, charts: Charts, tiles: int, storage: str) -> int:
+    """Bytes that the lightmap will take on the GPU: its tiles, side by side in a square, and their tables."""
+    columns = math.isqrt(max(tiles - 1, 0)) + 1
+    texels = columns * -(-tiles // columns) * TILE * TILE
+    light = 2 * 4 * int(STORAGE[storage][1:])  # H and r, four channels of f4, f2 or f1
+    tables = FACET_BYTES * (charts.facet_count + 1) + PAGE_BYTES * math.prod(charts.size) // TILE**2
+    return texels * (SURFACE_BYTES + light + TEXTURE_BYTES * _textured(scene)) + tables
+
+
+def _textured(scene: Scene) -> int:
     """Colour textures that the texels need: of albedo and of emission."""
     albedo = any(m.albedo_texture is not None for m in scene.materials)
     emission = any(m.emission_texture is not None and m.emits for m in scene.materials)

@@ -13,6 +13,7 @@ from app.atlas.node_set import NodeSet
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
 from app.errors import UserError
+from app.sampled import first_exposure
 from app.scene.load import load_scene
 from app.scene.model import Scene
 
@@ -25,9 +26,10 @@ class CancelledError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A node set and how long each stage took [s]."""
+    """A node set, the exposure to open it with [EV], and how long each stage took [s]."""
 
     nodes: NodeSet
+    exposure: float
     seconds: dict[str, float]
 
 
@@ -53,8 +55,9 @@ def load(
     start = time.perf_counter()
     tell("cutting into texels", 0.6)
     nodes = NodeSet(scene, charts)
+    exposure = first_exposure(nodes)
     tell("done", 1.0)
-    return Loaded(nodes, seconds | {"texels": time.perf_counter() - start})
+    return Loaded(nodes, exposure, seconds | {"texels": time.perf_counter() - start})
 
 
 class Loading:

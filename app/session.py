@@ -6,8 +6,8 @@ A session owns scene, charts, lightmap and solver. It knows no window and no img
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,19 +20,21 @@ from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Texture
 from app.history import History
 from app.loading import CancelledError, Loaded, Loading, load
+from app.options import specs
 from app.picking import Picked, picked_from_hit
 from app.render.camera import CameraView
-from app.render.exposure import auto_exposure
 from app.render.false_colour import Scale
 from app.render.frame import FrameRenderer
 from app.render.items import ItemImage
 from app.render.options import DisplayOptions
 from app.render.surfaces import Rect
+from app.sampled import exposure_of
 from app.scene.model import RGB, Camera, Material, Scene
 from app.solvers import SOLVERS, EnergyBook, ShootingOptions
 from app.solvers.shooting.stages import BATCH
 
-BOOKS_EVERY = 0.5  # seconds between two looks at the energy book while shooting: it reads every texel
+BOOKS_SECONDS = 0.5  # between two looks at the energy book while shooting, at least: it reads every texel
+BOOKS_SHARE = 0.05  # of the time may go into it
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,10 @@ class Stats:
 
 
 class Session:
-    """Raises UserError (SceneError, GpuError) from ``open_now``; ``open`` reports through ``message`` instead."""
+    """Raises UserError (SceneError, GpuError) from ``open_now``; ``open`` reports through ``message`` instead.
+
+    expose_on_open: whether a scene that opens sets the exposure.
+    """
 
     def __init__(
         self,
@@ -75,12 +80,14 @@ class Session:
         atlas: AtlasOptions | None = None,
         display: DisplayOptions | None = None,
         default_light: bool = False,
+        expose_on_open: bool = False,
     ) -> None:
         self.gpu = gpu
         self.shooting = shooting or ShootingOptions()
         self.atlas = atlas or AtlasOptions()
         self.display = display or DisplayOptions()
         self.default_light = default_light
+        self.expose_on_open = expose_on_open
         self.renderer = FrameRenderer(gpu)
         self.items = ItemImage(gpu)
         self.running = True
@@ -93,19 +100,23 @@ class Session:
         self._last_advance = 0.0
         self._batch = 1
         self._books: EnergyBook
+        self._books_due = 0.0
+        self._settled = True
+        self._busy = False
+        self._swapping: Generator[None, None, None] | None = None
         self._opened = False
 
     # -- opening -------------------------------------------------------------------------------------------------------
 
     def open(self, source: str | Path) -> None:
         """Start to load in the background; ``poll`` swaps the scene when it is there."""
-        if self.loading is not None:
-            self.loading.cancel()
+        self._stop_loading()
         self.loading = Loading(source, self.atlas, default_light=self.default_light)
 
     def open_now(self, source: str | Path, progress: Callable[[str, float], None] | None = None) -> None:
         """Load and wait."""
-        self._swap(load(source, self.atlas, default_light=self.default_light, progress=progress))
+        for _ in self._swap(load(source, self.atlas, default_light=self.default_light, progress=progress)):
+            pass
 
     def set_atlas(self, atlas: AtlasOptions) -> None:
         """Cut the open scene anew, in the background."""
@@ -113,30 +124,57 @@ class Session:
         self.open(self.source)
 
     def poll(self) -> None:
-        """Once per frame: hear from the GPU, and swap in a scene that has finished loading."""
+        """Once per frame: hear from the GPU, and swap in a scene that has finished loading, a part of it per frame."""
+        self._busy = False
         if self.loading is not None and self.loading.ended:
-            ended, self.loading = self.loading, None
-            try:
-                self._swap(ended.result)
-            except CancelledError:
-                self.message = f"{ended.source}: loading stopped"
-            except UserError as error:
-                self.message = str(error)
-        if self._opened:
+            self._busy = True
+            self._swap_some(self.loading)
+        elif self._opened:
             self._hear()
 
-    def _swap(self, loaded: Loaded) -> None:
+    def _swap_some(self, loading: Loading) -> None:
+        """The next part of opening what was loaded; the scene that is open stays until the last."""
+        try:
+            if self._swapping is None:
+                self._swapping = self._swap(loading.result)
+            next(self._swapping)
+        except StopIteration:
+            self.loading = self._swapping = None
+        except CancelledError:
+            self.message = f"{loading.source}: loading stopped"
+            self.loading = None
+        except UserError as error:
+            self.message = str(error)
+            self.loading = self._swapping = None
+
+    def _swap(self, loaded: Loaded) -> Generator[None, None, None]:
+        """Open what was loaded, in parts that each take a fraction of it. Raises UserError; what is open stays then."""
         clock = time.perf_counter()
         lightmap = Lightmap(self.gpu, loaded.nodes, storage=self.shooting.storage)
-        solver = SOLVERS["shooting"](self.gpu, lightmap, self.shooting)
+        try:
+            self.gpu.ctx.finish()
+            yield
+            solver = SOLVERS["shooting"](self.gpu, lightmap, self.shooting)
+        except BaseException:  # also when the swap is given up between two parts
+            lightmap.release()
+            raise
         self.close()
         self.lightmap, self.solver = lightmap, solver
         self.load_seconds = loaded.seconds | {"upload": time.perf_counter() - clock}
         self.source = self.scene.source or self.scene.name
         self.look_through(self.scene.cameras[0])
+        if self.expose_on_open:
+            self.display = self.display.replace(exposure=_in_range(loaded.exposure))
         self.message = None if self.scene.emits else f"{self.scene.name} has no light: try --light for a ceiling light"
         self._opened = True
-        self._begin()
+        self._begin(self.solver.books())
+
+    def _stop_loading(self) -> None:
+        if self.loading is not None:
+            self.loading.cancel()
+        if self._swapping is not None:
+            self._swapping.close()
+        self.loading = self._swapping = None
 
     def close(self) -> None:
         """Release the open scene; the session can open another."""
@@ -146,8 +184,7 @@ class Session:
             self._opened = False
 
     def release(self) -> None:
-        if self.loading is not None:
-            self.loading.cancel()
+        self._stop_loading()
         self.close()
         self.renderer.release()
         self.items.release()
@@ -176,10 +213,22 @@ class Session:
     def converged(self) -> bool:
         return self.solver.report.residual <= self.shooting.residual
 
+    @property
+    def shooting_goes_on(self) -> bool:
+        """Whether ``advance`` has something to do."""
+        return self._opened and self.running and not self.converged
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing changes by itself: neither light nor numbers, and no scene is on its way."""
+        return self.loading is None and not self.shooting_goes_on and self._settled
+
     def advance(self, *, budget_ms: float, shots: int = 1) -> int:
-        """Make up to ``shots`` shots within ``budget_ms``; returns how many. None when paused or converged."""
-        if not self._opened or not self.running or self.converged:
+        """Make up to ``shots`` shots within ``budget_ms``; returns how many. None when paused or converged, nor in a frame that
+        has already done something long."""
+        if not self._opened or self._busy or not self.shooting_goes_on:
             return 0
+        self._settled = False
         made, start = 0, time.perf_counter()
         while made < shots:
             made += self.solver.step(min(shots - made, self._batch))
@@ -196,6 +245,7 @@ class Session:
     def shoot_once(self) -> None:
         """One shot, also when paused."""
         self.solver.step(1)
+        self._settled = False
 
     def solve(self, stop: Stop, progress: Callable[[Stats], None] | None = None) -> None:
         """Shoot until ``stop``, or until converged; ``progress`` hears of it a few times a second."""
@@ -235,7 +285,8 @@ class Session:
     def settle(self) -> None:
         """Wait for the GPU and bring report, book and history up to the last shot."""
         self.solver.poll(wait=True)
-        self._books = self.solver.books()
+        self._make_books()
+        self._settled = True
         emitted = float(self._books.emitted.sum())
         if emitted > 0:
             unshot, escaped = float(self._books.unshot.sum()) / emitted, float(self._books.escaped.sum()) / emitted
@@ -244,16 +295,17 @@ class Session:
     def restart(self) -> None:
         """Forget all light and begin again."""
         self.solver.reset()
-        self._begin()
+        nothing = np.zeros(3)
+        self._begin(replace(self._books, absorbed=nothing, escaped=nothing, unshot=self._books.emitted))
 
     def set_shooting(self, options: ShootingOptions) -> None:
         """Other knobs, from the next shot on; only another storage format begins again."""
-        restart = options.storage != self.shooting.storage
+        begins = options.storage != self.shooting.storage
         self.shooting = options
         if self._opened:
             self.solver.set_options(options)
-            if restart:
-                self._begin()
+            if begins:
+                self._begin(self.solver.books())
 
     def set_material(self, index: int, material: Material) -> None:
         """Another albedo or emission: charts and texels stay, the light begins again."""
@@ -261,26 +313,40 @@ class Session:
         materials[index] = material
         self.lightmap.set_materials(tuple(materials))
         self.restart()
+        self._books_due = 0.0
+        self._settled = False
 
-    def _begin(self) -> None:
+    def _begin(self, books: EnergyBook) -> None:
+        """books: with nothing shot."""
         self.seconds, self._last_advance = 0.0, 0.0
         self._batch = 1
-        self._books = self.solver.books()
-        self._books_time = time.perf_counter()
+        self._books = books
+        self._books_due = time.perf_counter() + BOOKS_SECONDS
+        self._settled = True
         self.history = History()
         self.history.add(0, 0.0, self.solver.report.residual, 0.0)
 
     def _hear(self, books: bool = True) -> None:
+        """Take in what the solver reports; the energy book now and then, and once when shooting has stopped."""
         before = self.solver.report.shots
         report = self.solver.poll()
-        if not self.running or self.converged:
+        if not self.shooting_goes_on:
             self._last_advance = 0.0
-        if books and report.shots != before and time.perf_counter() - self._books_time > BOOKS_EVERY:
-            self._books = self.solver.books()
-            self._books_time = time.perf_counter()
-        if report.shots != before:
+            if books and not self._settled:
+                self._busy = True
+                self.settle()
+        elif books and time.perf_counter() >= self._books_due:
+            self._busy = True
+            self._make_books()
+        if report.shots != before and not self._settled:
             escaped = float(report.escaped.sum()) / max(float(self._books.emitted.sum()), 1e-300)
             self.history.add(report.shots, self.seconds, report.residual, escaped)
+
+    def _make_books(self) -> None:
+        start = time.perf_counter()
+        self._books = self.solver.books()
+        now = time.perf_counter()
+        self._books_due = now + max(BOOKS_SECONDS, (now - start) / BOOKS_SHARE)
 
     # -- what is known -------------------------------------------------------------------------------------------------
 
@@ -330,8 +396,16 @@ class Session:
         distance = float(np.linalg.norm(np.asarray(camera.world_from_camera)[:3, 3] - self.lightmap.frame.centre))
         self.view = CameraView.from_camera(camera, distance)
 
-    def draw(self, target: Framebuffer, size: tuple[int, int], *, scale: Scale | None = None, samples: int = 1) -> None:
-        """The picture of the solution as it is now."""
+    def draw(
+        self,
+        target: Framebuffer,
+        size: tuple[int, int],
+        *,
+        scale: Scale | None = None,
+        samples: int = 1,
+        whole: bool = True,
+    ) -> None:
+        """The picture of the solution as it is now; if not ``whole``, brought up to date over several frames."""
         self.renderer.render(
             target,
             size,
@@ -342,11 +416,13 @@ class Session:
             shooter=self._shooter_rect,
             scale=scale,
             samples=samples,
+            whole=whole,
         )
 
     def expose(self) -> None:
         """Set the exposure from the light of the scene."""
-        self.display = self.display.replace(exposure=auto_exposure(self.lightmap))
+        mean_residual = self._books.unshot / max(self._books.area, 1e-300)
+        self.display = self.display.replace(exposure=_in_range(exposure_of(self.lightmap, mean_residual)))
 
     @property
     def _ambient(self) -> RGB | None:
@@ -367,3 +443,10 @@ class Session:
     def hemicube_image(self) -> Texture:
         """The last shooter's visibility map, in one colour per facet."""
         return self.items.draw(self.solver.inspect()["visibility"])
+
+
+def _in_range(exposure: float) -> float:
+    """An exposure that the display takes: a scene lit by next to nothing is not exposed any longer."""
+    spec = next(s for s in specs(DisplayOptions) if s.name == "exposure")
+    assert spec.minimum is not None and spec.maximum is not None
+    return min(max(exposure, spec.minimum), spec.maximum)

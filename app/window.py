@@ -7,12 +7,13 @@ Events go to Dear ImGui through its queue, so that a press shorter than a frame 
 from __future__ import annotations
 
 import string
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
-from moderngl_window import activate_context, run_window_config_instance
+from moderngl_window import activate_context
 from moderngl_window.context.base import WindowConfig
 from moderngl_window.timers.clock import Timer
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 GL_VERSION = (4, 1)
 TITLE = "Glowtree"
+AWAKE_SECONDS = 1.0  # that frames go on after the last event: tooltips appear, scroll bars settle
+REST_SECONDS = 0.5  # between two looks around at rest; an event ends the rest at once
 NOWHERE = -3.4e38  # where Dear ImGui has the mouse when it is outside the window
 BUTTONS = {1: 0, 2: 1, 3: 2}  # left, right, middle: moderngl-window to Dear ImGui
 MODIFIERS = {
@@ -55,6 +58,11 @@ KEY_NAMES = {
     **{f"F{i}": f"f{i}" for i in range(1, 13)},
     **{letter: letter.lower() for letter in string.ascii_uppercase},
 }
+# pyglet's events after which the window is drawn again
+EVENTS = """
+    on_key_press on_key_release on_text on_mouse_motion on_mouse_drag on_mouse_press on_mouse_release on_mouse_scroll
+    on_mouse_enter on_mouse_leave on_file_drop on_resize on_expose on_show on_activate on_deactivate on_close
+""".split()
 CURSORS = {
     imgui.MouseCursor_.arrow: "CURSOR_DEFAULT",
     imgui.MouseCursor_.text_input: "CURSOR_TEXT",
@@ -96,10 +104,9 @@ def run_window(
         window.close()
         raise
     ui = Ui(scale=_text_scale(window), layout_file=layout_file, scenes=scenes, suffixes=suffixes)
-    frame = UiFrame(gpu, ui)
+    frame = UiFrame(gpu, ui, whole=False)
     try:
-        config = ViewerWindow(window, timer, session, frame, ui, frames)
-        run_window_config_instance(config)
+        ViewerWindow(window, timer, session, frame, ui, frames).run()
     finally:
         frame.release()
         ui.release()
@@ -159,6 +166,7 @@ class ViewerWindow(WindowConfig):
         self._held: set[imgui.Key] = set()
         self._cursor: int | None = None
         self._caption = ""
+        self._awake_until, self._frames_due = 0.0, 0
         ui.use()
         platform = imgui.get_platform_io()
         platform.platform_get_clipboard_text_fn = lambda _context: self._pyglet.get_clipboard_text()
@@ -169,8 +177,34 @@ class ViewerWindow(WindowConfig):
             on_deactivate=self._on_deactivate,
             on_mouse_leave=lambda x, y: ui.io.add_mouse_pos_event(NOWHERE, NOWHERE),
         )
+        self._pyglet.push_handlers(**dict.fromkeys(EVENTS, self._wake))
 
-    # -- a frame -------------------------------------------------------------------------------------------------------
+    # -- frames --------------------------------------------------------------------------------------------------------
+
+    def run(self) -> None:
+        """Frame after frame until the window is closed; where nothing changes, wait for an event instead."""
+        import pyglet
+
+        self.timer.start()
+        while not self.wnd.is_closing:
+            if self._at_rest():
+                pyglet.app.platform_event_loop.step(REST_SECONDS)
+                continue
+            now, elapsed = self.timer.next_frame()
+            self.wnd.use()
+            self.wnd.render(now, min(elapsed, REST_SECONDS))
+            if not self.wnd.is_closing:
+                self.wnd.swap_buffers()
+
+    def _wake(self, *_: object) -> None:
+        self._awake_until = time.perf_counter() + AWAKE_SECONDS
+        self._frames_due = self._frame.frames_to_show(self._session)
+
+    def _at_rest(self) -> bool:
+        """Whether another frame would look like the last one."""
+        if not self._session.at_rest or self._ui.moving or self._frames_left is not None:
+            self._wake()
+        return time.perf_counter() > self._awake_until and self._frames_due <= 0
 
     def on_render(self, time: float, frame_time: float) -> None:
         """Collect what is ready, shoot within the budget, draw, do what was asked for."""
@@ -190,6 +224,7 @@ class ViewerWindow(WindowConfig):
                 self._screenshot()
             elif request is Request.QUIT:
                 self.wnd.is_closing = True
+        self._frames_due -= 1
         if self._frames_left is not None:
             self._frames_left -= 1
             if self._frames_left <= 0:

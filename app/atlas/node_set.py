@@ -19,7 +19,8 @@ Array = NDArray[np.generic]
 ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 MAX_FACETS = (1 << 24) - 2  # item ids are held as floats, see common/item.glsl
-TABLE_WIDTH = 2048  # columns of the facet table
+TABLE_WIDTH = 2048  # columns of the facet and side tables
+UNCHARTED = 16777215.0  # item of a side that has no texels, see common/item.glsl
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +126,7 @@ class NodeSet:
             "t_pages": pages,
             "t_facets": self._facet_table(),
             "t_materials": self.material_table(self.scene),
+            "t_sides": self._side_table(),
         }
 
     def _facet_table(self) -> F32:
@@ -135,6 +137,18 @@ class NodeSet:
         table[2 : 2 * len(dpdu) + 2 : 2, :3] = dpdu
         table[3 : 2 * len(dpdv) + 3 : 2, :3] = dpdv
         return table.reshape(rows, TABLE_WIDTH, 4)
+
+    def _side_table(self) -> F32:
+        """(rows, TABLE_WIDTH, 2): per triangle the item of its front and of its back: facet from 1, or UNCHARTED."""
+        count = len(self.scene.triangles)
+        table = np.full((-(-count // TABLE_WIDTH) * TABLE_WIDTH, 2), UNCHARTED, np.float32)
+        table[self.charts.face_triangle, self.charts.face_back.astype(int)] = self.charts.face_facet + 1
+        return table.reshape(-1, TABLE_WIDTH, 2)
+
+    @property
+    def corner_positions(self) -> F32:
+        """(n, 3) f32: where the scene's vertices are in the solver frame; ``scene.triangles`` index them."""
+        return self.frame.local_from_world(self.scene.positions).astype(np.float32)
 
     def _receivers(self) -> tuple[F32, F32]:
         s, charts = self.surfaces, self.charts

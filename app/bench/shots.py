@@ -1,8 +1,9 @@
-"""``glowtree bench shots``: milliseconds per shot, by pass, at the three sizes of [Coombe03, table 1].
+"""``glowtree bench shots``: milliseconds per shot, by pass, at the sizes of [Coombe03, table 1]: 31K, 172K and 1.6M texels.
 
-Every pass is timed by the clock around ``glFinish``, alone, many times; its cost is the median. The whole shot is timed the same
-way, in batches as the headless solver shoots. Bandwidth is what the receiver pass must move at least (read 24 and blend 2·32
-bytes per texel that is not hidden) against a copy of the same textures measured in the same run.
+The Cornell box is cut three times, then a museum and a grotto of the paper's sizes. A shot is timed in batches, as the headless
+solver shoots, and alone, as the viewer does; the passes one by one, each to the end of its GPU work, for the shooters that the
+solve chooses. Every figure is a median. Bandwidth is what the receiver pass must move at least: H and r of each texel that
+gets light, read and written, and of shaped tiles position, area, normal and ids; beside it a plain copy in the same run.
 """
 
 from __future__ import annotations
@@ -25,9 +26,16 @@ from app.options import from_flags
 from app.solvers import ShootingOptions, UniformShooting
 from app.solvers.shooting.stages import BATCH
 
-SIZES = (("cornell-box", 31_000), ("museum", 172_000), ("grotto", 1_600_000))  # the paper's Cornell, Museum, Grotto
-SECONDS = 1.0  # per pass and size
-RECEIVE_BYTES = 24 + 2 * 32  # position, area, normal, ids; H and r read and written, in RGBA32F
+SIZES = (
+    ("cornell-box", 31_000),
+    ("cornell-box", 172_000),
+    ("cornell-box", 1_600_000),
+    ("museum", 172_000),
+    ("grotto", 1_600_000),
+)
+SECONDS = 3.0  # per figure and size
+BLEND_BYTES = 2 * 32  # H and r read and written, RGBA32F
+READ_BYTES = 16 + 8  # position, area; normal, ids
 
 
 def bench_shots(flags: argparse.Namespace) -> int:
@@ -49,11 +57,11 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions) -> dict
     lightmap = Lightmap(gpu, nodes, storage=options.storage)
     solver = UniformShooting(gpu, lightmap, options)
     solver.step(BATCH)
-    shot_ms = median_ms(gpu, lambda: solver.step(BATCH), SECONDS * 2) / BATCH
-    single_ms = median_ms(gpu, lambda: solver.step(1), SECONDS * 2)
-    passes = {label: median_ms(gpu, run, SECONDS) for label, run in solver.passes().items()}
-    copied = copy_bandwidth(gpu, lightmap.size)
-    moved = RECEIVE_BYTES * lightmap.texel_count / (passes["receive"] * 1e-3)
+    shot_ms = _median_ms(gpu, lambda: solver.step(BATCH)) / BATCH
+    single_ms = _median_ms(gpu, lambda: solver.step(1))
+    passes, received = _passes(gpu, solver)
+    shaped = len(nodes.shaped_tiles) / max(nodes.tiles, 1)
+    moved = received * (BLEND_BYTES + shaped * READ_BYTES) / (passes["receive"] * 1e-3)
     row = {
         "scene": name,
         "triangles": len(nodes.scene.triangles),
@@ -62,44 +70,56 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions) -> dict
         "single_shot_ms": single_ms,
         "pass_ms": passes,
         "receive_gb_per_s": moved * 1e-9,
-        "copy_gb_per_s": copied * 1e-9,
+        "copy_gb_per_s": copy_bandwidth(gpu, lightmap.size) * 1e-9,
     }
     solver.release()
     lightmap.release()
     return row
 
 
-def median_ms(gpu: Gpu, run: Callable[[], object], seconds: float) -> float:
-    """Median wall time of ``run`` to the end of its GPU work [ms], over about so many seconds."""
-    run()
+def _median_ms(gpu: Gpu, run: Callable[[], object]) -> float:
+    """Median wall time of ``run`` to the end of its GPU work [ms]."""
     gpu.ctx.finish()
     times: list[float] = []
-    end = time.perf_counter() + seconds
+    end = time.perf_counter() + SECONDS
     while time.perf_counter() < end or len(times) < 5:
-        start = time.perf_counter()
-        run()
-        gpu.ctx.finish()
-        times.append((time.perf_counter() - start) * 1e3)
+        times.append(_ms(gpu, run))
     return statistics.median(times)
 
 
+def _ms(gpu: Gpu, run: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    run()
+    gpu.ctx.finish()
+    return (time.perf_counter() - start) * 1e3
+
+
+def _passes(gpu: Gpu, solver: UniformShooting) -> tuple[dict[str, float], float]:
+    """Median milliseconds of each pass over the shooters of a solve, and the mean number of texels that get light."""
+    times: dict[str, list[float]] = {label: [] for label in solver.passes()}
+    samples = []
+    end = time.perf_counter() + SECONDS
+    while time.perf_counter() < end or len(samples) < 5:
+        for label, run in solver.passes().items():
+            query = gpu.ctx.query(samples=True)
+            with query:
+                times[label].append(_ms(gpu, run))
+            if label == "receive":
+                samples.append(query.samples)
+    return {label: statistics.median(values) for label, values in times.items()}, statistics.mean(samples)
+
+
 def _table(values: dict[str, Any]) -> str:
-    rows = values["sizes"]
-    labels = list(rows[0]["pass_ms"])
-    head = ["scene", "triangles", "texels", f"shot (of {BATCH})", "shot (of 1)", *labels, "receive GB/s", "copy GB/s"]
+    """Markdown."""
+    labels = list(values["sizes"][0]["pass_ms"])
+    head = ["scene", "triangles", "texels", f"shot, of {BATCH}", "shot, alone", *labels, "GB/s", "copy GB/s", "share"]
     lines = [head, ["---"] * len(head)]
-    for row in rows:
+    for row in values["sizes"]:
         numbers = [row["shot_ms"], row["single_shot_ms"], *(row["pass_ms"][label] for label in labels)]
-        rates = [row["receive_gb_per_s"], row["copy_gb_per_s"]]
-        lines.append(
-            [
-                row["scene"],
-                f"{row['triangles']:,}",
-                f"{row['texels']:,}",
-                *(f"{n:.2f}" for n in numbers),
-                *(f"{r:.1f}" for r in rates),
-            ]
-        )
+        rates = row["receive_gb_per_s"], row["copy_gb_per_s"]
+        cells = [row["scene"], f"{row['triangles']:,}", f"{row['texels']:,}", *(f"{n:.2f}" for n in numbers)]
+        lines.append([*cells, *(f"{rate:.1f}" for rate in rates), f"{rates[0] / rates[1]:.0%}"])
     widths = np.max([[len(cell) for cell in line] for line in lines], axis=0)
     table = "\n".join("| " + " | ".join(c.rjust(w) for c, w in zip(line, widths, strict=True)) + " |" for line in lines)
-    return f"{values['renderer']}: ms per shot, and per pass of it (choose and zero: per batch of {BATCH})\n\n{table}"
+    note = f"ms per shot and per pass (choose, book: per batch of {BATCH}); GB/s: of the receiver pass"
+    return f"{values['renderer']}\n{note}\n\n{table}"

@@ -67,10 +67,8 @@ class ImguiRenderer:
             if texture.tex_id:
                 self._destroy(texture)
         self._io.backend_flags &= ~int(imgui.BackendFlags_.renderer_has_textures)
-        if self._array is not None:
-            self._array.release()
-        self._vertices.release()
-        self._indices.release()
+        array = () if self._array is None else (self._array,)
+        self._gpu.release_all(*array, self._vertices, self._indices)
         self._shown.clear()
 
     # -- textures that Dear ImGui owns ---------------------------------------------------------------------------------
@@ -93,7 +91,7 @@ class ImguiRenderer:
             self._destroy(data)
 
     def _destroy(self, data: imgui.ImTextureData) -> None:
-        self._own.pop(data.tex_id).release()
+        self._gpu.release_all(self._own.pop(data.tex_id))
         data.set_tex_id(0)
         data.set_status(imgui.ImTextureStatus.destroyed)
 
@@ -106,7 +104,7 @@ class ImguiRenderer:
         target.use()
         target.viewport = (0, 0, width, height)
         self._gpu.ctx.enable_only(moderngl.BLEND)
-        self._gpu.ctx.blend_func = BLEND["over"]  # type: ignore[assignment]  # four factors are legal; moderngl's stub is wrong
+        self._gpu.ctx.blend_func = BLEND["over"]
         first = 0
         for draw_list in data.cmd_lists:
             for command in draw_list.cmd_buffer:
@@ -139,7 +137,7 @@ class ImguiRenderer:
         stale = buffers != (self._vertices, self._indices) or self._generation != self._gpu.shaders.generation
         if self._array is None or stale:
             if self._array is not None:
-                self._array.release()
+                self._gpu.release_all(self._array)
             content = [(self._vertices, VERTEX_LAYOUT, "in_position", "in_uv", "in_colour")]
             self._array = self._gpu.ctx.vertex_array(program, content, index_buffer=self._indices)
             self._generation = self._gpu.shaders.generation
@@ -151,7 +149,7 @@ class ImguiRenderer:
     def _filled(self, buffer: moderngl.Buffer, content: bytes) -> moderngl.Buffer:
         """``buffer`` with other content, or a larger one in its place."""
         if buffer.size < len(content):
-            buffer.release()
+            self._gpu.release_all(buffer)
             buffer = self._gpu.ctx.buffer(reserve=int(len(content) * GROWTH), dynamic=True)
         else:
             buffer.orphan()

@@ -115,13 +115,22 @@ class Pass:
 
 class Mesh:
     """An interleaved vertex buffer: ``attributes`` maps names to moderngl formats (``3f``, ``2u``), in order. With
-    ``per_instance`` one element is one instance of a quad, which the vertex shader makes from ``gl_VertexID`` 0 to 3."""
+    ``per_instance`` one element is one instance of a quad, which the vertex shader makes from ``gl_VertexID`` 0 to 3. ``indices`` are u32."""
 
-    def __init__(self, gpu: Gpu, data: bytes, attributes: Mapping[str, str], *, per_instance: bool = False) -> None:
+    def __init__(
+        self,
+        gpu: Gpu,
+        data: bytes,
+        attributes: Mapping[str, str],
+        *,
+        per_instance: bool = False,
+        indices: bytes | None = None,
+    ) -> None:
         self._ctx = gpu.ctx
         self.buffer = gpu.ctx.buffer(data)
         self.attributes = dict(attributes)
         self.per_instance = per_instance
+        self._indices = None if indices is None else gpu.ctx.buffer(indices)
         self.count = len(data) // sum(int(f[0]) * 4 for f in attributes.values())
         self._arrays: list[tuple[moderngl.Program, moderngl.VertexArray]] = []
 
@@ -136,7 +145,7 @@ class Mesh:
         layout = " ".join(f if n in wanted else f"{int(f[0]) * 4}x" for n, f in self.attributes.items())
         layout += " /i" if self.per_instance else ""
         names = [n for n in self.attributes if n in wanted]
-        array = self._ctx.vertex_array(program, [(self.buffer, layout, *names)])
+        array = self._ctx.vertex_array(program, [(self.buffer, layout, *names)], index_buffer=self._indices)
         self._arrays.append((program, array))
         return array
 
@@ -145,3 +154,5 @@ class Mesh:
             array.release()
         self._arrays.clear()
         self.buffer.release()
+        if self._indices is not None:
+            self._indices.release()

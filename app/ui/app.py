@@ -102,6 +102,12 @@ class Ui:
         y, y_end = round(top * ratio), round((top + height) * ratio)
         return x, round(imgui.get_io().display_size.y * ratio) - y_end, max(x_end - x, 1), max(y_end - y, 1)
 
+    @property
+    def moving(self) -> bool:
+        """Whether something of the interface changes by itself: a notice, a flight of the eye, a file dialog."""
+        state = self.state
+        return bool(state.toasts) or state.flight is not None or state.drag_button >= 0 or self._dialog.waiting
+
     def take_requests(self) -> list[Request]:
         """What the host has to do, once."""
         requests, self.state.requests = self.state.requests, []

@@ -36,6 +36,11 @@ class FileDialog:
             patterns = " ".join(f"*{s}" for s in self._suffixes) or "*"
             self._pending = portable_file_dialogs.open_file(TITLE, str(self._folder), ["Scenes", patterns])
 
+    @property
+    def waiting(self) -> bool:
+        """Whether a dialog of the desktop's own is open, from which no event comes."""
+        return self._pending is not None
+
     def poll(self) -> Path | None:
         """Once per frame: the file that was chosen just now, or None."""
         chosen = self._listed() if self._pending is None else self._answered()

@@ -81,7 +81,7 @@ class FakeSession:
         self.calls.append(("advance",)) if self.running else None
         return shots if self.running else 0
 
-    def draw(self, target, size, *, scale=None, samples=1) -> None:
+    def draw(self, target, size, *, scale=None, samples=1, whole=True) -> None:
         target.clear(0.2, 0.3, 0.4, 1.0)
 
     def hemicube_image(self):

@@ -218,7 +218,8 @@ class UniformShooting:
         self.stages.see.draw(
             self.stages.visibility_target,
             blocks=self._shooter_block(shot),
-            mesh=self.lightmap.mesh,
+            textures=self.lightmap.textures("t_sides"),
+            mesh=self.lightmap.occluders,
             instances=self.stages.projection.views,
             depth=True,
             clip_distances=4,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from imgui_bundle import imgui
+
 from app.ui import widgets
 from app.ui.state import State
 
@@ -16,3 +18,8 @@ def draw(session: Session, state: State) -> None:
     plain = session.display.false_colour == "off"
     skip = ("false_colour_log", "false_colour_max") if plain else ("tone_map", "exposure")
     session.display = widgets.edit_options(session.display, skip=skip)
+    if plain:
+        widgets.labelled("")
+        if imgui.button("Auto exposure", imgui.ImVec2(-1, 0)):
+            state.act(session.expose)
+        widgets.tooltip("Set the exposure from the light of the scene: what surfaces reflect becomes mid grey on average")

@@ -1,0 +1,224 @@
+"""Every program compiles with whatever the tables and options can ask of it; the loader says where a shader is wrong."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import pytest
+
+from app.atlas.charts import TILE
+from app.gpu import Gpu, Mesh, Pass, ShaderError, ShaderLibrary
+from app.gpu.shader import SHADERS, Source
+from app.options import specs
+from app.projections import PROJECTIONS
+from app.render.layers import LAYER_SHADERS
+from app.render.options import TONE_MAPS
+from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
+from app.solvers.shooting.stages import OPEN_BLOCK
+
+OPTION = {spec.name: spec for spec in specs(ShootingOptions)}
+FLAG = (False, True)
+# What a host may set a define to: every choice, of a plain number its end. A define that no host sets is a constant.
+DEFINES: Mapping[str, tuple[object, ...]] = {
+    "RESOLUTION": (OPTION["resolution"].minimum,),
+    "LEVEL": tuple(range(MAX_LEVEL + 1)),
+    "ROW_PATCHES": tuple(TILE >> level for level in range(MAX_LEVEL + 1)),
+    "BLOCK": (OPEN_BLOCK,),
+    "MATERIAL_BITS": (16,),
+    "ALBEDO_TEXTURE": FLAG,
+    "EMISSION_TEXTURE": FLAG,
+    "OVERLAY": FLAG,
+    "SAMPLES": (1, 4),
+    "FLAT": FLAG,
+    "NEAR_FIELD": FLAG,
+    "DISC": FLAG,
+    "DISC_SUBDIVISION": (OPTION["discs"].maximum,),
+    "VISIBILITY": tuple(range(len(VISIBILITIES))),
+}
+CONSTANTS = {"TILE", "BORDERED"}
+SLOTS = {
+    "projection": tuple(p.glsl for p in PROJECTIONS.values()),
+    "layer": tuple(f"render/layers/{layer.shader}.glsl" for layer in LAYER_SHADERS.values()),
+    "curve": ("render/false_colour.glsl", *(f"render/tone_maps/{name}.glsl" for name in TONE_MAPS)),
+}
+CLIP_SLOTS = {"projection": tuple(p.clip_glsl for p in PROJECTIONS.values())}  # of the program that draws the map
+PROGRAMS = sorted(str(path.relative_to(SHADERS))[: -len(".frag.glsl")] for path in SHADERS.rglob("*.frag.glsl"))
+
+
+def stages(name: str) -> list[str]:
+    vertex = f"{name}.vert.glsl"
+    return [vertex if (SHADERS / vertex).exists() else "common/fullscreen.vert.glsl", f"{name}.frag.glsl"]
+
+
+def fillings(name: str) -> Iterator[dict[str, str]]:
+    """Every choice for each slot of a program."""
+    text = "".join((SHADERS / stage).read_text() for stage in stages(name))
+    wanted = sorted(set(re.findall(r"#include <(\w+)>", text)))
+    choices = SLOTS | (CLIP_SLOTS if name == "shooting/visibility" else {})
+    for files in itertools.product(*(dict.fromkeys(choices[slot]) for slot in wanted)):
+        yield dict(zip(wanted, files, strict=True))
+
+
+def combinations(name: str, slots: Mapping[str, str]) -> Iterator[dict[str, object]]:
+    """Every choice for each define that a program declares with these files in its slots."""
+    text = "".join(Source(SHADERS, stage, {}, slots, set()).text for stage in stages(name))
+    declared = sorted(set(re.findall(r"^\s*#define (\w+) ", text, re.MULTILINE)) - CONSTANTS)
+    for values in itertools.product(*(DEFINES[define] for define in declared)):
+        yield dict(zip(declared, values, strict=True))
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_compiles_with_everything_that_can_be_asked_of_it(gpu: Gpu, name: str) -> None:
+    library = ShaderLibrary(gpu.ctx)
+    compiled = [
+        library.program(name, {k: int(v) if isinstance(v, float) else v for k, v in defines.items()}, slots)
+        for slots in fillings(name)
+        for defines in combinations(name, slots)
+    ]
+    assert len({program.glo for program in compiled}) == len(compiled) >= 1
+    library.release()
+
+
+def test_every_glsl_file_belongs_to_a_program() -> None:
+    """No shader lies about unused."""
+    used: set[str] = set()
+    for name in PROGRAMS:
+        for slots in fillings(name):
+            for stage in stages(name):
+                used |= {p.rsplit(":", 1)[0] for p in Source(SHADERS, stage, {}, slots, set())._places}
+                used.add(stage)
+    # a file of nothing but includes has no line of its own
+    assert {str(p.relative_to(SHADERS)) for p in SHADERS.rglob("*.glsl")} <= used
+
+
+# -- the loader --------------------------------------------------------------------------------------------------------
+
+FULLSCREEN = "void main() { gl_Position = vec4(0.0); }\n"
+
+
+class Broken:
+    """A shader folder of its own, one file by default."""
+
+    def __init__(self, gpu: Gpu, root: Path) -> None:
+        self.root, self.library = root, ShaderLibrary(gpu.ctx, root)
+        self.write("common/fullscreen.vert.glsl", FULLSCREEN)
+
+    def write(self, path: str, text: str) -> None:
+        file = self.root / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+
+
+@pytest.fixture
+def folder(gpu: Gpu, tmp_path: Path) -> Iterator[Broken]:
+    broken = Broken(gpu, tmp_path)
+    yield broken
+    broken.library.release()
+
+
+def test_a_file_is_included_once(folder: Broken) -> None:
+    folder.write("half.glsl", "float half_of(float x) { return 0.5 * x; }\n")
+    folder.write("quarter.glsl", '#include "half.glsl"\nfloat quarter_of(float x) { return half_of(half_of(x)); }\n')
+    folder.write(
+        "a.frag.glsl",
+        '#include "half.glsl"\n#include "quarter.glsl"\n#include "half.glsl"\nuniform float u_x;\n'
+        "layout(location = 0) out vec4 out_x;\nvoid main() { out_x = vec4(half_of(u_x) + quarter_of(u_x)); }\n",
+    )
+    folder.library.program("a")  # twice the same function would not compile
+    text = Source(folder.root, "a.frag.glsl", {}, {}, set()).text
+    assert text.count("float half_of") == text.count("float quarter_of") == 1
+    assert text.index("float half_of") < text.index("float quarter_of")
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ('#include "nowhere.glsl"', "app/shaders/a.frag.glsl:2: no file app/shaders/nowhere.glsl"),
+        ("#include <slot>", "app/shaders/a.frag.glsl:2: nothing fills the slot <slot>"),
+    ],
+)
+def test_an_include_that_leads_nowhere(folder: Broken, line: str, message: str) -> None:
+    folder.write("a.frag.glsl", f"// a comment\n{line}\nvoid main() {{}}\n")
+    with pytest.raises(ShaderError, match=re.escape(message)):
+        folder.library.program("a")
+
+
+def test_a_define_that_no_shader_declares(folder: Broken) -> None:
+    folder.write("a.frag.glsl", "#define SIZE 1\nvoid main() {}\n")
+    folder.library.program("a", {"SIZE": 2})
+    with pytest.raises(ShaderError, match="a: no shader declares #define LENGTH"):
+        folder.library.program("a", {"SIZE": 2, "LENGTH": 3})
+
+
+def test_a_define_replaces_the_default(folder: Broken) -> None:
+    folder.write("a.frag.glsl", "  #define ON 0\n#define SIZE 1\nvoid main() {}\n")
+    text = Source(folder.root, "a.frag.glsl", {"ON": True, "SIZE": 7}, {}, set()).text
+    assert "#define ON 1\n" in text and "#define SIZE 7\n" in text
+
+
+@pytest.mark.parametrize("stage", ["vert", "frag"])
+@pytest.mark.parametrize("kind", ["undeclared", "type"])
+def test_an_error_names_the_included_file_and_its_line(folder: Broken, stage: str, kind: str) -> None:
+    wrong = {"undeclared": "return x * nothing;", "type": "vec3 y = vec2(x); return y.x;"}[kind]
+    folder.write("inner.glsl", f"// one\n// two\nfloat f(float x) {{ {wrong} }}\n")
+    folder.write("outer.glsl", '// one\n#include "inner.glsl"\nfloat g(float x) { return f(x); }\n')
+    good = {"vert": FULLSCREEN, "frag": "layout(location = 0) out vec4 c;\nvoid main() { c = vec4(1.0); }\n"}
+    for name, text in good.items():
+        folder.write(f"a.{name}.glsl", text if name != stage else '\n\n\n#include "outer.glsl"\n' + text)
+    with pytest.raises(ShaderError, match=r"app/shaders/inner\.glsl:3\b"):
+        folder.library.program("a")
+
+
+def test_an_error_after_an_include_names_the_outer_line(folder: Broken) -> None:
+    folder.write("inner.glsl", "float f(float x) { return x; }\n" * 1 + "// more\n" * 9)
+    folder.write("a.frag.glsl", '#include "inner.glsl"\nvoid main() {\n    undeclared = 1.0;\n}\n')
+    with pytest.raises(ShaderError, match=r"app/shaders/a\.frag\.glsl:3\b"):
+        folder.library.program("a")
+
+
+def test_reload_keeps_the_last_good_programs(folder: Broken) -> None:
+    good = "layout(location = 0) out vec4 c;\nvoid main() { c = vec4(1.0); }\n"
+    for name in ("a", "b"):
+        folder.write(f"{name}.frag.glsl", good)
+    before = [folder.library.program(name) for name in ("a", "b")]
+    folder.write("b.frag.glsl", "void main() { wrong }\n")
+    with pytest.raises(ShaderError, match=r"b\.frag\.glsl:1"):
+        folder.library.reload()
+    assert [folder.library.program(name) for name in ("a", "b")] == before
+    assert folder.library.generation == 0
+    folder.write("b.frag.glsl", good)
+    folder.library.reload()
+    assert folder.library.generation == 1
+    assert folder.library.program("a") is not before[0]
+
+
+# -- passes bind by name -----------------------------------------------------------------------------------------------
+
+
+def test_a_pass_refuses_names_it_lacks_and_asks_for_those_it_needs(gpu: Gpu) -> None:
+    texture = gpu.texture((4, 4), 4, "f4")
+    target = gpu.target(texture)
+    rows = Pass(gpu, "shooting/rows", defines={"ROW_PATCHES": 4})
+    right = {"textures": {"t_patches": texture}, "uniforms": {"u_width": 1}}
+    wrong = [
+        ({"textures": {}}, "shooting/rows needs texture t_patches"),
+        ({"textures": {"t_patches": texture, "t_map": texture}}, "shooting/rows has no texture t_map"),
+        ({"uniforms": {}}, "shooting/rows needs uniform u_width"),
+        ({"uniforms": {"u_width": 1, "u_height": 1}}, "shooting/rows has no uniform u_height"),
+        ({"blocks": {"ShooterBlock": (None, 0, 0)}}, "shooting/rows has no block ShooterBlock"),
+    ]
+    for change, message in wrong:
+        with pytest.raises(ShaderError, match=message):
+            rows.draw(target, **(right | change))  # type: ignore[arg-type]
+    see = Pass(gpu, "shooting/visibility", slots={"projection": PROJECTIONS["hemicube"].clip_glsl})
+    samplers = {name: texture for name in see.program if name.startswith("t_")}
+    with pytest.raises(ShaderError, match="shooting/visibility needs block ShooterBlock"):
+        see.draw(target, textures=samplers)
+    mesh = Mesh(gpu, bytes(12), {"in_position": "3f"})
+    with pytest.raises(ShaderError, match="mesh has no attribute in_ids"):
+        mesh.vertex_array(see.program)
+    mesh.release()
+    gpu.release_all(target, texture)
