@@ -105,6 +105,12 @@ def build_parser() -> Parser:
     _json_flag(shots)
     add_flags(shots, ShootingOptions)
     shots.set_defaults(command=_bench_shots)
+    frames = benches.add_parser("frames", help="milliseconds per frame of the viewer, by part")
+    frames.add_argument("scene", nargs="?", default=DEFAULT_SCENE, help=f"a file or a name (default {DEFAULT_SCENE})")
+    _json_flag(frames)
+    add_flags(frames, AtlasOptions)
+    add_flags(frames, ShootingOptions)
+    frames.set_defaults(command=_bench_frames)
 
     doctor = commands.add_parser("doctor", help="what this machine has, and what is missing")
     _json_flag(doctor)
@@ -156,10 +162,11 @@ def _positive(kind: type[int] | type[float]) -> Callable[[str], float]:
 
 
 def _size(text: str) -> tuple[int, int]:
-    width, _, height = text.lower().partition("x")
-    if not (width.isdigit() and height.isdigit() and 16 <= int(width) <= 16384 and 16 <= int(height) <= 16384):
+    sides = re.fullmatch(r"(\d{1,6})x(\d{1,6})", text.lower(), re.ASCII)
+    width, height = map(int, sides.groups()) if sides else (0, 0)
+    if not (16 <= width <= 16384 and 16 <= height <= 16384):
         raise argparse.ArgumentTypeError(f"{text}: must be WIDTHxHEIGHT, each 16 to 16384")
-    return int(width), int(height)
+    return width, height
 
 
 # Each command imports what it needs: --help and errors answer at once.
@@ -193,6 +200,12 @@ def _bench_shots(flags: argparse.Namespace) -> int:
     from app.bench.shots import bench_shots
 
     return bench_shots(flags)
+
+
+def _bench_frames(flags: argparse.Namespace) -> int:
+    from app.bench.frames import bench_frames
+
+    return bench_frames(flags)
 
 
 def _doctor(flags: argparse.Namespace) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -11,6 +10,8 @@ from typing import Any
 
 from rich.console import Console as RichConsole
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from app.bake import json_text
 
 Tell = Callable[[str, float], None]  # what is being done, share done
 PATIENCE = 1.0  # seconds without a bar: what is over by then needs none
@@ -47,4 +48,4 @@ class Console:
             print(f"glowtree: note: {text}", file=sys.stderr)
 
     def result(self, values: dict[str, Any], text: str) -> None:
-        print(json.dumps(values, indent=2, allow_nan=False) if self._quiet else text)
+        print(json_text(values).rstrip() if self._quiet else text)

@@ -39,9 +39,8 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
     with gpu_context() as gpu:
         session = Session(gpu, **session_options(flags))
         check_size(gpu, flags.size)
-        _open(session, flags.scene, console, note)
-        if flags.ui or LAYER_SHADERS[session.display.layer].light is not None:
-            _check_light(session)
+        shows_light = flags.ui or LAYER_SHADERS[session.display.layer].light is not None
+        _open(session, flags.scene, console, note, needs_light=shows_light)
         _choose_camera(session, flags.camera)
         _solve(session, flags, console)
         if flags.exposure is None:
@@ -63,7 +62,6 @@ def bake(flags: argparse.Namespace) -> int:
     with _folder(flags.output), gpu_context() as gpu:
         session = Session(gpu, **session_options(flags))
         _open(session, flags.scene, console)
-        _check_light(session)
         _solve(session, flags, console)
         clock = time.perf_counter()
         lightmap = session.lightmap
@@ -176,9 +174,12 @@ def report(session: Session) -> dict[str, Any]:
     }
 
 
-def _open(session: Session, scene: str, console: Console, note: str | None = None) -> None:
+def _open(session: Session, scene: str, console: Console, note: str | None = None, *, needs_light: bool = True) -> None:
+    """Load, and say what there is to say. Raises UserError for a scene that needs light and has none."""
     with console.progress("loading") as tell:
         session.open_now(scene, tell)
+    if needs_light and not session.scene.emits:
+        raise UserError(f"{scene}: {NO_LIGHT}")
     for warning in (*([note] if note else []), *session.scene.warnings, *session.charts.warnings):
         console.warn(warning)
 
@@ -189,12 +190,6 @@ def _solve(session: Session, flags: argparse.Namespace, console: Console) -> Non
         session.solve(
             stop, lambda stats: tell(f"{stats.shots} shots, {stats.residual:.3%} unshot", session.progress(stop))
         )
-
-
-def _check_light(session: Session) -> None:
-    """Raise UserError where there is nothing to solve."""
-    if not session.scene.emits:
-        raise UserError(f"{session.source}: {NO_LIGHT}")
 
 
 def _choose_camera(session: Session, name: str | None) -> None:

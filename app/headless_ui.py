@@ -63,11 +63,12 @@ class UiFrame:
         size: tuple[float, float],
         ratio: float = 1.0,
         seconds: float = STEP,
+        look: bool = True,
     ) -> list[Request]:
         """Build and draw one frame into ``target``; what is left for the host to do.
 
         size: of the window [display units]; ratio: pixels per unit, so that the target has size·ratio pixels;
-        seconds: since the last frame. Reloads shaders itself.
+        seconds: since the last frame. look: draw the view anew, or show it as it was drawn last. Reloads shaders itself.
         """
         scale = self._false_colour(session)
         legend = None if scale is None else _legend(session.display.false_colour, scale)
@@ -75,11 +76,12 @@ class UiFrame:
             session, size=size, ratio=ratio, seconds=seconds, texture_id=self._renderer.texture_id, legend=legend
         )
         left, bottom, width, height = self._ui.view_rect
+        known = self._view
         texture, view_target = self._view_of(width, height)
-        if session.opened:
-            session.draw(view_target, (width, height), scale=scale, samples=self._samples, whole=self._whole)
-        else:
+        if not session.opened:
             view_target.clear(*theme.PANEL)
+        elif look or known is not self._view:
+            session.draw(view_target, (width, height), scale=scale, samples=self._samples, whole=self._whole)
         target.use()
         target.clear(*theme.PANEL)
         self._present.draw(

@@ -8,6 +8,7 @@ from typing import Any
 
 from app.atlas.charts import TILE, Charts
 from app.atlas.lightmap import STORAGE
+from app.atlas.node_set import TABLE_WIDTH
 from app.atlas.options import AtlasOptions
 from app.atlas.texels import uniform_leaves
 from app.console import Console
@@ -17,7 +18,8 @@ from app.scene.model import Scene
 
 SURFACE_BYTES = 24  # per texel: position and area, normal and ids
 TEXTURE_BYTES = 8  # per texel, for albedo and for emission
-FACET_BYTES = 32
+FACET_ENTRY_BYTES = 16  # two of them per facet
+TRIANGLE_BYTES = 8  # the charts of both sides
 PAGE_BYTES = 4  # per cell of TILE×TILE texels of the atlas
 LEVELS = TILE.bit_length() - 1  # from tiles down to texels
 
@@ -60,8 +62,14 @@ def _memory(scene: Scene, charts: Charts, tiles: int, storage: str) -> int:
     columns = math.isqrt(max(tiles - 1, 0)) + 1
     texels = columns * -(-tiles // columns) * TILE * TILE
     light = 2 * 4 * int(STORAGE[storage][1:])  # H and r, four channels of f4, f2 or f1
-    tables = FACET_BYTES * (charts.facet_count + 1) + PAGE_BYTES * math.prod(charts.size) // TILE**2
-    return texels * (SURFACE_BYTES + light + TEXTURE_BYTES * _textured(scene)) + tables
+    pages = PAGE_BYTES * math.prod(charts.size) // TILE**2
+    facets = _whole_rows(FACET_ENTRY_BYTES, 2 * (charts.facet_count + 1))
+    sides = _whole_rows(TRIANGLE_BYTES, len(scene.triangles))
+    return texels * (SURFACE_BYTES + light + TEXTURE_BYTES * _textured(scene)) + pages + facets + sides
+
+
+def _whole_rows(entry_bytes: int, entries: int) -> int:
+    return entry_bytes * TABLE_WIDTH * -(-entries // TABLE_WIDTH)
 
 
 def _textured(scene: Scene) -> int:

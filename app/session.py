@@ -5,6 +5,7 @@ A session owns scene, charts, lightmap and solver. It knows no window and no img
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
@@ -150,14 +151,20 @@ class Session:
     def _swap(self, loaded: Loaded) -> Generator[None, None, None]:
         """Open what was loaded, in parts that each take a fraction of it. Raises UserError; what is open stays then."""
         clock = time.perf_counter()
-        lightmap = Lightmap(self.gpu, loaded.nodes, storage=self.shooting.storage)
-        try:
+        with contextlib.ExitStack() as undo:  # also when the swap is given up between two parts
+            lightmap = Lightmap(self.gpu, loaded.nodes, storage=self.shooting.storage)
+            undo.callback(lightmap.release)
             self.gpu.ctx.finish()
             yield
             solver = SOLVERS["shooting"](self.gpu, lightmap, self.shooting)
-        except BaseException:  # also when the swap is given up between two parts
-            lightmap.release()
-            raise
+            undo.callback(solver.release)
+            yield
+            for run in solver.passes().values():  # drivers compile a program when it first draws: one per part
+                run()
+                self.gpu.ctx.finish()
+                yield
+            solver.reset()
+            undo.pop_all()
         self.close()
         self.lightmap, self.solver = lightmap, solver
         self.load_seconds = loaded.seconds | {"upload": time.perf_counter() - clock}

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 GL_VERSION = (4, 1)
 TITLE = "Glowtree"
 AWAKE_SECONDS = 1.0  # that frames go on after the last event: tooltips appear, scroll bars settle
+SLOW_FRAME, FAST_FRAME = 0.08, 0.05  # s for shooting and drawing, beyond which they take turns, and below which not
 REST_SECONDS = 0.5  # between two looks around at rest; an event ends the rest at once
 NOWHERE = -3.4e38  # where Dear ImGui has the mouse when it is outside the window
 BUTTONS = {1: 0, 2: 1, 3: 2}  # left, right, middle: moderngl-window to Dear ImGui
@@ -106,7 +107,7 @@ def run_window(
     ui = Ui(scale=_text_scale(window), layout_file=layout_file, scenes=scenes, suffixes=suffixes)
     frame = UiFrame(gpu, ui, whole=False)
     try:
-        ViewerWindow(window, timer, session, frame, ui, frames).run()
+        ViewerWindow(window, timer, session, frame, ui, frames).main_loop()
     finally:
         frame.release()
         ui.release()
@@ -151,6 +152,22 @@ def _text_scale(window: Any) -> float:
     return max(1.0, float(window._window.scale) / window.pixel_ratio)
 
 
+class Turns:
+    """Which frames shoot and which draw the view: every one both, or in turns where both together take long."""
+
+    def __init__(self) -> None:
+        self._alternate, self._shoot, self._last = False, True, 0.0
+
+    def next(self, seconds: float) -> tuple[bool, bool]:
+        """Whether the next frame shoots, and whether it draws the view. seconds: that the last frame took."""
+        both = seconds + (self._last if self._alternate else 0.0)
+        self._last = seconds
+        if self._alternate != (both > (FAST_FRAME if self._alternate else SLOW_FRAME)):
+            self._alternate = not self._alternate
+        self._shoot = not (self._alternate and self._shoot)
+        return self._shoot, not (self._alternate and self._shoot)
+
+
 class ViewerWindow(WindowConfig):
     """Steps and draws a session, frame by frame, and passes events on. Owns none of what it is given."""
 
@@ -166,6 +183,7 @@ class ViewerWindow(WindowConfig):
         self._held: set[imgui.Key] = set()
         self._cursor: int | None = None
         self._caption = ""
+        self._turns = Turns()
         self._awake_until, self._frames_due = 0.0, 0
         ui.use()
         platform = imgui.get_platform_io()
@@ -181,7 +199,7 @@ class ViewerWindow(WindowConfig):
 
     # -- frames --------------------------------------------------------------------------------------------------------
 
-    def run(self) -> None:
+    def main_loop(self) -> None:
         """Frame after frame until the window is closed; where nothing changes, wait for an event instead."""
         import pyglet
 
@@ -208,15 +226,17 @@ class ViewerWindow(WindowConfig):
 
     def on_render(self, time: float, frame_time: float) -> None:
         """Collect what is ready, shoot within the budget, draw, do what was asked for."""
-        session, state = self._session, self._ui.state
+        session, state, look = self._session, self._ui.state, True
         try:
             session.poll()
-            session.advance(budget_ms=state.pace.frame_budget, shots=state.pace.shots_per_frame)
+            shoot, look = self._turns.next(frame_time) if session.shooting_goes_on else (False, True)
+            if shoot:
+                session.advance(budget_ms=state.pace.frame_budget, shots=state.pace.shots_per_frame)
         except UserError as error:
             session.running = False
             state.notify(str(error), error=True)
         target, ratio = self.wnd.fbo, self.wnd.pixel_ratio
-        requests = self._frame.draw(session, target, size=self.wnd.size, ratio=ratio, seconds=frame_time)
+        requests = self._frame.draw(session, target, size=self.wnd.size, ratio=ratio, seconds=frame_time, look=look)
         self._show_cursor()
         self._show_name()
         for request in requests:

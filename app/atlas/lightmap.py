@@ -116,7 +116,9 @@ class Lightmap:
         )
 
     def release(self) -> None:
-        self.gpu.release_all(*self._targets, *self._textures.values(), self.mesh, self.occluders, *self.receivers.values())
+        self.gpu.release_all(
+            *self._targets, *self._textures.values(), self.mesh, self.occluders, *self.receivers.values()
+        )
 
     # -- read-back -----------------------------------------------------------------------------------------------------
 

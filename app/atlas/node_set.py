@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -57,7 +58,7 @@ class NodeSet:
         if charts.facet_count > min(MAX_FACETS, (1 << (32 - self.material_bits)) - 2):
             raise UserError(f"{charts.facet_count} facets × {len(scene.materials)} materials do not fit 32 bits")
         self.leaves: Leaves = uniform_leaves(charts)
-        self.surfaces: TexelSurfaces = texel_surfaces(scene, charts, self.leaves)
+        self.surfaces: TexelSurfaces = on_their_faces(scene, charts, texel_surfaces(scene, charts, self.leaves))
         self.tiles = len(self.leaves.x)
         self.columns = max(1, int(np.ceil(np.sqrt(self.tiles))))
         self.rows = max(1, -(-self.tiles // self.columns))
@@ -175,6 +176,21 @@ class NodeSet:
         out = np.zeros((2, self.charts.facet_count, 3))
         out[:, self.charts.face_facet] = faces_tangents(self.scene, self.charts)
         return out[0] / self.frame.scale, out[1] / self.frame.scale
+
+
+def on_their_faces(scene: Scene, charts: Charts, surfaces: TexelSurfaces) -> TexelSurfaces:
+    """Texels moved onto the plane of the face that they show most of, with its normal. The mean of several faces lies inside or
+    outside of a folded surface, where the surface itself would hide it."""
+    covered = surfaces.face >= 0
+    face = surfaces.face[covered]
+    triangle = charts.face_triangle[face]
+    normal = scene.normals_areas[0][triangle] * np.where(charts.face_back[face], -1.0, 1.0)[:, None]
+    position = surfaces.position[covered]
+    height = ((position - scene.corners[triangle, 0]) * normal).sum(-1)
+    positions, normals = surfaces.position.copy(), surfaces.normal.copy()
+    positions[covered] = position - height[:, None] * normal
+    normals[covered] = normal
+    return dataclasses.replace(surfaces, position=positions, normal=normals)
 
 
 def octahedral(normals: NDArray[np.floating]) -> NDArray[np.uint32]:

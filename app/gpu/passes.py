@@ -115,7 +115,8 @@ class Pass:
 
 class Mesh:
     """An interleaved vertex buffer: ``attributes`` maps names to moderngl formats (``3f``, ``2u``), in order. With
-    ``per_instance`` one element is one instance of a quad, which the vertex shader makes from ``gl_VertexID`` 0 to 3. ``indices`` are u32."""
+    ``per_instance`` one element is one instance of a quad, which the vertex shader makes from ``gl_VertexID`` 0 to 3.
+    ``indices`` are u32."""
 
     def __init__(
         self,

@@ -29,7 +29,7 @@ def load_scene(source: str | Path, *, default_light: bool = False) -> Scene:
     A scene without emitter gets ``with_ceiling_light`` if ``default_light`` is set, else a warning that says so.
     SceneError if there is no such file, its format is unknown or its content unusable.
     """
-    path = _path(source)
+    path = scene_file(source)
     try:
         scene = LOADERS[path.suffix.lower()](path)
     except SceneError as error:  # its reason may quote the file, line breaks and all
@@ -86,7 +86,7 @@ def with_ceiling_light(scene: Scene) -> Scene:
     )
 
 
-def _path(source: str | Path) -> Path:
+def scene_file(source: str | Path) -> Path:
     """The file that ``source`` means; a name of the library wins unless a file of that name exists."""
     path, shown = Path(source).expanduser(), one_line(str(source))[:200]
     if str(source) in scene_names() and not path.is_file():

@@ -173,7 +173,7 @@ def test_an_error_names_the_included_file_and_its_line(folder: Broken, stage: st
 
 
 def test_an_error_after_an_include_names_the_outer_line(folder: Broken) -> None:
-    folder.write("inner.glsl", "float f(float x) { return x; }\n" * 1 + "// more\n" * 9)
+    folder.write("inner.glsl", "float f(float x) { return x; }\n" + "// more\n" * 9)
     folder.write("a.frag.glsl", '#include "inner.glsl"\nvoid main() {\n    undeclared = 1.0;\n}\n')
     with pytest.raises(ShaderError, match=r"app/shaders/a\.frag\.glsl:3\b"):
         folder.library.program("a")
@@ -198,27 +198,44 @@ def test_reload_keeps_the_last_good_programs(folder: Broken) -> None:
 # -- passes bind by name -----------------------------------------------------------------------------------------------
 
 
-def test_a_pass_refuses_names_it_lacks_and_asks_for_those_it_needs(gpu: Gpu) -> None:
-    texture = gpu.texture((4, 4), 4, "f4")
-    target = gpu.target(texture)
-    rows = Pass(gpu, "shooting/rows", defines={"ROW_PATCHES": 4})
-    right = {"textures": {"t_patches": texture}, "uniforms": {"u_width": 1}}
-    wrong = [
-        ({"textures": {}}, "shooting/rows needs texture t_patches"),
-        ({"textures": {"t_patches": texture, "t_map": texture}}, "shooting/rows has no texture t_map"),
-        ({"uniforms": {}}, "shooting/rows needs uniform u_width"),
-        ({"uniforms": {"u_width": 1, "u_height": 1}}, "shooting/rows has no uniform u_height"),
-        ({"blocks": {"ShooterBlock": (None, 0, 0)}}, "shooting/rows has no block ShooterBlock"),
-    ]
-    for change, message in wrong:
+NAMES = """
+in vec3 in_position;
+uniform float u_gain;
+uniform sampler2D t_map;
+layout(std140) uniform Block { vec4 u_offset; };
+void main() { gl_Position = u_gain * vec4(in_position, 1.0) + texelFetch(t_map, ivec2(0), 0) + u_offset; }
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"textures": ()}, "pass named needs texture t_map"),
+        ({"textures": ("t_map", "t_more", "t_most")}, "pass named has no texture t_more, t_most"),
+        ({"uniforms": ()}, "pass named needs uniform u_gain"),
+        ({"uniforms": ("u_gain", "u_lost")}, "pass named has no uniform u_lost"),
+        ({"blocks": ()}, "pass named needs block Block"),
+        ({"blocks": ("Block", "Rock")}, "pass named has no block Rock"),
+        ({"mesh": "in_colour"}, "mesh has no attribute in_position"),
+        ({}, None),
+    ],
+)
+def test_a_pass_refuses_names_it_lacks_and_asks_for_those_it_needs(
+    gpu: Gpu, folder: Broken, monkeypatch: pytest.MonkeyPatch, change: dict[str, object], message: str | None
+) -> None:
+    folder.write("named.vert.glsl", NAMES)
+    folder.write("named.frag.glsl", "layout(location = 0) out vec4 c;\nvoid main() { c = vec4(1.0); }\n")
+    monkeypatch.setattr(gpu, "shaders", folder.library)
+    texture, buffer = gpu.texture((4, 4), 4, "f4"), gpu.buffer(16)
+    target = gpu.target(gpu.texture((4, 4), 4, "f4"))
+    names = {"textures": ("t_map",), "uniforms": ("u_gain",), "blocks": ("Block",), "mesh": "in_position"} | change
+    mesh = Mesh(gpu, bytes(36), {str(names.pop("mesh")): "3f"})
+    values = {"textures": texture, "uniforms": 1.0, "blocks": (buffer, 0, 16)}
+    given = {kind: dict.fromkeys(names[kind], values[kind]) for kind in values}  # type: ignore[call-overload]
+    named = Pass(gpu, "named")
+    if message is None:
+        named.draw(target, mesh=mesh, **given)
+    else:
         with pytest.raises(ShaderError, match=message):
-            rows.draw(target, **(right | change))  # type: ignore[arg-type]
-    see = Pass(gpu, "shooting/visibility", slots={"projection": PROJECTIONS["hemicube"].clip_glsl})
-    samplers = {name: texture for name in see.program if name.startswith("t_")}
-    with pytest.raises(ShaderError, match="shooting/visibility needs block ShooterBlock"):
-        see.draw(target, textures=samplers)
-    mesh = Mesh(gpu, bytes(12), {"in_position": "3f"})
-    with pytest.raises(ShaderError, match="mesh has no attribute in_ids"):
-        mesh.vertex_array(see.program)
-    mesh.release()
-    gpu.release_all(target, texture)
+            named.draw(target, mesh=mesh, **given)
+    gpu.release_all(target, *target.color_attachments, texture, buffer, mesh)

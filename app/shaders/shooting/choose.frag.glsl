@@ -1,15 +1,15 @@
 // The shooters of a batch: row k describes the k-th strongest of the rows' strongest patches. [Coombe03, 3.4]
 //
 // The polygon is the patch's own parallelogram, so that neighbouring patches tile their surface exactly. Visibility is
-// sampled from the middle of the residual, or where part of the patch holds none (something stands on it), or the patch
-// is curved, from the lit texel nearest to that middle.
+// sampled from the middle of the residual; where part of the patch holds none (something stands on it), or the patch is not
+// flat, from its leading texel.
 #define LEVEL 2
 #include "common/atlas.glsl"
 #include "shooting/shooter.glsl"
 #include "shooting/belongs.glsl"
 
 const float WEAKEST = 0.1;  // a shot under a tenth of the batch's best waits for a later batch
-const float UNLIT = 0.01;   // a texel under 1 % of the patch's mean residual counts as covered by something
+const float UNLIT = 0.01;   // a texel under 1 % of the leading one's residual counts as covered by something
 const int SIZE = 1 << LEVEL;
 
 uniform sampler2D t_position_area;
@@ -52,17 +52,40 @@ float residual_at(ivec2 px) {
     return r.r + r.g + r.b;
 }
 
-Shooter shooter_from_patch(ivec2 corner_px) {
-    // the strongest texel leads: the others shoot with it if they belong to it
-    Texel lead;
-    lead.area = 0.0;
-    float lead_power = 0.0;
+// The strongest texel near the middle of the patch's residual: its plane is the shooter's. On a convex surface no other part of
+// the patch then lies above that plane.
+Texel leading_texel(ivec2 corner_px, out float lead_residual) {
+    vec3 middle = vec3(0.0);
+    float power = 0.0, strongest = 0.0;
     for (int i = 0; i < SIZE * SIZE; ++i) {
         ivec2 px = corner_px + ivec2(i % SIZE, i / SIZE);
         Texel texel = texel_at(px);
-        float power = residual_at(px) * texel.area;
-        if (power > lead_power) { lead_power = power; lead = texel; }
+        float own = residual_at(px) * texel.area;
+        middle += own * texel.position;
+        power += own;
+        strongest = max(strongest, own);
     }
+    middle /= max(power, 1e-30);
+    Texel lead;
+    lead.area = lead_residual = 0.0;
+    float nearest = 3e38;
+    for (int i = 0; i < SIZE * SIZE; ++i) {
+        ivec2 px = corner_px + ivec2(i % SIZE, i / SIZE);
+        Texel texel = texel_at(px);
+        vec3 offset = texel.position - middle;
+        bool strong = residual_at(px) * texel.area > 0.5 * strongest;
+        if (strong && dot(offset, offset) < nearest) {
+            nearest = dot(offset, offset);
+            lead = texel;
+            lead_residual = residual_at(px);
+        }
+    }
+    return lead;
+}
+
+Shooter shooter_from_patch(ivec2 corner_px) {
+    float lead_residual;
+    Texel lead = leading_texel(corner_px, lead_residual);
     Shooter s;
     s.size_px = 0;
     s.power = 0.0;
@@ -74,7 +97,8 @@ Shooter shooter_from_patch(ivec2 corner_px) {
     if (dot(s.normal, lead.normal) < 0.0) s.normal = -s.normal;
 
     vec3 area_centre = vec3(0.0), power_centre = vec3(0.0), flux = vec3(0.0);
-    float area = 0.0, power = 0.0, flat_cos = 1.0;
+    float area = 0.0, power = 0.0;
+    bool whole = true;
     ivec2 lower = ivec2(SIZE), upper = ivec2(-1);
     for (int i = 0; i < SIZE * SIZE; ++i) {
         ivec2 at = ivec2(i % SIZE, i / SIZE), px = corner_px + at;
@@ -86,43 +110,31 @@ Shooter shooter_from_patch(ivec2 corner_px) {
         area_centre += texel.position * texel.area;
         power_centre += texel.position * texel.area * (r.r + r.g + r.b);
         power += texel.area * (r.r + r.g + r.b);
-        flat_cos = min(flat_cos, dot(texel.normal, s.normal));
+        whole = whole && texel.facet == lead.facet && r.r + r.g + r.b > UNLIT * lead_residual;
         lower = min(lower, at);
         upper = max(upper, at);
     }
     s.area = area;
     s.power = power;
     s.exitance = flux / area;
-    s.centre = area_centre / area;
     s.facet = lead.facet;
     s.patch_px = corner_px;
     s.size_px = SIZE;
     s.lead = lead.position;
     s.reach = reach;
 
+    // see from the middle of the residual, or where that may lie inside or under something, from the texel that leads
+    s.origin = whole ? power_centre / power : lead.position;
+    s.centre = area_centre / area;
+    s.centre -= s.normal * dot(s.centre - s.origin, s.normal);
+
     // the covered block of texels as a parallelogram in the shooter's plane, scaled to the area that it covers
     vec2 extent = vec2(upper - lower + 1);
-    vec3 edge_u = (dpdu - s.normal * dot(dpdu, s.normal)) * extent.x;
-    vec3 edge_v = (dpdv - s.normal * dot(dpdv, s.normal)) * extent.y;
+    vec3 edge_u = dpdu * extent.x, edge_v = dpdv * extent.y;
     if (dot(cross(edge_u, edge_v), s.normal) < 0.0) edge_v = -edge_v;
     float scale = sqrt(area / length(cross(edge_u, edge_v)));
     s.edge_u = edge_u * scale;
     s.edge_v = edge_v * scale;
-
-    // shoot from the middle of the residual, or from the lit texel nearest to it
-    s.origin = power_centre / power;
-    bool whole = flat_cos > 0.99999;
-    float nearest = 3e38;
-    vec3 fallback = lead.position;
-    for (int i = 0; i < SIZE * SIZE; ++i) {
-        ivec2 px = corner_px + ivec2(i % SIZE, i / SIZE);
-        Texel texel = texel_at(px);
-        if (!belongs(texel, s.normal, lead.position, reach)) continue;
-        if (residual_at(px) * area < UNLIT * power) { whole = false; continue; }
-        vec3 offset = texel.position - s.origin;
-        if (dot(offset, offset) < nearest) { nearest = dot(offset, offset); fallback = texel.position; }
-    }
-    if (!whole) s.origin = fallback;
     return s;
 }
 

@@ -34,7 +34,10 @@ void main() {
     float facet = v_facet;
 #else
     Texel texel = load_texel(t_position_area, t_normal_ids, texel_px);
-    if (texel.area <= 0.0) discard;
+    // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it
+    ivec2 in_patch = texel_px - s.patch_px;
+    bool own = all(greaterThanEqual(in_patch, ivec2(0))) && all(lessThan(in_patch, ivec2(s.size_px)));
+    if (texel.area <= 0.0 || own) discard;
     vec3 position = texel.position, normal = texel.normal;
     vec3 albedo = albedo_of(t_materials, texel.material, texel_px);
     float facet = float(texel.facet);

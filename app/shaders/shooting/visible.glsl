@@ -36,5 +36,6 @@ float visible(float facet, vec3 local, vec3 normal_local, sampler2D map) {
         vec2 weight = mix(1.0 - f, f, corner);
         sum += seen ? weight.x * weight.y : 0.0;
     }
-    return sum;
+    // the other side of what is seen: a shell without thickness has texels on both, in the same place
+    return plane < 0.0 ? sum : 0.0;
 }

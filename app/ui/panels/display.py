@@ -22,4 +22,6 @@ def draw(session: Session, state: State) -> None:
         widgets.labelled("")
         if imgui.button("Auto exposure", imgui.ImVec2(-1, 0)):
             state.act(session.expose)
-        widgets.tooltip("Set the exposure from the light of the scene: what surfaces reflect becomes mid grey on average")
+        widgets.tooltip(
+            "Set the exposure from the light of the scene: what surfaces reflect becomes mid grey on average"
+        )
