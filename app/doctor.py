@@ -26,8 +26,12 @@ def doctor(flags: argparse.Namespace) -> int:
         "python": sys.version.split()[0],
         "platform": platform.platform(),
     }
-    values |= {name: importlib.metadata.version(name) for name in PACKAGES}
     missing = []
+    for name in PACKAGES:
+        try:
+            values[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            missing.append(f"missing package {name}: {sys.executable} -m pip install {name}")
     try:
         with gpu_context() as gpu:
             limits = gpu.limits
@@ -44,10 +48,8 @@ def doctor(flags: argparse.Namespace) -> int:
     if sys.platform.startswith("linux"):
         absent = [package for library, package in LIBRARIES.items() if ctypes.util.find_library(library) is None]
         if absent:
-            missing.append(f"missing libraries: apt-get install {' '.join(absent)} libgl1-mesa-dri")
-        values["display"] = (
-            os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or "none: headless commands only"
-        )
+            missing.append(f"missing libraries, on Debian: apt-get install {' '.join(absent)} libgl1-mesa-dri")
+        values["display"] = os.environ.get("DISPLAY") or "none: headless commands only"
     values["missing"] = missing
     text = "\n".join(f"{name:>18}  {value}" for name, value in values.items() if name != "missing")
     verdict = "\n".join(missing) if missing else "Everything that is needed is there."

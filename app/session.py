@@ -164,6 +164,7 @@ class Session:
                 self.gpu.ctx.finish()
                 yield
             solver.reset()
+            yield
             undo.pop_all()
         self.close()
         self.lightmap, self.solver = lightmap, solver
@@ -279,6 +280,8 @@ class Session:
     def _solve(self, stop: Stop, start: float, told: float, progress: Callable[[Stats], None] | None) -> None:
         while not self.converged:
             left = BATCH if stop.shots is None else stop.shots - self.solver.shots
+            if stop.shots is not None and left <= 0:
+                left = stop.shots - self.solver.poll(wait=True).shots  # some of the issued ones were too weak
             spent = time.perf_counter() - start
             if left <= 0 or (stop.seconds is not None and spent >= stop.seconds):
                 break

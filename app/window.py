@@ -30,6 +30,7 @@ GL_VERSION = (4, 1)
 TITLE = "Glowtree"
 AWAKE_SECONDS = 1.0  # that frames go on after the last event: tooltips appear, scroll bars settle
 SLOW_FRAME, FAST_FRAME = 0.08, 0.05  # s for shooting and drawing, beyond which they take turns, and below which not
+LOADING_PAUSE = 0.03  # s between frames while there is only a scene to wait for: loading gets the processor
 REST_SECONDS = 0.5  # between two looks around at rest; an event ends the rest at once
 NOWHERE = -3.4e38  # where Dear ImGui has the mouse when it is outside the window
 BUTTONS = {1: 0, 2: 1, 3: 2}  # left, right, middle: moderngl-window to Dear ImGui
@@ -207,12 +208,15 @@ class ViewerWindow(WindowConfig):
         while not self.wnd.is_closing:
             if self._at_rest():
                 pyglet.app.platform_event_loop.step(REST_SECONDS)
+                self._pyglet.dispatch_events()  # the step only queued them
                 continue
             now, elapsed = self.timer.next_frame()
             self.wnd.use()
             self.wnd.render(now, min(elapsed, REST_SECONDS))
             if not self.wnd.is_closing:
                 self.wnd.swap_buffers()
+            if self._session.loading is not None and not self._session.shooting_goes_on:
+                time.sleep(LOADING_PAUSE)
 
     def _wake(self, *_: object) -> None:
         self._awake_until = time.perf_counter() + AWAKE_SECONDS

@@ -53,14 +53,14 @@ def room(size: ArrayLike = (1.0, 1.0, 1.0)) -> F64:
 
 
 def table_room() -> Scene:
-    """A closed room 4 × 3 × 4 with a lamp under the ceiling and a table, on whose both sides light falls: direct light,
-    shadow and colour bleeding. Every edge is a multiple of 1/4, so that the same density always gives the same texels."""
-    lamp = [[1.5, 2.75, 1.5], [2.5, 2.75, 1.5], [2.5, 2.75, 2.5], [1.5, 2.75, 2.5]]  # faces down
-    table = [[0.5, 1.0, 0.5], [0.5, 1.0, 2.5], [2.0, 1.0, 2.5], [2.0, 1.0, 0.5]]  # faces up
+    """A closed room 4 × 3 × 4 with a lamp under the ceiling and a table, both with two sides: direct light, shadow and colour
+    bleeding. Every edge is a multiple of 1/2, so that at 8 texels/m it is whole patches."""
+    lamp = [[1.5, 2.5, 1.5], [2.5, 2.5, 1.5], [2.5, 2.5, 2.5], [1.5, 2.5, 2.5]]
+    table = [[0.5, 1.0, 0.5], [0.5, 1.0, 2.5], [2.0, 1.0, 2.5], [2.0, 1.0, 0.5]]
     materials = (
         grey(0.6),
         Material("red", (0.7, 0.2, 0.1)),
-        grey(0.2, 20.0),
+        grey(0.2, 20.0, double_sided=True),
         grey(0.5, double_sided=True),
     )
     return quads_scene([*room((4.0, 3.0, 4.0)), lamp, table], materials, [0, 0, 1, 0, 0, 0, 2, 3])

@@ -178,17 +178,21 @@ class NodeSet:
         return out[0] / self.frame.scale, out[1] / self.frame.scale
 
 
+FOLD = 1e-4  # of a texel's width: further off the plane of its leading face, a mean of faces is off the surface
+
+
 def on_their_faces(scene: Scene, charts: Charts, surfaces: TexelSurfaces) -> TexelSurfaces:
-    """Texels moved onto the plane of the face that they show most of, with its normal. The mean of several faces lies inside or
-    outside of a folded surface, where the surface itself would hide it."""
+    """Texels that fold over several faces, put onto the one that they show most of, with its normal. Their mean lies inside or
+    outside of the surface, where the surface itself would hide it."""
     covered = surfaces.face >= 0
     face = surfaces.face[covered]
     triangle = charts.face_triangle[face]
     normal = scene.normals_areas[0][triangle] * np.where(charts.face_back[face], -1.0, 1.0)[:, None]
     position = surfaces.position[covered]
-    height = ((position - scene.corners[triangle, 0]) * normal).sum(-1)
+    height = np.abs(((position - scene.corners[triangle, 0]) * normal).sum(-1))
+    folded = height > FOLD * np.sqrt(surfaces.area[covered])
     positions, normals = surfaces.position.copy(), surfaces.normal.copy()
-    positions[covered] = position - height[:, None] * normal
+    positions[covered] = np.where(folded[:, None], surfaces.leading[covered], position)
     normals[covered] = normal
     return dataclasses.replace(surfaces, position=positions, normal=normals)
 

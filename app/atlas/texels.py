@@ -44,13 +44,15 @@ class TexelSurfaces:
 
     position (n, 16, 16, 3) f64: centroid of the covered surface [m], where curved a mean that may lie off it;
     area (n, 16, 16) f64 [m²], 0 where nothing is covered; normal (n, 16, 16, 3) f32: unit area-weighted mean,
-    towards the lit side; face (n, 16, 16) i32: the face with the largest share, -1 where nothing is covered.
+    towards the lit side; face (n, 16, 16) i32: the face with the largest share, -1 where nothing is covered;
+    leading (n, 16, 16, 3) f64: centroid of that share alone [m].
     """
 
     position: F64
     area: F64
     normal: F32
     face: I32
+    leading: F64
 
 
 def faces_tangents(scene: Scene, charts: Charts) -> tuple[F64, F64]:
@@ -78,7 +80,7 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
     texels = len(leaves) * TILE * TILE
     area, best = np.zeros(texels), np.zeros(texels)
     face = np.full(texels, -1, np.int32)
-    moment, normal = np.zeros((3, texels)), np.zeros((3, texels))
+    moment, normal, lead = np.zeros((3, texels)), np.zeros((3, texels)), np.zeros((3, texels))
     origin = scene.corners[charts.face_triangle, 0]
     normals, areas = scene.normals_areas
     towards = normals[charts.face_triangle] * np.where(charts.face_back, -1.0, 1.0)[:, None]
@@ -93,14 +95,15 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
             f, slot = windows.face[part.pair], windows.slot(part)
             covered = part.share * per_texel[f] * size**2
             du, dv = (part.u - uv[f, 0, 0]) * size, (part.v - uv[f, 0, 1]) * size
+            np.maximum.at(best, slot, covered)
+            leading = covered >= best[slot]
+            face[slot[leading]] = f[leading]
             for k in range(3):
                 centre = origin[f, k] + du * tangents[0, f, k] + dv * tangents[1, f, k]
                 np.add.at(moment[k], slot, covered * centre)
                 np.add.at(normal[k], slot, covered * towards[f, k])
+                lead[k, slot[leading]] = centre[leading]
             np.add.at(area, slot, covered)
-            np.maximum.at(best, slot, covered)
-            leading = covered >= best[slot]
-            face[slot[leading]] = f[leading]
     shape = (len(leaves), TILE, TILE)
     with np.errstate(invalid="ignore", divide="ignore"):
         position = np.where(area > 0, moment / area, 0.0)
@@ -113,6 +116,7 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
         area=area.reshape(shape),
         normal=np.ascontiguousarray(normal.T, dtype=np.float32).reshape(*shape, 3),
         face=face.reshape(shape),
+        leading=np.ascontiguousarray(lead.T).reshape(*shape, 3),
     )
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 SIDE_EM = 20.5  # width of the side docks, in font heights: the widest fact fits
 BOTTOM_SHARE = 0.27  # height of the lower dock, of the window
 LEFT_SHARE = 0.43  # of the left dock for the Scene panel, the rest for the Solver
-RIGHT_SHARE = 0.38  # of the right dock for the Display panel, the rest for Inspect
+RIGHT_SHARE = 0.4  # of the right dock for the Display panel, the rest for Inspect
 WIDEST_SIDES = 0.3  # of a narrow window for each side dock
 
 

@@ -1,50 +1,64 @@
-"""Opens the real window over a session that only takes notes: what test_window.py drives with mouse and keys.
+"""Opens the real window over a real session that reports to test_window.py, which drives it with mouse and keys.
 
     python drive_window.py FOLDER
 
-Writes FOLDER/state.json every few frames: where buttons and sliders are, what the session was asked to do. A file
-name in FOLDER/drop is dropped on the window, as the window system would.
+Writes FOLDER/state.json every few frames: where buttons and sliders are, and where the session stands. A file name in
+FOLDER/drop is dropped on the window, as the window system would.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import moderngl_window
-from fake_session import FakeSession
+import pyglet
 from imgui_bundle import imgui
 
+from app.gpu import Gpu
+from app.session import Session
 from app.ui import widgets
 from app.window import run_window
 
 EVERY = 3  # frames between two reports
 
 
-class ReportingSession(FakeSession):
-    """Reports to the test, and hears from it, once per frame."""
+class ReportingSession(Session):
+    """Tells the test, every few frames, how it is."""
 
-    def __init__(self, folder: Path) -> None:
-        super().__init__()
+    def __init__(self, gpu: Gpu, folder: Path) -> None:
+        super().__init__(gpu, expose_on_open=True)
         self.folder, self.frame = folder, 0
         self.places: dict[str, tuple[float, float]] = {}
+        self.picked: str | None = None
 
     def poll(self) -> None:
+        super().poll()
         self.frame += 1
-        drop = self.folder / "drop"
-        if drop.exists():
-            dropped = drop.read_text()
-            drop.unlink()
-            moderngl_window.window()._window.dispatch_event("on_file_drop", 640, 360, [dropped])
         if self.frame % EVERY == 0:
-            calls = [c for c in self.calls if c[0] in ("open", "pick")]
-            state = {"frame": self.frame, "running": self.running, "exposure": self.display.exposure}
+            state = {
+                "frame": self.frame,
+                "name": self.name,
+                "running": self.running,
+                "shots": self.solver.shots if self.opened else 0,
+                "exposure": self.display.exposure,
+                "message": self.message,
+                "picked": self.picked,
+                "places": self.places,
+            }
             report = self.folder / "state.new"
-            report.write_text(json.dumps(state | {"calls": calls, "places": self.places}))
+            report.write_text(json.dumps(state))
             report.replace(self.folder / "state.json")
+
+    def pick(self, x_px: int, y_px: int) -> Any:
+        picked = super().pick(x_px, y_px)
+        self.picked = None if picked is None else picked.object
+        return picked
 
     def note(self, function: Callable[..., Any], name: Callable[..., str]) -> Callable[..., Any]:
         """``function``, but the place of its widget is remembered."""
@@ -58,12 +72,30 @@ class ReportingSession(FakeSession):
         return noting
 
 
+def drop_files(folder: Path) -> None:
+    """Pass on what the test drops: also while the window waits for an event."""
+    drop = folder / "drop"
+    while True:
+        if drop.exists():
+            dropped = drop.read_text()
+            drop.unlink()
+            window = moderngl_window.window()._window
+            pyglet.app.platform_event_loop.post_event(window, "on_file_drop", 640, 360, [dropped])
+        time.sleep(0.1)
+
+
 def main() -> None:
-    session = ReportingSession(Path(sys.argv[1]))
-    imgui.button = session.note(imgui.button, lambda label, *_: label.split("###")[-1])
-    widgets._editor = session.note(widgets._editor, lambda spec, _: spec.name)
-    run_window(lambda gpu: session, size=(1280, 720), vsync=False)
-    assert ("release",) in session.calls
+    folder = Path(sys.argv[1])
+
+    def make_session(gpu: Gpu) -> Session:
+        session = ReportingSession(gpu, folder)
+        imgui.button = session.note(imgui.button, lambda label, *_: label.split("###")[-1])
+        widgets._editor = session.note(widgets._editor, lambda spec, _: spec.name)
+        session.open("cornell-box")
+        return session
+
+    threading.Thread(target=drop_files, args=(folder,), daemon=True).start()
+    run_window(make_session, size=(1280, 720), vsync=False)
     print("closed")
 
 

@@ -94,6 +94,9 @@ class FakeSession:
     def shoot_once(self) -> None:
         self.calls.append(("shoot_once",))
 
+    def expose(self) -> None:
+        self.calls.append(("expose",))
+
     def restart(self) -> None:
         self.calls.append(("restart",))
 

@@ -233,6 +233,15 @@ def test_doctor_lists_what_is_there(capsys: pytest.CaptureFixture[str]) -> None:
     assert values["renderer"] and values["numpy"]
 
 
+def test_doctor_names_packages_that_are_missing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("app.doctor.PACKAGES", ("numpy", "no-such-package"))
+    assert run(["doctor"]) == 2
+    assert "missing package no-such-package: " in (out := capsys.readouterr().out)
+    assert out.rstrip().endswith("-m pip install no-such-package")
+
+
 # -- processes of their own --------------------------------------------------------------------------------------------
 
 

@@ -80,7 +80,7 @@ class UniformShooting:
         self.buffers = ShotBuffers(gpu, lightmap)
         self.stages = ShotStages(gpu, lightmap, options)
         self.last_shot: Shot | None = None
-        self._reports: deque[tuple[int, ChoiceStages, ReadBack]] = deque()
+        self._reports: deque[tuple[ChoiceStages, ReadBack]] = deque()
         self.reset()
 
     # -- the solver's interface ----------------------------------------------------------------------------------------
@@ -107,7 +107,8 @@ class UniformShooting:
             self.reset()
 
     def step(self, shots: int) -> int:
-        """Make ``shots`` shots (at most BATCH), the strongest patches first. Returns how many were issued."""
+        """Make up to ``shots`` shots (at most BATCH), the strongest patches first. Returns how many were issued: of a batch,
+        those too weak beside its best are left for later, and not counted once ``poll`` has heard of it."""
         shots = min(shots, BATCH)
         self._choose(shots)
         for shot in range(shots):
@@ -122,8 +123,10 @@ class UniformShooting:
     def poll(self, *, wait: bool = False) -> StepReport:
         """The newest report that has arrived: the state before the step that sent it; with ``wait`` that of the last step."""
         while self._reports and (wait or len(self._reports) > REPORT_LAG):
-            shots, choice, readback = self._reports.popleft()
-            self._hear(shots, choice, np.frombuffer(readback.take(), np.float32).reshape(-1, 4).astype(np.float64))
+            choice, readback = self._reports.popleft()
+            self._hear(choice, np.frombuffer(readback.take(), np.float32).reshape(-1, 4).astype(np.float64))
+        if not self._reports:
+            self.shots = self.report.shots
         return self.report
 
     def books(self) -> EnergyBook:
@@ -271,16 +274,16 @@ class UniformShooting:
             buffers.report_target,
             textures={"t_rows": buffers.rows, "t_ledger": buffers.ledger, "t_shooters": buffers.shooters},
         )
-        self._reports.append((self.shots, self._choice, ReadBack(self.gpu, buffers.report_target)))
+        self._reports.append((self._choice, ReadBack(self.gpu, buffers.report_target)))
 
-    def _hear(self, shots: int, choice: ChoiceStages, report: F64) -> None:
+    def _hear(self, choice: ChoiceStages, report: F64) -> None:
         """report (2 + SHOOTER_ROWS, 4), see report.frag.glsl; choice: the level that it is about."""
         emitted = self._emitted.sum()
         residual = report[0, 0] * self._watt / emitted if emitted > 0 else 0.0
         faint = report[0, 1] * self._watt < FAINT * emitted
         if faint and choice is self._choice and choice is not self.stages.choices[-1]:
             self._choice = self.stages.choices[self.stages.choices.index(choice) + 1]
-        self.report = StepReport(shots, float(residual), report[1, :3] * self._watt)
+        self.report = StepReport(int(report[1, 3]), float(residual), report[1, :3] * self._watt)
         if report[2 + 5, 3] > 0:
             self.last_shot = self._shot_from_rows(report[2:])
 

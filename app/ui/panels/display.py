@@ -19,8 +19,8 @@ def draw(session: Session, state: State) -> None:
     skip = ("false_colour_log", "false_colour_max") if plain else ("tone_map", "exposure")
     session.display = widgets.edit_options(session.display, skip=skip)
     if plain:
-        widgets.labelled("")
-        if imgui.button("Auto exposure", imgui.ImVec2(-1, 0)):
+        widgets.labelled("Set exposure")
+        if imgui.button("Auto", imgui.ImVec2(-1, 0)):
             state.act(session.expose)
         widgets.tooltip(
             "Set the exposure from the light of the scene: what surfaces reflect becomes mid grey on average"

@@ -14,7 +14,7 @@ from app.ui.state import RGB, State
 if TYPE_CHECKING:
     from app.session import Session
 
-ROWS_SHOWN = 8  # of the material list before it scrolls
+ROWS_SHOWN = 5  # of the material list before it scrolls
 SWATCH = int(imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop | imgui.ColorEditFlags_.no_border)
 PICKER = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label)
 STRONGEST = 1e5  # W/(sr m²), end of the slider: the sun's disc is brighter, lamps are not

@@ -1,0 +1,184 @@
+"""What the viewer's frame asks of a session: a scene opens in parts, numbers settle, exposure is found, turns are taken."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from app.atlas.options import AtlasOptions
+from app.gpu import Gpu
+from app.headless_ui import UiFrame
+from app.loading import load
+from app.render.false_colour import false_colour_scale
+from app.render.options import DisplayOptions
+from app.sampled import exposure_of, first_exposure, top_of_scale
+from app.session import Session, Stop
+from app.solvers import ShootingOptions
+from app.ui.app import Ui
+from app.window import FAST_FRAME, SLOW_FRAME, Turns
+
+SMALL = AtlasOptions(texels=4000)
+PATIENCE = 60.0  # s
+
+
+@pytest.fixture
+def session(gpu: Gpu) -> Iterator[Session]:
+    session = Session(gpu, atlas=SMALL, expose_on_open=True)
+    yield session
+    session.release()
+
+
+def frames(session: Session, until: Callable[[], bool]) -> int:
+    """Poll and advance as the window does; how many frames it took."""
+    end, count = time.monotonic() + PATIENCE, 0
+    while not until():
+        assert time.monotonic() < end
+        session.poll()
+        session.advance(budget_ms=20)
+        count += 1
+    return count
+
+
+def opened(session: Session, source: str) -> Session:
+    session.open(source)
+    frames(session, lambda: session.loading is None)
+    return session
+
+
+def test_a_scene_opens_in_parts_and_is_exposed(session: Session) -> None:
+    session.open("cornell-box")
+    frames(session, lambda: session.loading is not None and session.loading.ended)
+    assert frames(session, lambda: session.opened) > 3, "upload and programs are spread over frames"
+    assert session.solver.shots == 0 and session.stats.residual == 1.0, "warming up leaves no light behind"
+    assert session.stats.unshot == pytest.approx(session.stats.emitted)
+    assert session.display.exposure == pytest.approx(first_exposure(session.lightmap.nodes))
+
+
+def test_an_exposure_that_was_given_stays(gpu: Gpu) -> None:
+    session = Session(gpu, atlas=SMALL, display=DisplayOptions(exposure=3.0))
+    assert opened(session, "cornell-box").display.exposure == 3.0
+    session.release()
+
+
+def test_a_failed_load_keeps_the_scene(session: Session) -> None:
+    opened(session, "furnace")
+    lightmap = session.lightmap
+    opened(session, "no-such-scene")
+    assert session.lightmap is lightmap and session.message and "no-such-scene" in session.message
+
+
+def test_another_scene_may_be_asked_for_between_two_parts(session: Session) -> None:
+    opened(session, "furnace")
+    session.open("cornell-box")
+    frames(session, lambda: session.loading is not None and session.loading.ended)
+    session.poll()
+    session.poll()  # two parts of several
+    assert session.loading is not None
+    opened(session, "furnace")
+    assert session.name != "Cornell box" and session.solver.poll(wait=True).residual <= 1.0
+
+
+@pytest.mark.parametrize("stop", ["pause", "converge"])
+def test_numbers_settle_when_shooting_stops(session: Session, stop: str) -> None:
+    opened(session, "cornell-box")
+    frames(session, lambda: session.solver.shots >= 5)
+    if stop == "pause":
+        session.running = False
+    else:
+        session.set_shooting(session.shooting.replace(residual=0.99))
+    assert not session.at_rest
+    frames(session, lambda: session.at_rest)
+    assert session.solver.report.shots == session.solver.shots, "the reports of the last shots have arrived"
+    stats = session.stats
+    assert stats.unshot / stats.emitted == pytest.approx(stats.residual, rel=1e-3)  # both sum 32-bit floats
+    assert session.history.column("shots")[-1] == stats.shots
+
+
+def test_one_shot_settles_too(session: Session) -> None:
+    session.running = False
+    opened(session, "cornell-box")
+    session.shoot_once()
+    frames(session, lambda: session.at_rest)
+    assert session.stats.shots == 1 and session.stats.unshot < session.stats.emitted
+
+
+def test_a_restart_knows_its_book_without_looking(session: Session) -> None:
+    opened(session, "cornell-box")
+    frames(session, lambda: session.solver.shots >= 5)
+    session.restart()
+    kept, measured = session.books, session.solver.books()
+    for field in dataclasses.fields(kept):
+        np.testing.assert_allclose(getattr(kept, field.name), getattr(measured, field.name), rtol=1e-6, atol=1e-9)
+
+
+def test_a_dimmed_lamp_reaches_the_book(session: Session) -> None:
+    opened(session, "cornell-box")
+    before = session.stats.emitted
+    lamp = next(i for i, m in enumerate(session.scene.materials) if m.emits)
+    material = session.scene.materials[lamp]
+    session.set_material(lamp, dataclasses.replace(material, emission=tuple(e / 2 for e in material.emission)))
+    frames(session, lambda: session.stats.emitted != before)
+    assert session.stats.emitted == pytest.approx(before / 2, rel=1e-5)
+
+
+@pytest.mark.parametrize("storage", ["rgba32f", "rgba16f", "fixed8"])
+def test_the_first_exposure_is_that_of_the_unlit_lightmap(gpu: Gpu, storage: str) -> None:
+    session = Session(gpu, atlas=SMALL, shooting=ShootingOptions(storage=storage))
+    session.open_now("textured-room")
+    book, nodes = session.books, session.lightmap.nodes
+    assert first_exposure(nodes) == pytest.approx(exposure_of(session.lightmap, book.unshot / book.area), abs=0.02)
+    session.release()
+
+
+def test_exposure_follows_the_lamp(session: Session) -> None:
+    nodes = load("cornell-box", SMALL).nodes
+    brighter = [dataclasses.replace(m, emission=tuple(8 * e for e in m.emission)) for m in nodes.scene.materials]
+    before = first_exposure(nodes)
+    nodes.scene = nodes.scene.with_materials(tuple(brighter))
+    assert first_exposure(nodes) == pytest.approx(before - 3)  # 2³ times the light
+
+
+@pytest.mark.parametrize("kind", ["illuminance", "luminance"])
+def test_the_sampled_scale_is_that_of_all_texels(session: Session, kind: str) -> None:
+    session.open_now("cornell-box")  # so few tiles that the sample is all of them
+    session.solve(Stop(shots=50))
+    display = DisplayOptions(false_colour=kind)
+    assert top_of_scale(session.lightmap, kind) == false_colour_scale(display, session.lightmap).high
+
+
+def test_a_frame_that_does_not_look_shows_the_view_as_it_was(gpu: Gpu, session: Session) -> None:
+    session.open_now("cornell-box")
+    size = (640, 360)
+    texture = gpu.texture(size, 4, "f1")
+    target, ui = gpu.target(texture), Ui()
+    frame = UiFrame(gpu, ui)
+
+    def view(look: bool) -> np.ndarray:
+        frame.draw(session, target, size=size, look=look)
+        left, bottom, width, height = ui.view_rect
+        image = np.frombuffer(texture.read(), np.uint8).reshape(size[1], size[0], 4)
+        return image[bottom : bottom + height, left : left + width].copy()
+
+    for _ in range(4):
+        view(True)  # the panels find their places
+    before = view(True)
+    session.display = session.display.replace(exposure=session.display.exposure + 4)
+    assert np.array_equal(view(False), before)
+    assert not np.array_equal(view(True), before)
+    frame.release()
+    ui.release()
+    gpu.release_all(target, texture)
+
+
+def test_slow_frames_shoot_and_draw_in_turns() -> None:
+    turns = Turns()
+    assert [turns.next(0.5 * FAST_FRAME) for _ in range(3)] == [(True, True)] * 3
+    slow = [turns.next(SLOW_FRAME * 1.1 if i == 0 else SLOW_FRAME * 0.55) for i in range(6)]
+    assert set(slow) == {(True, False), (False, True)} and all(a != b for a, b in zip(slow, slow[1:], strict=False))
+    for _ in range(3):
+        last = turns.next(0.4 * FAST_FRAME)
+    assert last == (True, True), "and together again when they are fast"

@@ -1,0 +1,64 @@
+"""Light does not pass through walls, nor to the back of what has only a front."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from solver_scenes import UNIT_SQUARE, grey, quads_scene, room, solve
+
+from app.gpu import Gpu
+from app.solvers import SOLVERS
+from app.solvers.shooting.options import VISIBILITIES
+
+LAMP = np.array([[-0.5, 1.5, -1.0], [-0.5, 1.5, 1.5], [-0.5, 0.5, 1.5], [-0.5, 0.5, -1.0]])  # beside the unit box, faces +x
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("visibility", VISIBILITIES)
+@pytest.mark.parametrize("double_sided", [False, True], ids=["black outside", "white outside"])
+@pytest.mark.parametrize("shift", [0.0, 0.013], ids=["in line", "out of line"])
+def test_nothing_inside_a_closed_box_from_a_lamp_outside(
+    gpu: Gpu, solver: str, visibility: str, double_sided: bool, shift: float
+) -> None:
+    """The walls are as thin as can be, and patches of the lamp lie in the planes of floor and walls."""
+    scene = quads_scene([*room(), LAMP + shift], [grey(0.5, double_sided=double_sided), grey(0.0, 1.0)], [0] * 6 + [1])
+    box = solve(gpu, scene, texels=2000, residual=0.05, visibility=visibility, solver=solver)
+    inside = (box.object < 6) & (((0.5 - box.position) * box.normal).sum(1) > 0)
+    assert inside.sum() > 500
+    leak = (box.H[inside, 0] * box.area[inside]).sum() / box.book.emitted[0]
+    if visibility == "item-id":
+        assert leak == 0  # no sample of the map shows an inner face
+    else:
+        # What a sample shows beyond a receiver's plane lets it see the receiver: where sight grazes a wall's rim, in its very
+        # plane, half of the samples pass it. That is the width of one sample, 1/128, along two of the box's rims.
+        assert leak < 3e-3
+    box.release()
+
+
+def test_a_lamp_has_only_a_front(gpu: Gpu) -> None:
+    """A one-sided lamp between two boards lights the one in front of it."""
+    boards = [UNIT_SQUARE, UNIT_SQUARE[::-1] + [0.0, 0.0, 2.0]]  # face each other
+    lamp = UNIT_SQUARE * 0.5 + [0.25, 0.25, 1.0]  # faces +z
+    scene = quads_scene([*boards, lamp], [grey(0.0), grey(0.0, 1.0)], [0, 0, 1])
+    box = solve(gpu, scene, density=16)
+    H = box.means(box.H)[:, 0]
+    assert H[0] == 0
+    assert H[1] > 0.05
+    box.release()
+
+
+@pytest.mark.parametrize("visibility", VISIBILITIES)
+def test_nothing_behind_a_thin_wall(gpu: Gpu, visibility: str) -> None:
+    """A room with a partition from wall to wall, of one sheet that is white on both sides."""
+    sheet = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [1.0, 0.0, 1.0]])  # faces +x
+    walls = room((2.0, 1.0, 1.0))
+    lamp = UNIT_SQUARE[:, [0, 2, 1]] * [0.4, 1.0, 0.4] + [1.3, 0.9, 0.3]  # faces down
+    scene = quads_scene([*walls, sheet, lamp], [grey(0.7), grey(0.7, double_sided=True), grey(0.0, 10.0)], [0] * 6 + [1, 2])
+    box = solve(gpu, scene, density=12, residual=0.05, visibility=visibility)
+    dark = (box.position[:, 0] < 1 - 1e-6) | ((box.object == 6) & (box.normal[:, 0] < 0))
+    H = box.H[:, 0]
+    assert H[~dark].mean() > 0.5
+    # floor and ceiling pass below the sheet as one facet: within a sample of the map, 1/128, of its foot
+    assert H[dark].max() < 1e-3 * H[~dark].mean()
+    assert (H * box.area)[dark].sum() < 1e-5 * (H * box.area)[~dark].sum()
+    box.release()
