@@ -20,7 +20,6 @@ from app.gpu import Framebuffer, Gpu, Pass, ShaderError, Texture
 from app.gpu.imgui import ImguiRenderer
 from app.render.false_colour import Scale, colour_map, false_colour_scale
 from app.render.resolve import BORDERED, TEXELS_PER_FRAME
-from app.sampled import top_of_scale
 from app.ui import theme
 from app.ui.app import Ui
 from app.ui.state import Legend, Request
@@ -129,8 +128,7 @@ class UiFrame:
         asked = (session.lightmap, display.false_colour, display.false_colour_log, display.false_colour_max)
         now = time.perf_counter()
         if self._scale is None or asked != self._scale_of or (now >= self._scale_due and not display.false_colour_max):
-            top = display.false_colour_max or top_of_scale(session.lightmap, display.false_colour)
-            self._scale = false_colour_scale(display.replace(false_colour_max=top), session.lightmap)
+            self._scale = false_colour_scale(display, session.lightmap)
             self._scale_of = asked
             cost = time.perf_counter() - now
             self._scale_due = now + max(SCALE_SECONDS, cost / SCALE_SHARE)

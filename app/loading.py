@@ -13,7 +13,7 @@ from app.atlas.node_set import NodeSet
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
 from app.errors import UserError
-from app.sampled import first_exposure
+from app.render.exposure import first_exposure
 from app.scene.load import load_scene
 from app.scene.model import Scene
 

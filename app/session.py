@@ -5,66 +5,36 @@ A session owns scene, charts, lightmap and solver. It knows no window and no img
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from app.atlas.charts import Charts
-from app.atlas.lightmap import Lightmap
 from app.atlas.options import AtlasOptions
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Texture
 from app.history import History
 from app.loading import CancelledError, Loaded, Loading, load
-from app.options import specs
+from app.opening import prepare
 from app.picking import Picked, picked_from_hit
 from app.render.camera import CameraView
+from app.render.exposure import exposure_of
 from app.render.false_colour import Scale
 from app.render.frame import FrameRenderer
 from app.render.items import ItemImage
 from app.render.options import DisplayOptions
 from app.render.surfaces import Rect
-from app.sampled import exposure_of
 from app.scene.model import RGB, Camera, Material, Scene
-from app.solvers import SOLVERS, EnergyBook, ShootingOptions
+from app.solvers import EnergyBook, ShootingOptions
 from app.solvers.shooting.stages import BATCH
+from app.stats import Stats, Stop, stats_of
 
 BOOKS_SECONDS = 0.5  # between two looks at the energy book while shooting, at least: it reads every texel
 BOOKS_SHARE = 0.05  # of the time may go into it
-
-
-@dataclass(frozen=True)
-class Stop:
-    """When a solve ends, besides when it has converged; whichever comes first."""
-
-    shots: int | None = None
-    seconds: float | None = None
-
-
-@dataclass(frozen=True)
-class Stats:
-    """Where the solution stands. residual: unshot share of the emitted power [-]; energies summed over RGB [W]."""
-
-    shots: int
-    seconds: float
-    residual: float
-    emitted: float
-    absorbed: float
-    escaped: float
-    unshot: float
-    imbalance: float
-    shots_per_second: float
-    converged: bool
-    texels: int
-    tiles: int
-    triangles: int
-    charts: int
-    memory_mib: float
 
 
 class Session:
@@ -151,28 +121,14 @@ class Session:
     def _swap(self, loaded: Loaded) -> Generator[None, None, None]:
         """Open what was loaded, in parts that each take a fraction of it. Raises UserError; what is open stays then."""
         clock = time.perf_counter()
-        with contextlib.ExitStack() as undo:  # also when the swap is given up between two parts
-            lightmap = Lightmap(self.gpu, loaded.nodes, storage=self.shooting.storage)
-            undo.callback(lightmap.release)
-            self.gpu.ctx.finish()
-            yield
-            solver = SOLVERS["shooting"](self.gpu, lightmap, self.shooting)
-            undo.callback(solver.release)
-            yield
-            for run in solver.passes().values():  # drivers compile a program when it first draws: one per part
-                run()
-                self.gpu.ctx.finish()
-                yield
-            solver.reset()
-            yield
-            undo.pop_all()
+        lightmap, solver = yield from prepare(self.gpu, loaded.nodes, self.shooting)
         self.close()
         self.lightmap, self.solver = lightmap, solver
         self.load_seconds = loaded.seconds | {"upload": time.perf_counter() - clock}
         self.source = self.scene.source or self.scene.name
         self.look_through(self.scene.cameras[0])
         if self.expose_on_open:
-            self.display = self.display.replace(exposure=_in_range(loaded.exposure))
+            self.display = self.display.replace(exposure=loaded.exposure)
         self.message = None if self.scene.emits else f"{self.scene.name} has no light: try --light for a ceiling light"
         self._opened = True
         self._begin(self.solver.books())
@@ -367,24 +323,8 @@ class Session:
 
     @property
     def stats(self) -> Stats:
-        book, lightmap = self._books, self.lightmap
-        return Stats(
-            shots=self.solver.shots,
-            seconds=self.seconds,
-            residual=self.solver.report.residual,
-            emitted=float(book.emitted.sum()),
-            absorbed=float(book.absorbed.sum()),
-            escaped=float(book.escaped.sum()),
-            unshot=float(book.unshot.sum()),
-            imbalance=book.imbalance_share,
-            shots_per_second=self.history.shots_per_second,
-            converged=self.converged,
-            texels=lightmap.texel_count,
-            tiles=lightmap.tiles,
-            triangles=len(self.scene.triangles),
-            charts=self.charts.chart_count,
-            memory_mib=sum(lightmap.memory.values()) / 2**20,
-        )
+        """Where the solution stands."""
+        return stats_of(self)
 
     @property
     def timings(self) -> dict[str, float]:
@@ -432,7 +372,7 @@ class Session:
     def expose(self) -> None:
         """Set the exposure from the light of the scene."""
         mean_residual = self._books.unshot / max(self._books.area, 1e-300)
-        self.display = self.display.replace(exposure=_in_range(exposure_of(self.lightmap, mean_residual)))
+        self.display = self.display.replace(exposure=exposure_of(self.lightmap, mean_residual))
 
     @property
     def _ambient(self) -> RGB | None:
@@ -455,8 +395,4 @@ class Session:
         return self.items.draw(self.solver.inspect()["visibility"])
 
 
-def _in_range(exposure: float) -> float:
-    """An exposure that the display takes: a scene lit by next to nothing is not exposed any longer."""
-    spec = next(s for s in specs(DisplayOptions) if s.name == "exposure")
-    assert spec.minimum is not None and spec.maximum is not None
-    return min(max(exposure, spec.minimum), spec.maximum)
+__all__ = ["Session", "Stats", "Stop"]

@@ -97,7 +97,7 @@ def _ms(gpu: Gpu, run: Callable[[], object]) -> float:
 def _passes(gpu: Gpu, solver: UniformShooting) -> tuple[dict[str, float], float]:
     """Median milliseconds of each pass over the shooters of a solve, and the mean number of texels that get light."""
     times: dict[str, list[float]] = {label: [] for label in solver.passes()}
-    samples = []
+    samples: list[int] = []
     end = time.perf_counter() + SECONDS
     while time.perf_counter() < end or len(samples) < 5:
         for label, run in solver.passes().items():

@@ -12,10 +12,12 @@ import numpy as np
 
 from app.atlas.lightmap import Lightmap
 from app.render.options import DisplayOptions
+from app.render.sample import sampled_colours, sampled_irradiance, sampled_tiles
 from app.scene.model import F64
 
 WHITE_EFFICACY = 179.0  # lm/W
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec.709 [IEC 61966-2-1]
+BRIGHTEST_SHARE = 99.9  # per cent of the texels that the scale covers
 DECADES = 3.0  # of a logarithmic scale
 NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # tops of a scale, times a power of ten
 UNITS = {"illuminance": "lx", "luminance": "cd/m²"}
@@ -62,15 +64,18 @@ def colour_map(count: int) -> F64:
 
 
 def _percentile(kind: str, lightmap: Lightmap) -> float:
-    covered = lightmap.nodes.surfaces.area > 0
-    irradiance = lightmap.irradiance().astype(np.float64)
-    if kind == "illuminance":
-        values = irradiance @ LUMINANCE * WHITE_EFFICACY
-    else:
-        emission = lightmap.emission()
-        covered &= emission.max(-1) == 0
-        values = (emission + lightmap.albedo() * irradiance) @ LUMINANCE * (WHITE_EFFICACY / np.pi)
-    return float(np.percentile(values[covered], 99.9)) if covered.any() else 0.0
+    """What nearly all illuminance [lx] or, lamps left out, luminance [cd/m²] is below, from an even sample of the tiles."""
+    nodes, irradiance = lightmap.nodes, sampled_irradiance(lightmap)
+    sample = sampled_tiles(nodes)
+    shown = nodes.surfaces.area[sample] > 0
+    radiance = irradiance * np.float32(np.pi)
+    if kind == "luminance":
+        emission = sampled_colours(nodes, [m.emission for m in lightmap.scene.materials], nodes.emission_tiles, sample)
+        albedo = sampled_colours(nodes, [m.albedo for m in lightmap.scene.materials], nodes.albedo_tiles, sample)
+        shown &= emission.max(-1) == 0
+        radiance = albedo * irradiance
+    values = radiance[shown] @ LUMINANCE * (WHITE_EFFICACY / np.pi)
+    return float(np.percentile(values, BRIGHTEST_SHARE)) if len(values) else 0.0
 
 
 def _nice_above(value: float) -> float:

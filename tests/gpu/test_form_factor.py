@@ -52,7 +52,9 @@ def probe(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator
 
 def factors(gpu: Gpu, positions: F64, normals: F64, **defines: object) -> F64:
     """(n,) F from each receiver to the parallelogram of EDGES."""
-    inputs = [gpu.texture((len(a), 1), 4, "f4", np.float32(np.c_[a, a[:, :1] * 0]).tobytes()) for a in (positions, normals)]
+    inputs = [
+        gpu.texture((len(a), 1), 4, "f4", np.float32(np.c_[a, a[:, :1] * 0]).tobytes()) for a in (positions, normals)
+    ]
     output = gpu.texture((len(positions), 1), 4, "f4")
     target = gpu.target(output)
     Pass(gpu, "probe", defines=defines).draw(
@@ -129,7 +131,7 @@ def test_discs_approach_the_polygon(probe: Gpu, rng: np.random.Generator) -> Non
 
 # -- the catalogue, through a whole shot -------------------------------------------------------------------------------
 
-FACING = UNIT_SQUARE[::-1] + [0.0, 0.0, 1.0]
+FACING = np.add(UNIT_SQUARE[::-1], [0.0, 0.0, 1.0])
 STANDING = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])  # on an edge, faces +x
 
 

@@ -16,7 +16,7 @@ from app.errors import UserError
 from app.gpu import Gpu
 from app.render.camera import CameraView
 from app.render.develop import encode_srgb, tone_map
-from app.render.exposure import auto_exposure
+from app.render.exposure import exposure_of
 from app.render.false_colour import LUMINANCE, Scale, colour_map, false_colour_scale
 from app.render.frame import FrameRenderer, render_image
 from app.render.options import LAYERS, TONE_MAPS, DisplayOptions
@@ -359,6 +359,12 @@ def test_false_colour_is_the_colour_of_the_value(gpu: Gpu, box: Lightmap, logari
     assert picture(gpu, box, display)[y, x] / 255 == pytest.approx(expected, abs=STEP + 0.5 / 255)
 
 
+def mean_residual(lightmap: Lightmap) -> np.ndarray:
+    """r̄ over all texels, RGB [W/m²]."""
+    area = lightmap.nodes.surfaces.area
+    return np.einsum("tijc,tij->c", lightmap.residual().astype(np.float64), area) / area.sum()
+
+
 def test_scale_and_exposure_come_from_the_light(box: Lightmap) -> None:
     H = (1.0, 2.0, 0.5)
     put(box, "t_irradiance", even(box, H))
@@ -371,20 +377,20 @@ def test_scale_and_exposure_come_from_the_light(box: Lightmap) -> None:
     assert 179 / np.pi * brightest <= luminance.high <= 1.5 * 179 / np.pi * brightest
     assert luminance.unit == "cd/m²"
 
-    exposure = auto_exposure(box)
+    exposure = exposure_of(box, mean_residual(box))
     area = box.nodes.surfaces.area
     mean = np.average(np.log((box.albedo() * H @ LUMINANCE)[area > 0] / np.pi), weights=area[area > 0])
     assert 2.0**exposure * np.exp(mean) == pytest.approx(0.18, rel=1e-5)
     put(box, "t_irradiance", even(box, H) * 8)
-    assert auto_exposure(box) == pytest.approx(exposure - 3, abs=1e-5)
+    assert exposure_of(box, mean_residual(box)) == pytest.approx(exposure - 3, abs=1e-5)
 
 
 def test_a_scene_just_opened_is_exposed_for_the_light_to_come(box: Lightmap) -> None:
-    exposure = auto_exposure(box)
+    exposure = exposure_of(box, mean_residual(box))
     assert np.isfinite(exposure)
     assert abs(exposure) < 4, "the lamp of the Cornell box gives about as much light as the exposure of 0 is for"
     put(box, "t_residual", even(box, (0.0, 0.0, 0.0)))
-    assert auto_exposure(box) == 0.0, "no light at all"
+    assert exposure_of(box, mean_residual(box)) == 0.0, "no light at all"
 
 
 # -- frames ------------------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import time
 from collections.abc import Callable, Iterator
 
@@ -13,10 +14,9 @@ from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
 from app.headless_ui import UiFrame
 from app.loading import load
-from app.render.false_colour import false_colour_scale
+from app.render.exposure import exposure_of, first_exposure
 from app.render.options import DisplayOptions
-from app.sampled import exposure_of, first_exposure, top_of_scale
-from app.session import Session, Stop
+from app.session import Session
 from app.solvers import ShootingOptions
 from app.ui.app import Ui
 from app.window import FAST_FRAME, SLOW_FRAME, Turns
@@ -94,8 +94,11 @@ def test_numbers_settle_when_shooting_stops(session: Session, stop: str) -> None
     frames(session, lambda: session.at_rest)
     assert session.solver.report.shots == session.solver.shots, "the reports of the last shots have arrived"
     stats = session.stats
-    assert stats.unshot / stats.emitted == pytest.approx(stats.residual, rel=1e-3)  # both sum 32-bit floats
-    assert session.history.column("shots")[-1] == stats.shots
+    assert (
+        0.9 * stats.residual < stats.unshot / stats.emitted <= stats.residual
+    )  # a report is from before its last shot
+    last = [session.history.column(name)[-1] for name in ("shots", "residual")]
+    assert last == [stats.shots, pytest.approx(stats.unshot / stats.emitted)]
 
 
 def test_one_shot_settles_too(session: Session) -> None:
@@ -142,14 +145,6 @@ def test_exposure_follows_the_lamp(session: Session) -> None:
     assert first_exposure(nodes) == pytest.approx(before - 3)  # 2³ times the light
 
 
-@pytest.mark.parametrize("kind", ["illuminance", "luminance"])
-def test_the_sampled_scale_is_that_of_all_texels(session: Session, kind: str) -> None:
-    session.open_now("cornell-box")  # so few tiles that the sample is all of them
-    session.solve(Stop(shots=50))
-    display = DisplayOptions(false_colour=kind)
-    assert top_of_scale(session.lightmap, kind) == false_colour_scale(display, session.lightmap).high
-
-
 def test_a_frame_that_does_not_look_shows_the_view_as_it_was(gpu: Gpu, session: Session) -> None:
     session.open_now("cornell-box")
     size = (640, 360)
@@ -178,7 +173,7 @@ def test_slow_frames_shoot_and_draw_in_turns() -> None:
     turns = Turns()
     assert [turns.next(0.5 * FAST_FRAME) for _ in range(3)] == [(True, True)] * 3
     slow = [turns.next(SLOW_FRAME * 1.1 if i == 0 else SLOW_FRAME * 0.55) for i in range(6)]
-    assert set(slow) == {(True, False), (False, True)} and all(a != b for a, b in zip(slow, slow[1:], strict=False))
+    assert set(slow) == {(True, False), (False, True)} and all(a != b for a, b in itertools.pairwise(slow))
     for _ in range(3):
         last = turns.next(0.4 * FAST_FRAME)
     assert last == (True, True), "and together again when they are fast"

@@ -2,66 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
-from solver_scenes import UNIT_SQUARE, Solution, grey, quads_scene, room, solve, table_room
+from solver_scenes import UNIT_SQUARE, grey, quads_scene, room, solve, table_room
 
 from app.gpu import Gpu
 from app.metrics import relative_rms
-from app.reference.dense import irradiance_at, solve_dense
-from app.scene.model import Material
+from app.reference.dense import DenseSolution, irradiance_at, solve_dense
+from app.reference.form_factors import point_to_polygon
+from app.scene.model import F64, Material, Scene
 from app.solvers import SOLVERS
+
+
+def object_means(dense: DenseSolution, scene: Scene) -> F64:
+    """(objects, 3) area-weighted mean irradiance [W/m²]."""
+    owner, area = scene.object_ids[dense.patches.triangle], dense.patches.areas
+    return np.stack([np.bincount(owner, area * h) / np.bincount(owner, area) for h in dense.H.T], -1)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_room_without_shadows(gpu: Gpu, solver: str) -> None:
     """A box of three albedos, its ceiling the lamp: mean irradiance of each wall, and of points on the floor.
 
-    In a convex room the reference's rows sum to 1 exactly and its error is that of its grid, 0.5 % between walls that touch;
-    the solver's shooters hand out all their light within 0.5 %."""
+    In a convex room the reference's rows sum to 1 exactly and its error is that of its grid: with 700 patches its means move
+    towards the solver's by 0.9 %. The solver's shooters hand out all their light within 0.5 %."""
     materials = (grey(0.2), grey(0.0, 4.0), Material("red", (0.8, 0.3, 0.1)), grey(0.5))
     scene = quads_scene(room((2.0, 1.0, 1.5)), materials, [0, 1, 2, 3, 3, 2])
-    mine = solve(gpu, scene, texels=2500, solver=solver)
+    mine = solve(gpu, scene, texels=2500, residual=3e-4, resolution=128, solver=solver)
     dense = solve_dense(scene, 300, 2)
-    wall = scene.object_ids[dense.patches.triangle]
-    areas = np.bincount(wall, dense.patches.areas)
-    truth = np.stack([np.bincount(wall, dense.patches.areas * h) / areas for h in dense.H.T], -1)
-    np.testing.assert_allclose(mine.means(mine.H), truth, rtol=0.01)
+    np.testing.assert_allclose(mine.means(mine.H), object_means(dense, scene), rtol=0.015)
     floor = np.flatnonzero(mine.object == 0)[::7]
     points = irradiance_at(dense, scene, mine.position[floor], mine.normal[floor])
-    assert relative_rms(mine.H[floor], points) < 0.01
+    assert relative_rms(mine.H[floor], points) < 0.015
     mine.release()
 
 
-@pytest.fixture(scope="module")
-def table(_gpu: Gpu) -> Iterator[Solution]:
-    solution = solve(_gpu, table_room(), density=8, residual=3e-3, coarsen=False)
-    yield solution
-    solution.release()
-
-
-def test_room_with_a_table(gpu: Gpu, table: Solution) -> None:
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_room_with_a_table(gpu: Gpu, solver: str) -> None:
     """Shadow, both sides, colour: means within 3 %. The reference's 380 patches resolve a shadow's edge to a third of a metre,
-    and one visibility ray for each of its pieces errs by about 2 % where the table hides the lamp."""
-    scene = table.lightmap.scene
+    and one visibility ray for each of its pieces errs by about 2 % where table or lamp hide a wall."""
+    mine = solve(gpu, table_room(), density=8, residual=5e-3, resolution=128, solver=solver)
+    scene = mine.lightmap.scene
     dense = solve_dense(scene, 380, 2)
-    wall = scene.object_ids[dense.patches.triangle]
-    areas = np.bincount(wall, dense.patches.areas)
-    truth = np.stack([np.bincount(wall, dense.patches.areas * h) / areas for h in dense.H.T], -1)
-    mine = table.means(table.H)
-    print(mine / truth - 1)
-    np.testing.assert_allclose(mine, truth, rtol=0.03)
-    under = (table.object == 7) & (table.normal[:, 1] < 0)
-    points = irradiance_at(dense, scene, table.position[under][::5], table.normal[under][::5])
-    print(relative_rms(table.H[under][::5], points), table.H[under][::5].mean(), points.mean())
+    np.testing.assert_allclose(mine.means(mine.H), object_means(dense, scene), rtol=0.03)
+    under = np.flatnonzero((mine.object == 7) & (mine.normal[:, 1] < 0))[::5]
+    points = irradiance_at(dense, scene, mine.position[under], mine.normal[under])
+    assert relative_rms(mine.H[under], points) < 0.05  # in the shadow, where that ray decides most
+    mine.release()
 
 
 def test_direct_light_is_the_closed_form(gpu: Gpu) -> None:
     """Black surfaces: one bounce. H at texels under a square lamp against Lambert's formula from the whole lamp at once."""
-    from app.reference.form_factors import point_to_polygon
-
     lamp = UNIT_SQUARE[:, [0, 2, 1]] + [0.0, 1.0, 0.0]  # faces down
     floor = UNIT_SQUARE[:, [0, 2, 1]][::-1] * [3.0, 1.0, 3.0] - [1.0, 0.0, 1.0]
     scene = quads_scene([floor, lamp], [grey(0.0), grey(0.0, 2.0)], [0, 1])

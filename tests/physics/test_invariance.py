@@ -56,8 +56,16 @@ IDENTITY = np.eye(4)
 # name: (the changed scene, world matrix, texels per metre)
 CHANGES: dict[str, tuple[Callable[[Scene], Scene], F64, float]] = {
     "moved and turned": (lambda s: moved(s, MOVE), MOVE, DENSITY),
-    "a thousandth": (lambda s: moved(s, np.diag([1e-3, 1e-3, 1e-3, 1.0])), np.diag([1e-3, 1e-3, 1e-3, 1.0]), DENSITY * 1e3),
-    "a thousand times": (lambda s: moved(s, np.diag([1e3, 1e3, 1e3, 1.0])), np.diag([1e3, 1e3, 1e3, 1.0]), DENSITY / 1e3),
+    "a thousandth": (
+        lambda s: moved(s, np.diag([1e-3, 1e-3, 1e-3, 1.0])),
+        np.diag([1e-3, 1e-3, 1e-3, 1.0]),
+        DENSITY * 1e3,
+    ),
+    "a thousand times": (
+        lambda s: moved(s, np.diag([1e3, 1e3, 1e3, 1.0])),
+        np.diag([1e3, 1e3, 1e3, 1.0]),
+        DENSITY / 1e3,
+    ),
     "shuffled": (shuffled, IDENTITY, DENSITY),
     "split": (lambda s: split(s, apart=False), IDENTITY, DENSITY),
     "split in two facets": (lambda s: split(s, apart=True), IDENTITY, DENSITY),

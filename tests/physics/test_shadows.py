@@ -10,7 +10,9 @@ from app.gpu import Gpu
 from app.solvers import SOLVERS
 from app.solvers.shooting.options import VISIBILITIES
 
-LAMP = np.array([[-0.5, 1.5, -1.0], [-0.5, 1.5, 1.5], [-0.5, 0.5, 1.5], [-0.5, 0.5, -1.0]])  # beside the unit box, faces +x
+LAMP = np.array(
+    [[-0.5, 1.5, -1.0], [-0.5, 1.5, 1.5], [-0.5, 0.5, 1.5], [-0.5, 0.5, -1.0]]
+)  # beside the unit box, faces +x
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -37,7 +39,7 @@ def test_nothing_inside_a_closed_box_from_a_lamp_outside(
 
 def test_a_lamp_has_only_a_front(gpu: Gpu) -> None:
     """A one-sided lamp between two boards lights the one in front of it."""
-    boards = [UNIT_SQUARE, UNIT_SQUARE[::-1] + [0.0, 0.0, 2.0]]  # face each other
+    boards = [UNIT_SQUARE, np.add(UNIT_SQUARE[::-1], [0.0, 0.0, 2.0])]  # face each other
     lamp = UNIT_SQUARE * 0.5 + [0.25, 0.25, 1.0]  # faces +z
     scene = quads_scene([*boards, lamp], [grey(0.0), grey(0.0, 1.0)], [0, 0, 1])
     box = solve(gpu, scene, density=16)
@@ -53,7 +55,9 @@ def test_nothing_behind_a_thin_wall(gpu: Gpu, visibility: str) -> None:
     sheet = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [1.0, 0.0, 1.0]])  # faces +x
     walls = room((2.0, 1.0, 1.0))
     lamp = UNIT_SQUARE[:, [0, 2, 1]] * [0.4, 1.0, 0.4] + [1.3, 0.9, 0.3]  # faces down
-    scene = quads_scene([*walls, sheet, lamp], [grey(0.7), grey(0.7, double_sided=True), grey(0.0, 10.0)], [0] * 6 + [1, 2])
+    scene = quads_scene(
+        [*walls, sheet, lamp], [grey(0.7), grey(0.7, double_sided=True), grey(0.0, 10.0)], [0] * 6 + [1, 2]
+    )
     box = solve(gpu, scene, density=12, residual=0.05, visibility=visibility)
     dark = (box.position[:, 0] < 1 - 1e-6) | ((box.object == 6) & (box.normal[:, 0] < 0))
     H = box.H[:, 0]

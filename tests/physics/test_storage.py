@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -12,20 +13,20 @@ from app.atlas.lightmap import STORAGE
 from app.gpu import Gpu
 from app.scene.model import Material, Scene
 
-SHOTS = 320
-
 
 def two_coloured_room() -> Scene:
-    return quads_scene(room((2.0, 1.0, 1.0)), [grey(0.6), Material("lamp", (0.3, 0.3, 0.3), (3.0, 1.0, 0.2))], [0, 1] + [0] * 4)
+    lamp = Material("lamp", (0.3, 0.3, 0.3), (3.0, 1.0, 0.2))
+    return quads_scene(room((2.0, 1.0, 1.0)), [grey(0.6), lamp], [0, 1, 0, 0, 0, 0])
 
 
 @pytest.fixture(scope="module")
 def solved(_gpu: Gpu) -> Iterator[dict[str, Solution]]:
-    """The same shots in every storage format."""
+    """The same room in every storage format, converged."""
     solutions = {}
     for storage in STORAGE:
-        solutions[storage] = begin(_gpu, two_coloured_room(), texels=2000, storage=storage, coarsen=False, resolution=128)
-        solutions[storage].shoot(SHOTS)
+        solutions[storage] = solve(
+            _gpu, two_coloured_room(), texels=2000, storage=storage, residual=0.01, resolution=128
+        )
     yield solutions
     for solution in solutions.values():
         solution.release()
@@ -38,41 +39,61 @@ def test_light_is_finite_and_not_negative(gpu: Gpu, solved: dict[str, Solution],
     assert solved[storage].H.max() > 0
 
 
-def test_half_floats_are_close_to_floats(gpu: Gpu, solved: dict[str, Solution]) -> None:
-    """Each of the few dozen shots that a texel receives rounds H to 2^-11 of itself, without bias."""
-    full, half = solved["rgba32f"].H, solved["rgba16f"].H
-    assert np.abs(half - full).max() / full.mean() < 0.02
-    np.testing.assert_allclose(half.mean(0), full.mean(0), rtol=3e-3)
+def test_half_floats_are_close_shot_by_shot(gpu: Gpu) -> None:
+    """Every shot rounds H by at most 2^-10 of itself, the step of a half float. Black walls: each of the lamp's 36 patches shoots
+    once, in whatever order."""
+    scene = quads_scene(room((2.0, 1.0, 1.0)), [grey(0.0), grey(0.0, 3.0)], [0, 1, 0, 0, 0, 0])
+    H = []
+    for storage in ("rgba32f", "rgba16f"):
+        solution = solve(gpu, scene, texels=2000, residual=1e-6, coarsen=False, storage=storage)
+        assert solution.solver.shots == 36
+        H.append(solution.H)
+        solution.release()
+    assert H[0].mean() > 0.3
+    np.testing.assert_allclose(H[1], H[0], rtol=36 * 2**-10, atol=1e-4)  # atol: contributions below half floats' range
 
 
-def test_eight_bits_lose_light_and_the_book_says_so(gpu: Gpu, solved: dict[str, Solution]) -> None:
-    """A contribution under half of 1/255 of the largest exitance is rounded away: the picture gets darker, and what is
-    missing is the imbalance."""
+@pytest.mark.parametrize("storage", STORAGE)
+def test_what_storage_loses_is_in_the_book(gpu: Gpu, solved: dict[str, Solution], storage: str) -> None:
+    """Light only disappears where it is stored, and that is the book's imbalance. It never appears: a half float of a driver
+    that cuts instead of rounding (llvmpipe) only gets smaller, by the step of some hundred shots."""
+    full, book = solved["rgba32f"].book, solved[storage].book
+    missing = (full.absorbed + full.unshot - book.absorbed - book.unshot).sum() / book.emitted.sum()
+    own = max(abs(full.imbalance_share), 1e-3)  # that of the form factors
+    assert book.imbalance_share == pytest.approx(missing, abs=2 * own)
+    assert missing > -0.005
+    ratio = solved[storage].means(solved[storage].H) / solved["rgba32f"].means(solved["rgba32f"].H)
+    assert ratio.max() < 1.005
+    assert ratio.min() >= {"rgba32f": 1.0, "rgba16f": 0.8, "fixed8": 0.0}[storage]
+
+
+def test_eight_bits_lose_light(gpu: Gpu, solved: dict[str, Solution]) -> None:
+    """A contribution under half of 1/255 of the largest exitance is rounded away: the picture gets darker."""
     full, fixed = solved["rgba32f"], solved["fixed8"]
-    assert fixed.means(fixed.H).max() > 0
-    assert (fixed.means(fixed.H) <= full.means(full.H)).all()
+    assert (fixed.means(fixed.H) < full.means(full.H)).all()
     assert fixed.H.sum() < 0.9 * full.H.sum()
-    book = fixed.book
-    assert book.imbalance_share > 0.05 > abs(full.book.imbalance_share)
-    # light only disappears where it is stored
-    missing = (full.book.absorbed + full.book.unshot - book.absorbed - book.unshot).sum() / book.emitted.sum()
-    assert book.imbalance_share == pytest.approx(missing, abs=0.01)
+    assert fixed.book.imbalance_share > 0.05 > abs(full.book.imbalance_share)
+    steps = fixed.H / fixed.lightmap.unit * 255
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-3)
 
 
 @pytest.mark.parametrize("coarsen", [False, True])
 def test_residual_falls_shot_by_shot(gpu: Gpu, coarsen: bool) -> None:
-    """What a shot takes away is more than what its receivers reflect, ρ < 1; the report follows the book."""
+    """What a shot takes away is more than what its receivers reflect: ρ < 1, and form factors add at most 0.5 %. The report
+    follows the book."""
     box = begin(gpu, two_coloured_room(), texels=2000, coarsen=coarsen)
     reported = [box.solver.report.residual]
     while reported[-1] > 0.05:
         box.solver.step(8)
         reported.append(box.solver.poll(wait=True).residual)
-    # a report is of the state before its step; form factors make at most 0.5 % of a shot's light out of nothing, less than ρ takes
-    assert all(b < a for a, b in zip(reported[1:], reported[2:], strict=False))
+    # a report is of the state before its step: the first two are the same
+    assert all(later < earlier for earlier, later in itertools.pairwise(reported[1:]))
     assert reported[0] == 1 == pytest.approx(reported[1], rel=1e-5)
     book = box.book
     box.solver.step(1)
-    assert box.solver.poll(wait=True).residual == pytest.approx(book.unshot.sum() / book.emitted.sum(), rel=1e-4)  # f32 sums
+    assert box.solver.poll(wait=True).residual == pytest.approx(
+        book.unshot.sum() / book.emitted.sum(), rel=1e-4
+    )  # f32 sums
     box.release()
 
 
@@ -107,7 +128,9 @@ def test_bright_and_faint_lamps_alike(gpu: Gpu, exitance: float) -> None:
     """Stored relative to the brightest lamp: the same bits whatever the unit, but for the rounding of the unit itself."""
     results = []
     for E in (1.0, exitance):
-        box = solve(gpu, quads_scene(room(), [grey(0.5, E)]), texels=400, residual=0.02, storage="rgba16f", resolution=128)
+        box = solve(
+            gpu, quads_scene(room(), [grey(0.5, E)]), texels=400, residual=0.02, storage="rgba16f", resolution=128
+        )
         results.append(box.H / E)
         box.release()
     np.testing.assert_allclose(results[1], results[0], rtol=2e-3)  # 2^-11 of a half float, a few roundings

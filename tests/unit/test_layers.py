@@ -16,7 +16,7 @@ LAYERS = [
     {"atlas"},
     {"projections"},
     {"solvers", "reference", "render", "metrics", "bake"},
-    {"history", "sampled", "picking"},
+    {"history", "picking", "opening", "stats"},
     {"loading"},
     {"session"},
     {"ui"},

@@ -1,0 +1,60 @@
+"""When a solve ends, and where it stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+
+@dataclass(frozen=True)
+class Stop:
+    """When a solve ends, besides when it has converged; whichever comes first."""
+
+    shots: int | None = None
+    seconds: float | None = None
+
+
+@dataclass(frozen=True)
+class Stats:
+    """Where the solution stands. residual: unshot share of the emitted power [-]; energies summed over RGB [W]."""
+
+    shots: int
+    seconds: float
+    residual: float
+    emitted: float
+    absorbed: float
+    escaped: float
+    unshot: float
+    imbalance: float
+    shots_per_second: float
+    converged: bool
+    texels: int
+    tiles: int
+    triangles: int
+    charts: int
+    memory_mib: float
+
+
+def stats_of(session: Session) -> Stats:
+    """Where the solution of an open session stands."""
+    book, lightmap = session.books, session.lightmap
+    return Stats(
+        shots=session.solver.shots,
+        seconds=session.seconds,
+        residual=session.solver.report.residual,
+        emitted=float(book.emitted.sum()),
+        absorbed=float(book.absorbed.sum()),
+        escaped=float(book.escaped.sum()),
+        unshot=float(book.unshot.sum()),
+        imbalance=book.imbalance_share,
+        shots_per_second=session.history.shots_per_second,
+        converged=session.converged,
+        texels=lightmap.texel_count,
+        tiles=lightmap.tiles,
+        triangles=len(session.scene.triangles),
+        charts=session.charts.chart_count,
+        memory_mib=sum(lightmap.memory.values()) / 2**20,
+    )
