@@ -42,7 +42,7 @@ def read_and_unfold(
     scene = load_scene(source, default_light=default_light)
     middle = time.perf_counter()
     tell("unfolding", 0.1)
-    charts = parametrize(scene, density=atlas.density, texels=atlas.texels, progress=tell)
+    charts = parametrize(scene, density=atlas.density, texels=atlas.texels, progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share))
     return scene, charts, {"read": middle - start, "unfold": time.perf_counter() - middle}
 
 

@@ -51,12 +51,15 @@ class Spec:
         if self.choices:
             return "one of " + ", ".join(self.choices)
         if self.minimum is not None and self.maximum is not None:
-            return f"{self.minimum:g} to {self.maximum:g}"
+            return f"{self._text(self.minimum)} to {self._text(self.maximum)}"
         if self.minimum is not None:
-            return f"at least {self.minimum:g}"
+            return f"at least {self._text(self.minimum)}"
         if self.maximum is not None:
-            return f"at most {self.maximum:g}"
+            return f"at most {self._text(self.maximum)}"
         return {int: "a whole number", float: "a number", bool: "true or false"}.get(self.type, "text")
+
+    def _text(self, bound: float) -> str:
+        return str(int(bound)) if self.type is int else f"{bound:g}"
 
     def check(self, value: Any) -> None:
         """Raise UserError unless ``value`` is legal."""

@@ -296,6 +296,9 @@ class Session:
         """Take in what the solver reports; the energy book now and then, and once when shooting has stopped."""
         before = self.solver.report.shots
         report = self.solver.poll()
+        if not np.isfinite(report.residual):
+            self.running = False
+            raise UserError(f"{self.name}: the light is not finite after {report.shots} shots; parameters {self.parameters}")
         if not self.shooting_goes_on:
             self._last_advance = 0.0
             if books and not self._settled:

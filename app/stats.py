@@ -42,7 +42,7 @@ def stats_of(session: Session) -> Stats:
     """Where the solution of an open session stands."""
     book, lightmap = session.books, session.lightmap
     return Stats(
-        shots=session.solver.shots,
+        shots=session.solver.report.shots,
         seconds=session.seconds,
         residual=session.solver.report.residual,
         emitted=float(book.emitted.sum()),

@@ -14,7 +14,7 @@ FALSE_COLOURS = ("off", "illuminance", "luminance")  # lux, cd/m²
 @dataclass(frozen=True)
 class DisplayOptions(Options):
     layer: str = option("combined", "what is shown: B, H, r, albedo, charts or texel density", choices=LAYERS)
-    exposure: float = option(0.0, "exposure", unit="EV", minimum=-24, maximum=24)
+    exposure: float = option(0.0, "exposure; where not given, found from the light", unit="EV", minimum=-24, maximum=24)
     tone_map: str = option("agx", "tone curve", choices=TONE_MAPS)
     smooth: bool = option(True, "bilinear texels instead of nearest")
     ambient: bool = option(False, "add the ambient estimate of light not yet shot (Cohen et al. 1988); display only")

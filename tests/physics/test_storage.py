@@ -40,17 +40,17 @@ def test_light_is_finite_and_not_negative(gpu: Gpu, solved: dict[str, Solution],
 
 
 def test_half_floats_are_close_shot_by_shot(gpu: Gpu) -> None:
-    """Every shot rounds H by at most 2^-10 of itself, the step of a half float. Black walls: each of the lamp's 36 patches shoots
-    once, in whatever order."""
+    """Every shot rounds H by at most 2^-10 of itself, the step of a half float. Black walls: each patch of the lamp shoots once,
+    in whatever order."""
     scene = quads_scene(room((2.0, 1.0, 1.0)), [grey(0.0), grey(0.0, 3.0)], [0, 1, 0, 0, 0, 0])
     H = []
     for storage in ("rgba32f", "rgba16f"):
         solution = solve(gpu, scene, texels=2000, residual=1e-6, coarsen=False, storage=storage)
-        assert solution.solver.shots == 36
         H.append(solution.H)
+        shots = solution.solver.shots
         solution.release()
-    assert H[0].mean() > 0.3
-    np.testing.assert_allclose(H[1], H[0], rtol=36 * 2**-10, atol=1e-4)  # atol: contributions below half floats' range
+    assert H[0].mean() > 0.3 and shots < 40
+    np.testing.assert_allclose(H[1], H[0], rtol=shots * 2**-10, atol=1e-4)  # atol: contributions below half floats' range
 
 
 @pytest.mark.parametrize("storage", STORAGE)
