@@ -15,6 +15,8 @@ import numpy as np
 import psutil
 import pytest
 
+from app.atlas.charts import TILE
+from app.atlas.lightmap import STORAGE
 from app.atlas.options import AtlasOptions
 from app.errors import SceneError, UserError
 from app.gpu import Gpu
@@ -266,14 +268,21 @@ def test_release_gives_everything_back(gpu: Gpu, forgotten: Callable[[], list[ob
     assert not forgotten()
 
 
-def test_picking_and_drawing_change_no_light(session: Session) -> None:
+@pytest.mark.parametrize("storage", STORAGE)
+def test_picking_reads_the_light_and_changes_none(session: Session, storage: str) -> None:
+    session.open_now("cornell-box")
+    session.set_shooting(session.shooting.replace(storage=storage))
     session.solve(Stop(shots=8))
     before = session.lightmap.irradiance()
     texture = session.gpu.texture((64, 48), 4, "f1")
     target = session.gpu.target(texture)
     session.draw(target, (64, 48))
-    picked = session.pick(32, 24)
+    picked = session.pick(32, 40)
     assert picked is not None and min(picked.H) > 0
+    (column, row), columns = picked.texel, session.lightmap.columns
+    at = row // TILE * columns + column // TILE, row % TILE, column % TILE
+    np.testing.assert_allclose(picked.H, before[at], rtol=1e-6)
+    np.testing.assert_allclose(picked.r, session.lightmap.residual()[at], rtol=1e-6)
     np.testing.assert_allclose(picked.B, np.add(picked.E, np.multiply(picked.albedo, picked.H)), rtol=1e-6)
     np.testing.assert_array_equal(session.lightmap.irradiance(), before)
     session.gpu.release_all(target, texture)
