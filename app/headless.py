@@ -21,15 +21,13 @@ from app.bake import prepare_directory, write_bake
 from app.console import Console
 from app.errors import UserError
 from app.gpu import Gpu, gpu_context
-from app.headless_ui import pixels, ui_image
+from app.headless_ui import SAMPLES, pixels, ui_image
 from app.options import from_flags
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
 from app.scene.load import NO_LIGHT
 from app.session import Session, Stop
 from app.solvers import ShootingOptions
-
-SAMPLES = 2  # per pixel along each axis: smooth edges
 
 
 def shot(flags: argparse.Namespace, note: str | None = None) -> int:

@@ -42,7 +42,12 @@ def read_and_unfold(
     scene = load_scene(source, default_light=default_light)
     middle = time.perf_counter()
     tell("unfolding", 0.1)
-    charts = parametrize(scene, density=atlas.density, texels=atlas.texels, progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share))
+    charts = parametrize(
+        scene,
+        density=atlas.density,
+        texels=atlas.texels,
+        progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share),
+    )
     return scene, charts, {"read": middle - start, "unfold": time.perf_counter() - middle}
 
 
@@ -61,7 +66,7 @@ def load(
 
 
 class Loading:
-    """A load under way. ``poll`` says whether it ended; ``result`` gives it or raises what went wrong."""
+    """A load under way. ``ended`` says whether it is over; ``result`` gives it or raises what went wrong."""
 
     def __init__(self, source: str | Path, atlas: AtlasOptions, *, default_light: bool = False) -> None:
         self.source = source

@@ -214,7 +214,7 @@ class Session:
     def solve(self, stop: Stop, progress: Callable[[Stats], None] | None = None) -> None:
         """Shoot until ``stop``, or until converged; ``progress`` hears of it a few times a second."""
         told = start = time.perf_counter()
-        self.interrupted = False
+        self.interrupted = self._settled = False
         try:
             self._solve(stop, start, told, progress)
         except KeyboardInterrupt:
@@ -256,6 +256,7 @@ class Session:
         emitted = float(self._books.emitted.sum())
         if emitted > 0:
             unshot, escaped = float(self._books.unshot.sum()) / emitted, float(self._books.escaped.sum()) / emitted
+            self.solver.report = replace(self.solver.report, residual=unshot)
             self.history.add(self.solver.shots, self.seconds, unshot, escaped)
 
     def restart(self) -> None:
@@ -287,6 +288,7 @@ class Session:
         self.seconds, self._last_advance = 0.0, 0.0
         self._batch = 1
         self._books = books
+        self.gpu.timers.reset()
         self._books_due = time.perf_counter() + BOOKS_SECONDS
         self._settled = True
         self.history = History()
@@ -296,9 +298,11 @@ class Session:
         """Take in what the solver reports; the energy book now and then, and once when shooting has stopped."""
         before = self.solver.report.shots
         report = self.solver.poll()
-        if not np.isfinite(report.residual):
+        if self.running and not np.isfinite(report.residual):
             self.running = False
-            raise UserError(f"{self.name}: the light is not finite after {report.shots} shots; parameters {self.parameters}")
+            raise UserError(
+                f"{self.name}: the light is not finite after {report.shots} shots; parameters {self.parameters}"
+            )
         if not self.shooting_goes_on:
             self._last_advance = 0.0
             if books and not self._settled:

@@ -8,8 +8,7 @@ Node-set textures hold the leaf tiles of 16×16 texels side by side [Coombe03, 4
     t_residual       storage  r [W/m²]: exitance not yet shot
     t_albedo, t_emission      only where a material has such a texture: the factor is in the material table
 
-and tables: t_pages (tile number from 1 of each 16×16 cell of the virtual atlas), t_facets, t_materials, t_sides (items of
-front and back of each triangle).
+and tables: t_pages (tile number from 1 of each 16×16 cell of the virtual atlas), t_facets, t_materials.
 The solver frame is centred on the scene and scaled by its half diagonal, so answers do not depend on unit or origin. H and r
 are stored relative to the largest exitance, which keeps half floats in range and is what 8-bit fixed point needs.
 """
@@ -20,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
-from app.atlas.node_set import VERTEX_FORMAT, Frame, NodeSet, ScalarT
+from app.atlas.node_set import OCCLUDER_FORMAT, VERTEX_FORMAT, Frame, NodeSet, ScalarT
 from app.atlas.receivers import RECEIVER_FORMAT
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.scene.model import F32, F64, Material, Scene
@@ -44,8 +43,8 @@ class Lightmap:
         self._textures = {name: self._upload(array) for name, array in nodes.arrays.items()}
         self._emit = Pass(gpu, "lightmap/emit", defines=self.defines("MATERIAL_BITS", "EMISSION_TEXTURE"))
         self.mesh = Mesh(gpu, nodes.vertices.tobytes(), VERTEX_FORMAT)
-        corners, triangles = nodes.corner_positions.tobytes(), nodes.scene.triangles.astype(np.uint32).tobytes()
-        self.occluders = Mesh(gpu, corners, {"in_position": "3f"}, indices=triangles)
+        corners, triangles = nodes.occluders
+        self.occluders = Mesh(gpu, corners.tobytes(), OCCLUDER_FORMAT, indices=triangles.tobytes())
         self.receivers = {
             flat: Mesh(gpu, quads.tobytes(), RECEIVER_FORMAT, per_instance=True)
             for flat, quads in ((True, nodes.flat_spans), (False, nodes.shaped_tiles))

@@ -20,7 +20,7 @@ Array = NDArray[np.generic]
 ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 MAX_FACETS = (1 << 24) - 2  # item ids are held as floats, see common/item.glsl
-TABLE_WIDTH = 2048  # columns of the facet and side tables
+TABLE_WIDTH = 2048  # columns of the facet table
 UNCHARTED = 16777215.0  # item of a side that has no texels, see common/item.glsl
 
 
@@ -67,6 +67,7 @@ class NodeSet:
         self.albedo_tiles, self.emission_tiles = texel_colours(scene, charts, self.leaves, self.surfaces)
         self.arrays = self._texel_arrays() | self._tables()
         self.flat_spans, self.shaped_tiles = self._receivers()
+        self.occluders = occluders(scene, charts, self.frame)
         self.vertices = _vertices(scene, charts, self.frame)
 
     def tiles_from_image(self, image: Array) -> Array:
@@ -127,7 +128,6 @@ class NodeSet:
             "t_pages": pages,
             "t_facets": self._facet_table(),
             "t_materials": self.material_table(self.scene),
-            "t_sides": self._side_table(),
         }
 
     def _facet_table(self) -> F32:
@@ -138,18 +138,6 @@ class NodeSet:
         table[2 : 2 * len(dpdu) + 2 : 2, :3] = dpdu
         table[3 : 2 * len(dpdv) + 3 : 2, :3] = dpdv
         return table.reshape(rows, TABLE_WIDTH, 4)
-
-    def _side_table(self) -> F32:
-        """(rows, TABLE_WIDTH, 2): per triangle the item of its front and of its back: facet from 1, or UNCHARTED."""
-        count = len(self.scene.triangles)
-        table = np.full((-(-count // TABLE_WIDTH) * TABLE_WIDTH, 2), UNCHARTED, np.float32)
-        table[self.charts.face_triangle, self.charts.face_back.astype(int)] = self.charts.face_facet + 1
-        return table.reshape(-1, TABLE_WIDTH, 2)
-
-    @property
-    def corner_positions(self) -> F32:
-        """(n, 3) f32: where the scene's vertices are in the solver frame; ``scene.triangles`` index them."""
-        return self.frame.local_from_world(self.scene.positions).astype(np.float32)
 
     def _receivers(self) -> tuple[F32, F32]:
         s, charts = self.surfaces, self.charts
@@ -206,6 +194,31 @@ def octahedral(normals: NDArray[np.floating]) -> NDArray[np.uint32]:
     return np.asarray(packed[..., 0] | packed[..., 1] << np.uint32(16), np.uint32)
 
 
+OCCLUDER = np.dtype([("in_position", "f4", 3), ("in_sides", "f4", 2)])
+OCCLUDER_FORMAT = {"in_position": "3f", "in_sides": "2f"}
+
+
+def occluders(scene: Scene, charts: Charts, frame: Frame) -> tuple[Array, Array]:
+    """What a shooter sees: vertices (v,) OCCLUDER and triangles (m, 3) u32.
+
+    in_sides: the items of front and back, facet from 1 or UNCHARTED, of the one triangle that has this vertex last (flat values
+    come from there). The other two corners share any vertex in their place: one vertex per triangle, not three.
+    """
+    count = len(scene.triangles)
+    sides = np.full((count, 2), UNCHARTED, np.float32)
+    sides[charts.face_triangle, charts.face_back.astype(int)] = charts.face_facet + 1
+    last = scene.triangles[:, 2]
+    vertex_at = np.full(len(scene.positions), -1, np.int64)
+    vertex_at[last] = np.arange(count)
+    bare = np.setdiff1d(scene.triangles, last)
+    vertex_at[bare] = count + np.arange(len(bare))
+    vertices = np.zeros(count + len(bare), OCCLUDER)
+    vertices["in_position"] = frame.local_from_world(scene.positions[np.concatenate([last, bare])])
+    vertices["in_sides"][:count] = sides
+    triangles = np.column_stack([vertex_at[scene.triangles[:, :2]], np.arange(count)])
+    return vertices, triangles.astype(np.uint32)
+
+
 VERTEX = np.dtype([("in_position", "f4", 3), ("in_uv_front", "f4", 2), ("in_uv_back", "f4", 2), ("in_ids", "u4", 4)])
 VERTEX_FORMAT = {"in_position": "3f", "in_uv_front": "2f", "in_uv_back": "2f", "in_ids": "4u"}
 
@@ -227,4 +240,4 @@ def _vertices(scene: Scene, charts: Charts, frame: Frame) -> Array:
     return data.reshape(-1)
 
 
-__all__ = ["VERTEX_FORMAT", "Frame", "NodeSet", "ScalarT", "octahedral"]
+__all__ = ["OCCLUDER_FORMAT", "VERTEX_FORMAT", "Frame", "NodeSet", "ScalarT", "octahedral"]

@@ -15,7 +15,7 @@ REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 
 def write_irradiance(path: Path, irradiance: F32) -> None:
-    """Write irradiance E (H, W, 3) f32 [W/m²]; the first scanline is row 0, v = 0 in glTF. OSError if it cannot be.
+    """Write irradiance (height, width, 3) f32 [W/m²]; the first scanline is row 0, v = 0 in glTF. OSError if it cannot be.
 
     The header names the quantity, its unit and the primaries, so that no reader has to guess.
     """
@@ -27,7 +27,7 @@ def write_irradiance(path: Path, irradiance: F32) -> None:
         "quantity": "irradiance",
         "unit": "W/m2",
         "primaries": "Rec.709, linear",
-        "comments": "Irradiance E; diffuse surfaces reflect albedo * E / pi [W/(sr m2)]. First scanline: v = 0 (glTF).",
+        "comments": "Irradiance H; diffuse surfaces reflect albedo * H / pi [W/(sr m2)]. First scanline: v = 0 (glTF).",
     }
     pixels = np.ascontiguousarray(irradiance, np.float32)
     try:

@@ -1,9 +1,9 @@
 """``glowtree bench shots``: milliseconds per shot, by pass, at the sizes of [Coombe03, table 1]: 31K, 172K and 1.6M texels.
 
 The Cornell box is cut three times, then a museum and a grotto of the paper's sizes. A shot is timed in batches, as the headless
-solver shoots, and alone, as the viewer does; the passes one by one, each to the end of its GPU work, for the shooters that the
-solve chooses. Every figure is a median. Bandwidth is what the receiver pass must move at least: H and r of each texel that
-gets light, read and written, and of shaped tiles position, area, normal and ids; beside it a plain copy in the same run.
+solver shoots, and alone, as the viewer does (means over the shots made); the passes one by one, each to the end of its GPU work,
+for the shooters that the solve chooses (medians). Bandwidth is what the receiver pass must move at least: H and r of each texel
+that gets light, read and written, and of shaped tiles position, area, normal and ids; beside it a plain copy in the same run.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from app.atlas.lightmap import Lightmap
+from app.atlas.lightmap import STORAGE, Lightmap
 from app.atlas.options import AtlasOptions
 from app.bench.copy import copy_bandwidth
 from app.console import Console
@@ -34,7 +34,8 @@ SIZES = (
     ("grotto", 1_600_000),
 )
 SECONDS = 3.0  # per figure and size
-BLEND_BYTES = 2 * 32  # H and r read and written, RGBA32F
+WARM_UP = 1.0  # seconds of shots before: lamps first, and programs are compiled when they first draw
+BLENDED = 2 * 2 * 4  # numbers per texel: H and r, read and written, RGBA
 READ_BYTES = 16 + 8  # position, area; normal, ids
 
 
@@ -56,12 +57,13 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions) -> dict
     nodes = load(name, AtlasOptions(texels=texels)).nodes
     lightmap = Lightmap(gpu, nodes, storage=options.storage)
     solver = UniformShooting(gpu, lightmap, options)
-    solver.step(BATCH)
-    shot_ms = _median_ms(gpu, lambda: solver.step(BATCH)) / BATCH
-    single_ms = _median_ms(gpu, lambda: solver.step(1))
+    _ms_per_shot(gpu, solver, BATCH, WARM_UP)
+    shot_ms = _ms_per_shot(gpu, solver, BATCH, SECONDS)
+    single_ms = _ms_per_shot(gpu, solver, 1, SECONDS)
     passes, received = _passes(gpu, solver)
     shaped = len(nodes.shaped_tiles) / max(nodes.tiles, 1)
-    moved = received * (BLEND_BYTES + shaped * READ_BYTES) / (passes["receive"] * 1e-3)
+    blend_bytes = BLENDED * int(STORAGE[options.storage][1:])
+    moved = received * (blend_bytes + shaped * READ_BYTES) / (passes["receive"] * 1e-3)
     row = {
         "scene": name,
         "triangles": len(nodes.scene.triangles),
@@ -77,14 +79,17 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions) -> dict
     return row
 
 
-def _median_ms(gpu: Gpu, run: Callable[[], object]) -> float:
-    """Median wall time of ``run`` to the end of its GPU work [ms]."""
+def _ms_per_shot(gpu: Gpu, solver: UniformShooting, batch: int, seconds: float) -> float:
+    """Mean wall time of a shot that was made [ms]; a batch leaves out those too weak beside its best."""
+    before = solver.poll(wait=True).shots
     gpu.ctx.finish()
-    times: list[float] = []
-    end = time.perf_counter() + SECONDS
-    while time.perf_counter() < end or len(times) < 5:
-        times.append(_ms(gpu, run))
-    return statistics.median(times)
+    start = time.perf_counter()
+    while time.perf_counter() < start + seconds:
+        solver.step(batch)
+        solver.poll()
+    gpu.ctx.finish()
+    elapsed = time.perf_counter() - start
+    return elapsed * 1e3 / max(solver.poll(wait=True).shots - before, 1)
 
 
 def _ms(gpu: Gpu, run: Callable[[], object]) -> float:

@@ -67,7 +67,6 @@ class Pass:
         blend: str | None = None,
         depth: bool = False,
         strip: bool = False,
-        lines: bool = False,
         clip_distances: int = 0,
     ) -> None:
         """Draw once into ``target``. Without a mesh, ``vertices`` without attributes. A block is (buffer, offset, size in bytes).
@@ -87,10 +86,10 @@ class Pass:
         target.use()
         target.viewport = viewport or (0, 0, *target.size)
         flags = (moderngl.BLEND if blend else 0) | (moderngl.DEPTH_TEST if depth else 0)
-        ctx.enable_only(flags | moderngl.PROGRAM_POINT_SIZE)
+        ctx.enable_only(flags)
         if blend:
             ctx.blend_func = BLEND[blend]
-        mode = moderngl.LINES if lines else moderngl.TRIANGLE_STRIP if strip else moderngl.TRIANGLES
+        mode = moderngl.TRIANGLE_STRIP if strip else moderngl.TRIANGLES
         for plane in range(clip_distances):
             ctx.enable_direct(GL_CLIP_DISTANCE0 + plane)
         with self.gpu.timers.measure(self.label):

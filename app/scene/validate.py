@@ -28,6 +28,7 @@ FLATNESS = 2.0**-23
 
 Array = NDArray[Any]
 Bools = NDArray[np.bool_]
+BRIGHTEST = 1e30  # W/(sr m²): leaves room for areas and sums in single precision
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,6 +199,10 @@ def _check_materials(source: str | Path, materials: Sequence[Material], notes: l
     for material in materials:
         if not all(math.isfinite(x) for x in (*material.albedo, *material.emission)):
             raise SceneError(source, f"material '{material.name}': albedo and emission must be finite numbers")
+        if max(material.emission) > BRIGHTEST:
+            raise SceneError(
+                source, f"material '{material.name}': emission above {BRIGHTEST:g} W/(sr m²) is out of range"
+            )
         albedo = _rgb(min(max(x, 0.0), 1.0) for x in material.albedo)
         emission = _rgb(max(x, 0.0) for x in material.emission)
         clamped += albedo != material.albedo

@@ -7,9 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from app.atlas.lightmap import Lightmap
 from app.gpu import Texture
-from app.options import Options
 from app.scene.model import F64
 
 
@@ -67,4 +65,4 @@ class Solver(Protocol):
     def release(self) -> None: ...
 
 
-__all__ = ["EnergyBook", "Lightmap", "Options", "Solver", "StepReport"]
+__all__ = ["EnergyBook", "Solver", "StepReport"]

@@ -50,7 +50,9 @@ def test_half_floats_are_close_shot_by_shot(gpu: Gpu) -> None:
         shots = solution.solver.shots
         solution.release()
     assert H[0].mean() > 0.3 and shots < 40
-    np.testing.assert_allclose(H[1], H[0], rtol=shots * 2**-10, atol=1e-4)  # atol: contributions below half floats' range
+    np.testing.assert_allclose(
+        H[1], H[0], rtol=shots * 2**-10, atol=1e-4
+    )  # atol: contributions below half floats' range
 
 
 @pytest.mark.parametrize("storage", STORAGE)

@@ -88,7 +88,6 @@ Shooter shooter_from_patch(ivec2 corner_px) {
     Texel lead = leading_texel(corner_px, lead_residual);
     Shooter s;
     s.size_px = 0;
-    s.power = 0.0;
     if (lead.area <= 0.0) return s;
     vec3 dpdu = facet_tangent(lead.facet, 0), dpdv = facet_tangent(lead.facet, 1);
     float reach = patch_reach(dpdu, dpdv, SIZE);
@@ -115,7 +114,6 @@ Shooter shooter_from_patch(ivec2 corner_px) {
         upper = max(upper, at);
     }
     s.area = area;
-    s.power = power;
     s.exitance = flux / area;
     s.facet = lead.facet;
     s.patch_px = corner_px;
@@ -143,7 +141,6 @@ void main() {
     vec4 row = ranked_row(shot);
     Shooter s;
     s.size_px = 0;
-    s.power = 0.0;
     if (row.x > 0.0 && (shot == 0 || row.x >= WEAKEST * ranked_row(0).x))
         s = shooter_from_patch(ivec2(row.yz) * SIZE);
     out_row = s.size_px > 0 ? shooter_row(s, int(gl_FragCoord.x)) : vec4(0.0);

@@ -10,16 +10,14 @@ const float GAUSS = 0.28867513459481287;  // 1 / (2 √3): two-point rule on [-1
 // Lambert's contour sum, one edge: the angle under which it is seen, times the height of its normal. [Lambert1760; Baum89]
 float contour_edge(vec3 a, vec3 b, vec3 normal) {
     vec3 axis = cross(a, b);
-    float sine = length(axis);
-    return atan(sine, dot(a, b)) * dot(axis, normal) / max(sine, 1e-30);
+    float sine = max(length(axis), 1e-30);  // atan(0, 0) is undefined
+    return atan(sine, dot(a, b)) * dot(axis, normal) / sine;
 }
 
 // The parallelogram seen from the receiver, corners a b c d clockwise, heights h above its horizon; what lies below is cut off.
 // Every edge is cut by itself; the cut itself is one more edge, from where the contour dives (out) to where it rises (in).
 float contour(vec3 a, vec3 b, vec3 c, vec3 d, vec3 normal) {
     vec4 h = vec4(dot(a, normal), dot(b, normal), dot(c, normal), dot(d, normal));
-    if (all(greaterThan(h, vec4(0.0))))
-        return contour_edge(a, b, normal) + contour_edge(b, c, normal) + contour_edge(c, d, normal) + contour_edge(d, a, normal);
     vec3 dive = vec3(0.0), rise = vec3(0.0);
     float sum = 0.0;
     for (int i = 0; i < 4; ++i) {
@@ -77,9 +75,7 @@ float form_factor(vec3 position, vec3 normal, Shooter s) {
 #if DISC
     float F = disc_form_factor(centre, normal, height, s);
 #elif NEAR_FIELD
-    // near the receiver, yet perhaps far from this texel
-    float F = in_far_field(s, dot(centre, centre)) ? far_form_factor(centre, normal, height, s)
-                                                   : polygon_form_factor(centre, normal, s);
+    float F = polygon_form_factor(centre, normal, s);
 #else
     float F = far_form_factor(centre, normal, height, s);
 #endif

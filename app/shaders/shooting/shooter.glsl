@@ -5,7 +5,6 @@ struct Shooter {
     vec3 normal;
     uint facet;
     vec3 centre;     // of the polygon
-    float power;     // Σ r·A over its texels, sum of RGB
     vec3 edge_u;     // the polygon is the parallelogram centre ± edge_u/2 ± edge_v/2, with area A_i
     vec3 edge_v;
     vec3 exitance;   // mean residual r_i, stored units
@@ -24,7 +23,6 @@ Shooter shooter_from_rows(vec4 rows[SHOOTER_ROWS]) {
     s.normal = rows[1].xyz;
     s.facet = uint(rows[1].w);
     s.centre = rows[2].xyz;
-    s.power = rows[2].w;
     s.edge_u = rows[3].xyz;
     s.edge_v = rows[4].xyz;
     s.patch_px = ivec2(rows[3].w, rows[4].w);
@@ -38,7 +36,7 @@ Shooter shooter_from_rows(vec4 rows[SHOOTER_ROWS]) {
 vec4 shooter_row(Shooter s, int row) {
     if (row == 0) return vec4(s.origin, s.area);
     if (row == 1) return vec4(s.normal, float(s.facet));
-    if (row == 2) return vec4(s.centre, s.power);
+    if (row == 2) return vec4(s.centre, 0.0);
     if (row == 3) return vec4(s.edge_u, float(s.patch_px.x));
     if (row == 4) return vec4(s.edge_v, float(s.patch_px.y));
     if (row == 5) return vec4(s.exitance, float(s.size_px));

@@ -10,9 +10,9 @@ from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOption
 
 BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
 OPEN, FAR = 0.0, 2.0  # item and depth of the open background, see common/item.glsl
-SHOOTER_ROWS = 7  # rows of t_shooters, see shooter.glsl
+SHOOTER_ROWS = 7  # texels that describe one shooter, see shooter.glsl
 BLOCK_BYTES = 256  # no driver asks for a coarser uniform block alignment
-BLOCK_ROWS = BLOCK_BYTES // 16  # columns of t_shooters
+BLOCK_ROWS = BLOCK_BYTES // 16  # texels in a row of t_shooters: one shooter, padded to a uniform block
 REPORT_TEXELS = 2 + SHOOTER_ROWS  # see report.frag.glsl
 OPEN_BLOCK = 32  # visibility texels along the edge of a block that open.frag.glsl sums
 

@@ -6,7 +6,7 @@
         r_i  = 0
         for every texel j:  ΔH_j = r_i F_ji V_ji;  H_j += ΔH_j;  r_j += ρ_j ΔH_j
 
-The chosen shooters never leave the GPU: ``choose`` writes one column of t_shooters per shot of a batch, and every later pass
+The chosen shooters never leave the GPU: ``choose`` writes one row of t_shooters per shot of a batch, and every later pass
 reads it there. All chosen residuals are zeroed before the first of the batch shoots, or what one gives to another would be
 lost. The host only hears, a few steps late, how much is still unshot.
 
@@ -91,7 +91,7 @@ class UniformShooting:
         self.buffers.ledger_target.clear()
         self._drop_reports()
         self._choice = self.stages.choices[0]
-        self.shots = 0
+        self.shots, self.last_shot = 0, None
         self._emitted = self._tile_sums()[1][:3]
         self.report = StepReport(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
 
@@ -221,7 +221,6 @@ class UniformShooting:
         self.stages.see.draw(
             self.stages.visibility_target,
             blocks=self._shooter_block(shot),
-            textures=self.lightmap.textures("t_sides"),
             mesh=self.lightmap.occluders,
             instances=self.stages.projection.views,
             depth=True,
