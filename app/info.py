@@ -19,7 +19,6 @@ from app.scene.model import Scene
 SURFACE_BYTES = 24  # per texel: position and area, normal and ids
 TEXTURE_BYTES = 8  # per texel, for albedo and for emission
 FACET_ENTRY_BYTES = 16  # two of them per facet
-TRIANGLE_BYTES = 8  # the charts of both sides
 PAGE_BYTES = 4  # per cell of TILE×TILE texels of the atlas
 LEVELS = TILE.bit_length() - 1  # from tiles down to texels
 
@@ -64,8 +63,7 @@ def _memory(scene: Scene, charts: Charts, tiles: int, storage: str) -> int:
     light = 2 * 4 * int(STORAGE[storage][1:])  # H and r, four channels of f4, f2 or f1
     pages = PAGE_BYTES * math.prod(charts.size) // TILE**2
     facets = _whole_rows(FACET_ENTRY_BYTES, 2 * (charts.facet_count + 1))
-    sides = _whole_rows(TRIANGLE_BYTES, len(scene.triangles))
-    return texels * (SURFACE_BYTES + light + TEXTURE_BYTES * _textured(scene)) + pages + facets + sides
+    return texels * (SURFACE_BYTES + light + TEXTURE_BYTES * _textured(scene)) + pages + facets
 
 
 def _whole_rows(entry_bytes: int, entries: int) -> int:

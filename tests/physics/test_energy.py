@@ -141,11 +141,10 @@ def test_furnace_while_patches_coarsen(gpu: Gpu, solver: str) -> None:
 
 
 @EVERY_SOLVER
-@pytest.mark.parametrize("texels", [1000, 4000])
-def test_furnace_with_a_ball(gpu: Gpu, texels: int, solver: str) -> None:
+def test_furnace_with_a_ball(gpu: Gpu, solver: str) -> None:
     """A ball of 1280 triangles in the room, under texels as large as 20 of them: they must neither hide in the ball nor look
     into it. Of the light, 1 % is still unshot, at most 2 % of B here; texels of several planes shoot and receive as if they were
-    one, which loses 1 % of the light with the larger ones."""
+    one, which loses another 1 %."""
     ball = icosphere(0.25, 3).moved(0.5, 0.5, 0.5)
     walls = quads_scene(room(), [grey(0.5, 1.0)])
     scene = dataclasses.replace(
@@ -156,7 +155,7 @@ def test_furnace_with_a_ball(gpu: Gpu, texels: int, solver: str) -> None:
         object_ids=np.concatenate([walls.object_ids, np.full(len(ball.triangles), 6)]).astype(np.int32),
         objects=(*walls.objects, "ball"),
     )
-    furnace = solve(gpu, scene, texels=texels, residual=0.01, solver=solver)
+    furnace = solve(gpu, scene, texels=1000, residual=0.01, solver=solver)
     B = furnace.means(furnace.B)[:, 0] / 2
     np.testing.assert_allclose(B, 1.0, atol=0.04)
     assert abs(shares(furnace)["imbalance"]) < 0.015
