@@ -26,6 +26,8 @@ def doctor(flags: argparse.Namespace) -> int:
         "python": sys.version.split()[0],
         "platform": platform.platform(),
     }
+    if sys.platform.startswith("linux"):
+        values["display"] = os.environ.get("DISPLAY") or "none: headless commands only"
     missing = []
     for name in PACKAGES:
         try:
@@ -44,14 +46,17 @@ def doctor(flags: argparse.Namespace) -> int:
                 "rasteriser": "software" if gpu.software else "hardware",
             }
     except GpuError as error:
-        missing.append(str(error))
-    if sys.platform.startswith("linux"):
-        absent = [package for library, package in LIBRARIES.items() if ctypes.util.find_library(library) is None]
-        if absent:
-            missing.append(f"missing libraries, on Debian: apt-get install {' '.join(absent)} libgl1-mesa-dri")
-        values["display"] = os.environ.get("DISPLAY") or "none: headless commands only"
+        missing += [str(error), *_libraries()]
     values["missing"] = missing
     text = "\n".join(f"{name:>18}  {value}" for name, value in values.items() if name != "missing")
     verdict = "\n".join(missing) if missing else "Everything that is needed is there."
     Console(quiet=flags.json).result(values, f"{text}\n\n{verdict}")
     return 2 if missing else 0
+
+
+def _libraries() -> list[str]:
+    """What may be the reason that there is no context. A loader can also find them where this does not look."""
+    if not sys.platform.startswith("linux"):
+        return []
+    absent = [package for library, package in LIBRARIES.items() if ctypes.util.find_library(library) is None]
+    return [f"missing libraries, on Debian: apt-get install {' '.join(absent)} libgl1-mesa-dri"] if absent else []

@@ -26,8 +26,9 @@ from app.options import from_flags
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
 from app.scene.load import NO_LIGHT
-from app.session import Session, Stop
+from app.session import Session, Stats, Stop
 from app.solvers import ShootingOptions
+from app.solving import NotFiniteError
 
 
 def shot(flags: argparse.Namespace, note: str | None = None) -> int:
@@ -40,7 +41,7 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
         shows_light = flags.ui or LAYER_SHADERS[session.display.layer].light is not None
         _open(session, flags.scene, console, note, needs_light=shows_light)
         _choose_camera(session, flags.camera)
-        _solve(session, flags, console)
+        failure = _solve(session, flags, console)
         if flags.exposure is None:
             session.expose()
         if flags.ui:
@@ -50,6 +51,8 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
         _save_png(flags.output, image)
         result = {"output": str(flags.output), **report(session)}
         session.release()
+    if failure is not None:
+        raise UserError(f"{failure}; {flags.output} shows it as it is")
     console.result(result, f"{flags.output}: {_summary(result)}")
     return 130 if result["interrupted"] else 0
 
@@ -60,15 +63,20 @@ def bake(flags: argparse.Namespace) -> int:
     with _folder(flags.output), gpu_context() as gpu:
         session = Session(gpu, **session_options(flags))
         _open(session, flags.scene, console)
-        _solve(session, flags, console)
+        failure = _solve(session, flags, console)
         clock = time.perf_counter()
         lightmap = session.lightmap
         irradiance = lightmap.atlas_image(lightmap.irradiance())
         covered = lightmap.atlas_image(lightmap.nodes.surfaces.face >= 0)
         session.load_seconds["read back"] = time.perf_counter() - clock
-        result = report(session)
-        files = write_bake(flags.output, session.scene, session.charts, irradiance, covered, result)
+        finite = np.asarray(np.isfinite(irradiance).all(-1))
+        lost = int((covered & ~finite).sum())
+        result = report(session) | {"texels_not_finite": lost}
+        irradiance = np.where(finite[..., None], irradiance, np.float32(0))
+        files = write_bake(flags.output, session.scene, session.charts, irradiance, covered & finite, result)
         session.release()
+    if failure is not None:
+        raise UserError(f"{failure}; {flags.output} has the light of all texels but {lost}")
     result = {"output": [str(path) for path in vars(files).values()], **result}
     console.result(result, f"{flags.output}: {_summary(result)}")
     return 130 if result["interrupted"] else 0
@@ -91,8 +99,6 @@ def view_or_shot(flags: argparse.Namespace) -> int:
 
 def view(flags: argparse.Namespace) -> int:
     """Open the window on a scene. Raises UserError."""
-    from platformdirs import user_config_path
-
     from app.scene.library import scene_names
     from app.scene.load import LOADERS
     from app.window import run_window
@@ -102,16 +108,28 @@ def view(flags: argparse.Namespace) -> int:
         session.open(flags.scene)
         return session
 
-    layout = user_config_path("glowtree", ensure_exists=True) / "layout.ini"
     run_window(
         make_session,
         size=flags.size,
         scenes=scene_names(),
         suffixes=tuple(LOADERS),
-        layout_file=layout,
+        layout_file=_layout_file(),
         frames=flags.frames,
     )
     return 0
+
+
+def _layout_file() -> Path | None:
+    """Where the window keeps the places of its panels; None, and a note, where nothing can be kept."""
+    from platformdirs import user_config_path
+
+    folder = user_config_path("glowtree")
+    try:
+        prepare_directory(folder)
+    except UserError as error:
+        Console().warn(f"the layout of the panels is not kept: {error}")
+        return None
+    return folder / "layout.ini"
 
 
 def session_options(flags: argparse.Namespace) -> dict[str, Any]:
@@ -182,12 +200,19 @@ def _open(session: Session, scene: str, console: Console, note: str | None = Non
         console.warn(warning)
 
 
-def _solve(session: Session, flags: argparse.Namespace, console: Console) -> None:
+def _solve(session: Session, flags: argparse.Namespace, console: Console) -> NotFiniteError | None:
+    """Solve. What broke the light is returned: what there is can still be written."""
     stop = Stop(shots=flags.shots, seconds=flags.time)
+
+    def say(stats: Stats) -> None:
+        tell(f"{stats.shots} shots, {stats.residual:.3%} unshot", session.progress(stop))
+
     with console.progress("shooting") as tell:
-        session.solve(
-            stop, lambda stats: tell(f"{stats.shots} shots, {stats.residual:.3%} unshot", session.progress(stop))
-        )
+        try:
+            session.solve(stop, say)
+        except NotFiniteError as error:
+            return error
+    return None
 
 
 def _choose_camera(session: Session, name: str | None) -> None:

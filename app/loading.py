@@ -1,4 +1,4 @@
-"""From a file to a node set, in a thread of its own: the window never waits for it."""
+"""From a file, or a scene that is open, to a node set, in a thread of its own: the window never waits for it."""
 
 from __future__ import annotations
 
@@ -26,20 +26,21 @@ class CancelledError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A node set, the exposure to open it with [EV], and how long each stage took [s]."""
+    """A node set, how it was cut, the exposure to open it with [EV], and how long each stage took [s]."""
 
     nodes: NodeSet
+    atlas: AtlasOptions
     exposure: float
     seconds: dict[str, float]
 
 
 def read_and_unfold(
-    source: str | Path, atlas: AtlasOptions, default_light: bool, tell: Progress
+    source: str | Path | Scene, atlas: AtlasOptions, default_light: bool, tell: Progress
 ) -> tuple[Scene, Charts, dict[str, float]]:
     """The scene, its charts, and the seconds of both stages. Raises UserError (SceneError)."""
     start = time.perf_counter()
     tell("reading", 0.0)
-    scene = load_scene(source, default_light=default_light)
+    scene = source if isinstance(source, Scene) else load_scene(source, default_light=default_light)
     middle = time.perf_counter()
     tell("unfolding", 0.1)
     charts = parametrize(
@@ -52,9 +53,9 @@ def read_and_unfold(
 
 
 def load(
-    source: str | Path, atlas: AtlasOptions, *, default_light: bool = False, progress: Progress | None = None
+    source: str | Path | Scene, atlas: AtlasOptions, *, default_light: bool = False, progress: Progress | None = None
 ) -> Loaded:
-    """Read a scene, unfold it and cut it into texels. Raises UserError (SceneError)."""
+    """Read a scene, or take one as it is; unfold it and cut it into texels. Raises UserError (SceneError)."""
     tell: Progress = progress or (lambda stage, share: None)
     scene, charts, seconds = read_and_unfold(source, atlas, default_light, tell)
     start = time.perf_counter()
@@ -62,20 +63,28 @@ def load(
     nodes = NodeSet(scene, charts)
     exposure = first_exposure(nodes)
     tell("done", 1.0)
-    return Loaded(nodes, exposure, seconds | {"texels": time.perf_counter() - start})
+    return Loaded(nodes, atlas, exposure, seconds | {"texels": time.perf_counter() - start})
 
 
 class Loading:
-    """A load under way. ``ended`` says whether it is over; ``result`` gives it or raises what went wrong."""
+    """A load under way. ``ended`` says whether it is over; ``result`` gives it or raises what went wrong.
 
-    def __init__(self, source: str | Path, atlas: AtlasOptions, *, default_light: bool = False) -> None:
+    cancelled: by the user. Whoever waits for the result gives up then; the thread ends at its next stage.
+    """
+
+    def __init__(self, source: str | Path | Scene, atlas: AtlasOptions, *, default_light: bool = False) -> None:
         self.source = source
         self.stage, self.fraction = "reading", 0.0
-        self._cancelled = False
+        self.cancelled = False
         self._loaded: Loaded | None = None
         self._error: BaseException | None = None
         self._thread = threading.Thread(target=self._run, args=(atlas, default_light), daemon=True)
         self._thread.start()
+
+    @property
+    def name(self) -> str:
+        """What is loaded, for messages."""
+        return self.source.name if isinstance(self.source, Scene) else str(self.source)
 
     @property
     def ended(self) -> bool:
@@ -85,16 +94,14 @@ class Loading:
     def result(self) -> Loaded:
         """What was loaded. Raises UserError, or CancelledError."""
         self._thread.join()
-        if self._cancelled:
-            raise CancelledError
         if self._error is not None:
             raise self._error
         assert self._loaded is not None
         return self._loaded
 
     def cancel(self) -> None:
-        """Stop at the next stage; the scene that is open stays."""
-        self._cancelled = True
+        """Stop; the scene that is open stays."""
+        self.cancelled = True
 
     def _run(self, atlas: AtlasOptions, default_light: bool) -> None:
         try:
@@ -105,6 +112,6 @@ class Loading:
             self._error = error
 
     def _progress(self, stage: str, share: float) -> None:
-        if self._cancelled:
+        if self.cancelled:
             raise CancelledError
         self.stage, self.fraction = stage, share

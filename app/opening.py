@@ -8,27 +8,44 @@ from collections.abc import Generator
 from app.atlas.lightmap import Lightmap
 from app.atlas.node_set import NodeSet
 from app.gpu import Gpu
-from app.solvers import SOLVERS, ShootingOptions, UniformShooting
+from app.render.frame import FrameRenderer
+from app.scene.model import Material
+from app.solvers import DEFAULT_SOLVER, SOLVERS, ShootingOptions, Solver
 
 
 def prepare(
-    gpu: Gpu, nodes: NodeSet, shooting: ShootingOptions
-) -> Generator[None, None, tuple[Lightmap, UniformShooting]]:
+    gpu: Gpu,
+    nodes: NodeSet,
+    options: ShootingOptions,
+    renderer: FrameRenderer,
+    *,
+    solver_name: str = DEFAULT_SOLVER,
+) -> Generator[None, None, tuple[Lightmap, Solver[ShootingOptions]]]:
     """Upload, and draw once with each program, since drivers compile it then; yields after each part. The light is as before
     the first shot. Raises UserError; then, and when given up between two parts, nothing stays on the GPU."""
     with contextlib.ExitStack() as undo:
-        lightmap = Lightmap(gpu, nodes, storage=shooting.storage)
+        lightmap = Lightmap(gpu, nodes, storage=options.storage)
         undo.callback(lightmap.release)
         gpu.ctx.finish()
         yield
-        solver = SOLVERS["shooting"](gpu, lightmap, shooting)
+        solver = SOLVERS[solver_name](gpu, lightmap, options)
         undo.callback(solver.release)
         yield
-        for run in solver.passes().values():
+        for run in solver.passes(1).values():
             run()
             gpu.ctx.finish()
             yield
         solver.reset()
         yield
+        renderer.prepare(lightmap)
+        undo.callback(renderer.give_up)
+        gpu.ctx.finish()
+        yield
         undo.pop_all()
     return lightmap, solver
+
+
+def put_materials(lightmap: Lightmap, materials: tuple[Material, ...]) -> None:
+    """Other factors of albedo and emission for the next reset: nothing is cleared, as the solver does that then."""
+    lightmap.scene = lightmap.scene.with_materials(materials)
+    lightmap.texture("t_materials").write(lightmap.nodes.material_table(lightmap.scene).tobytes())

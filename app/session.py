@@ -14,13 +14,15 @@ from typing import Any
 import numpy as np
 
 from app.atlas.charts import Charts
+from app.atlas.lightmap import Lightmap
 from app.atlas.options import AtlasOptions
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Texture
 from app.history import History
-from app.loading import CancelledError, Loaded, Loading, load
-from app.opening import prepare
+from app.loading import Loaded, Loading, load
+from app.opening import prepare, put_materials
 from app.picking import Picked, picked_from_hit
+from app.projections import PROJECTIONS
 from app.render.camera import CameraView
 from app.render.exposure import exposure_of
 from app.render.false_colour import Scale
@@ -29,12 +31,14 @@ from app.render.items import ItemImage
 from app.render.options import DisplayOptions
 from app.render.surfaces import Rect
 from app.scene.model import RGB, Camera, Material, Scene
-from app.solvers import EnergyBook, ShootingOptions
-from app.solvers.shooting.stages import BATCH
+from app.solvers import EnergyBook, ShootingOptions, Solver
+from app.solving import not_finite, share_done, solve
 from app.stats import Stats, Stop, stats_of
 
 BOOKS_SECONDS = 0.5  # between two looks at the energy book while shooting, at least: it reads every texel
 BOOKS_SHARE = 0.05  # of the time may go into it
+SLOW_BOOKS, RARE_SECONDS = 0.03, 3.0  # a look that takes longer than this is felt, and waits at least so long
+EDIT_SECONDS = 0.2  # without another edit, until the book is made: a slider that is dragged edits every frame
 
 
 class Session:
@@ -67,15 +71,15 @@ class Session:
         self.load_seconds: dict[str, float] = {}
         self.history = History()
         self.interrupted = False
-        self.seconds = 0.0
-        self._last_advance = 0.0
+        self.seconds = self._last_advance = 0.0
         self._batch = 1
         self._books: EnergyBook
-        self._books_due = 0.0
-        self._settled = True
-        self._busy = False
+        self._books_due = self._quiet_after = 0.0
+        self._settled, self._busy, self._opened = True, False, False
         self._swapping: Generator[None, None, None] | None = None
-        self._opened = False
+        self.lightmap: Lightmap
+        self.solver: Solver[ShootingOptions]
+        self.unedited: Scene  # the open one as it was read: the same through edits, and however it is cut
 
     # -- opening -------------------------------------------------------------------------------------------------------
 
@@ -90,44 +94,55 @@ class Session:
             pass
 
     def set_atlas(self, atlas: AtlasOptions) -> None:
-        """Cut the open scene anew, in the background."""
-        self.atlas = atlas
-        self.open(self.source)
+        """Cut the open scene anew, in the background; its materials as edited, exposure and camera stay. Raises UserError
+        while another scene is on its way."""
+        if self.loading is not None and self.loading.source is not self.unedited:
+            raise UserError(f"{self.loading.name} is loading: cut {self.name} anew before or after that")
+        self._stop_loading()
+        self.loading = Loading(self.unedited, atlas)
 
     def poll(self) -> None:
         """Once per frame: hear from the GPU, and swap in a scene that has finished loading, a part of it per frame."""
         self._busy = False
-        if self.loading is not None and self.loading.ended:
+        if self.loading is not None and (self.loading.ended or self.loading.cancelled):
             self._busy = True
             self._swap_some(self.loading)
         elif self._opened:
-            self._hear()
+            self.hear()
 
     def _swap_some(self, loading: Loading) -> None:
         """The next part of opening what was loaded; the scene that is open stays until the last."""
+        if loading.cancelled:
+            self._stop_loading()
+            self.message = f"{loading.name}: stopped" + (f"; {self.name} stays as it is" if self._opened else "")
+            return
         try:
             if self._swapping is None:
                 self._swapping = self._swap(loading.result)
             next(self._swapping)
         except StopIteration:
             self.loading = self._swapping = None
-        except CancelledError:
-            self.message = f"{loading.source}: loading stopped"
-            self.loading = None
         except UserError as error:
             self.message = str(error)
             self.loading = self._swapping = None
 
     def _swap(self, loaded: Loaded) -> Generator[None, None, None]:
         """Open what was loaded, in parts that each take a fraction of it. Raises UserError; what is open stays then."""
-        clock = time.perf_counter()
-        lightmap, solver = yield from prepare(self.gpu, loaded.nodes, self.shooting)
+        clock, scene = time.perf_counter(), loaded.nodes.scene
+        lightmap, solver = yield from prepare(self.gpu, loaded.nodes, self.shooting, self.renderer)
+        if solver.options != self.shooting:  # changed between two parts
+            solver.set_options(self.shooting)
+        cut_anew = self._opened and scene is self.unedited
+        if cut_anew and self.scene is not scene:
+            put_materials(lightmap, self.scene.materials)
+            solver.reset()
         self.close()
-        self.lightmap, self.solver = lightmap, solver
+        self.lightmap, self.solver, self.unedited, self.atlas = lightmap, solver, scene, loaded.atlas
         self.load_seconds = loaded.seconds | {"upload": time.perf_counter() - clock}
         self.source = self.scene.source or self.scene.name
-        self.look_through(self.scene.cameras[0])
-        if self.expose_on_open:
+        if not cut_anew:
+            self.look_through(self.scene.cameras[0])
+        if self.expose_on_open and not cut_anew:
             self.display = self.display.replace(exposure=loaded.exposure)
         self.message = None if self.scene.emits else f"{self.scene.name} has no light: try --light for a ceiling light"
         self._opened = True
@@ -192,14 +207,13 @@ class Session:
         has already done something long."""
         if not self._opened or self._busy or not self.shooting_goes_on:
             return 0
-        self._settled = False
         made, start = 0, time.perf_counter()
         while made < shots:
-            made += self.solver.step(min(shots - made, self._batch))
+            made += self.shoot(min(shots - made, self._batch))
             if made < shots:
                 self.gpu.ctx.finish()
                 spent = (time.perf_counter() - start) * 1e3
-                self._batch = max(1, min(BATCH, int((budget_ms - spent) / (spent / made))))
+                self._batch = max(1, int((budget_ms - spent) / (spent / made)))
                 if spent >= budget_ms:
                     break
         self.seconds += time.perf_counter() - self._last_advance if self._last_advance else 0.0
@@ -208,48 +222,24 @@ class Session:
 
     def shoot_once(self) -> None:
         """One shot, also when paused."""
-        self.solver.step(1)
+        self.shoot(1)
+
+    def shoot(self, shots: int) -> int:
+        """Up to ``shots`` shots, of one batch at most, also when paused or converged; how many."""
         self._settled = False
+        return self.solver.step(shots)
 
     def solve(self, stop: Stop, progress: Callable[[Stats], None] | None = None) -> None:
-        """Shoot until ``stop``, or until converged; ``progress`` hears of it a few times a second."""
-        told = start = time.perf_counter()
-        self.interrupted = self._settled = False
-        try:
-            self._solve(stop, start, told, progress)
-        except KeyboardInterrupt:
-            self.interrupted = True
-        self.gpu.ctx.finish()
-        self.seconds = time.perf_counter() - start
-        self.settle()
+        """Shoot until ``stop``, or until converged, see ``solving.solve``. Raises NotFiniteError."""
+        solve(self, stop, progress)
 
     def progress(self, stop: Stop) -> float:
-        """Share done of a solve: of the shots or seconds asked for, or of the decades of residual down to the threshold."""
-        residual = max(self.solver.report.residual, 1e-12)
-        shares = [np.log(min(residual, 1.0)) / np.log(min(self.shooting.residual, 0.999999))]
-        if stop.shots is not None:
-            shares.append(self.solver.shots / stop.shots)
-        if stop.seconds is not None:
-            shares.append(self.seconds / stop.seconds)
-        return float(min(max(shares), 1.0))
-
-    def _solve(self, stop: Stop, start: float, told: float, progress: Callable[[Stats], None] | None) -> None:
-        while not self.converged:
-            left = BATCH if stop.shots is None else stop.shots - self.solver.shots
-            if stop.shots is not None and left <= 0:
-                left = stop.shots - self.solver.poll(wait=True).shots  # some of the issued ones were too weak
-            spent = time.perf_counter() - start
-            if left <= 0 or (stop.seconds is not None and spent >= stop.seconds):
-                break
-            self.solver.step(min(BATCH, left))
-            self.seconds = time.perf_counter() - start
-            self._hear(books=False)
-            if progress and time.perf_counter() - told > 0.2:
-                told = time.perf_counter()
-                progress(self.stats)
+        """Share done of a solve."""
+        return share_done(self, stop)
 
     def settle(self) -> None:
-        """Wait for the GPU and bring report, book and history up to the last shot."""
+        """Wait for the GPU and bring report, book and history up to the last shot. Raises NotFiniteError, once."""
+        known = np.isfinite(self.solver.report.residual)
         self.solver.poll(wait=True)
         self._make_books()
         self._settled = True
@@ -258,6 +248,8 @@ class Session:
             unshot, escaped = float(self._books.unshot.sum()) / emitted, float(self._books.escaped.sum()) / emitted
             self.solver.report = replace(self.solver.report, residual=unshot)
             self.history.add(self.solver.shots, self.seconds, unshot, escaped)
+            if known and not np.isfinite(unshot + float(self._books.absorbed.sum())):
+                raise not_finite(self)
 
     def restart(self) -> None:
         """Forget all light and begin again."""
@@ -278,37 +270,37 @@ class Session:
         """Another albedo or emission: charts and texels stay, the light begins again."""
         materials = list(self.scene.materials)
         materials[index] = material
-        self.lightmap.set_materials(tuple(materials))
+        put_materials(self.lightmap, tuple(materials))
         self.restart()
-        self._books_due = 0.0
-        self._settled = False
+        self._quiet_after = time.perf_counter() + EDIT_SECONDS
+        self._books_due, self._settled = 0.0, False
 
     def _begin(self, books: EnergyBook) -> None:
         """books: with nothing shot."""
-        self.seconds, self._last_advance = 0.0, 0.0
-        self._batch = 1
-        self._books = books
+        self.seconds = self._last_advance = 0.0
+        self._batch, self._books = 1, books
         self.gpu.timers.reset()
-        self._books_due = time.perf_counter() + BOOKS_SECONDS
+        self._books_due, self._quiet_after = time.perf_counter() + BOOKS_SECONDS, 0.0
         self._settled = True
         self.history = History()
         self.history.add(0, 0.0, self.solver.report.residual, 0.0)
 
-    def _hear(self, books: bool = True) -> None:
-        """Take in what the solver reports; the energy book now and then, and once when shooting has stopped."""
+    def hear(self, *, books: bool = True) -> None:
+        """Take in what the solver reports; the energy book now and then, and once when shooting has stopped. Raises
+        NotFiniteError and pauses."""
         before = self.solver.report.shots
         report = self.solver.poll()
         if self.running and not np.isfinite(report.residual):
             self.running = False
-            raise UserError(
-                f"{self.name}: the light is not finite after {report.shots} shots; parameters {self.parameters}"
-            )
+            raise not_finite(self)
+        now = time.perf_counter()
+        books = books and now >= self._quiet_after
         if not self.shooting_goes_on:
             self._last_advance = 0.0
             if books and not self._settled:
                 self._busy = True
                 self.settle()
-        elif books and time.perf_counter() >= self._books_due:
+        elif books and now >= self._books_due:
             self._busy = True
             self._make_books()
         if report.shots != before and not self._settled:
@@ -319,7 +311,8 @@ class Session:
         start = time.perf_counter()
         self._books = self.solver.books()
         now = time.perf_counter()
-        self._books_due = now + max(BOOKS_SECONDS, (now - start) / BOOKS_SHARE)
+        cost = now - start
+        self._books_due = now + max(BOOKS_SECONDS if cost < SLOW_BOOKS else RARE_SECONDS, cost / BOOKS_SHARE)
 
     # -- what is known -------------------------------------------------------------------------------------------------
 
@@ -393,13 +386,14 @@ class Session:
     def _shooter_rect(self) -> Rect | None:
         """The last shooter's patch in atlas texels."""
         shot = self.solver.last_shot
-        return (
-            None if shot is None or not self.display.shooter else self.lightmap.nodes.atlas_rect(shot.corner, shot.size)
-        )
+        if shot is None or not self.display.last_shooter:
+            return None
+        return self.lightmap.nodes.atlas_rect(shot.corner, shot.size)
 
     def hemicube_image(self) -> Texture:
         """The last shooter's visibility map, in one colour per facet."""
-        return self.items.draw(self.solver.inspect()["visibility"])
+        seen, projection = self.solver.inspect(), PROJECTIONS[self.shooting.projection]
+        return self.items.draw(seen["items"], seen["depth"], projection.size(self.shooting.resolution))
 
 
 __all__ = ["Session", "Stats", "Stop"]

@@ -1,9 +1,10 @@
 """``glowtree bench shots``: milliseconds per shot, by pass, at the sizes of [Coombe03, table 1]: 31K, 172K and 1.6M texels.
 
-The Cornell box is cut three times, then a museum and a grotto of the paper's sizes. A shot is timed in batches, as the headless
-solver shoots, and alone, as the viewer does (means over the shots made); the passes one by one, each to the end of its GPU work,
-for the shooters that the solve chooses (medians). Bandwidth is what the receiver pass must move at least: H and r of each texel
-that gets light, read and written, and of shaped tiles position, area, normal and ids; beside it a plain copy in the same run.
+The Cornell box is cut three times, then a museum and a grotto of the paper's sizes. A shot is timed alone, as the viewer shoots,
+and in batches, as the headless solver does (means over the shots made); the passes of a batch one by one, each to the end of its
+GPU work, for the shooters that the solve chooses (medians, divided by the shots of a batch). Bandwidth is what the receiver pass
+must move at least: H and r of each texel that gets light, read and written once in a batch, and of shaped tiles position, area,
+normal and ids; beside it a plain copy in the same run.
 """
 
 from __future__ import annotations
@@ -57,9 +58,10 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions) -> dict
     nodes = load(name, AtlasOptions(texels=texels)).nodes
     lightmap = Lightmap(gpu, nodes, storage=options.storage)
     solver = UniformShooting(gpu, lightmap, options)
+    _ms_per_shot(gpu, solver, 1, WARM_UP)
+    single_ms = _ms_per_shot(gpu, solver, 1, SECONDS)
     _ms_per_shot(gpu, solver, BATCH, WARM_UP)
     shot_ms = _ms_per_shot(gpu, solver, BATCH, SECONDS)
-    single_ms = _ms_per_shot(gpu, solver, 1, SECONDS)
     passes, received = _passes(gpu, solver)
     shaped = len(nodes.shaped_tiles) / max(nodes.tiles, 1)
     blend_bytes = BLENDED * int(STORAGE[options.storage][1:])
@@ -100,18 +102,20 @@ def _ms(gpu: Gpu, run: Callable[[], object]) -> float:
 
 
 def _passes(gpu: Gpu, solver: UniformShooting) -> tuple[dict[str, float], float]:
-    """Median milliseconds of each pass over the shooters of a solve, and the mean number of texels that get light."""
-    times: dict[str, list[float]] = {label: [] for label in solver.passes()}
+    """Median milliseconds of each pass per shot of a batch, over the shooters of a solve, and how many texels are written."""
+    times: dict[str, list[float]] = {label: [] for label in solver.passes(BATCH)}
     samples: list[int] = []
     end = time.perf_counter() + SECONDS
     while time.perf_counter() < end or len(samples) < 5:
-        for label, run in solver.passes().items():
+        for label, run in solver.passes(BATCH).items():
             query = gpu.ctx.query(samples=True)
             with query:
                 times[label].append(_ms(gpu, run))
             if label == "receive":
                 samples.append(query.samples)
-    return {label: statistics.median(values) for label, values in times.items()}, statistics.mean(samples)
+    return {label: statistics.median(values) / BATCH for label, values in times.items()}, statistics.mean(
+        samples
+    ) / BATCH
 
 
 def _table(values: dict[str, Any]) -> str:
@@ -126,5 +130,5 @@ def _table(values: dict[str, Any]) -> str:
         lines.append([*cells, *(f"{rate:.1f}" for rate in rates), f"{rates[0] / rates[1]:.0%}"])
     widths = np.max([[len(cell) for cell in line] for line in lines], axis=0)
     table = "\n".join("| " + " | ".join(c.rjust(w) for c, w in zip(line, widths, strict=True)) + " |" for line in lines)
-    note = f"ms per shot and per pass (choose, book: per batch of {BATCH}); GB/s: of the receiver pass"
+    note = f"ms per shot, and of each pass per shot of a batch of {BATCH}; GB/s: of the receiver pass"
     return f"{values['renderer']}\n{note}\n\n{table}"

@@ -126,16 +126,20 @@ class Mesh:
         per_instance: bool = False,
         indices: bytes | None = None,
     ) -> None:
-        self._ctx = gpu.ctx
+        self._ctx, self._shaders = gpu.ctx, gpu.shaders
         self.buffer = gpu.ctx.buffer(data)
         self.attributes = dict(attributes)
         self.per_instance = per_instance
         self._indices = None if indices is None else gpu.ctx.buffer(indices)
         self.count = len(data) // sum(int(f[0]) * 4 for f in attributes.values())
         self._arrays: list[tuple[moderngl.Program, moderngl.VertexArray]] = []
+        self._generation = gpu.shaders.generation
 
     def vertex_array(self, program: moderngl.Program) -> moderngl.VertexArray:
         """This mesh as ``program`` reads it; attributes that it does not use are skipped. Raises ShaderError."""
+        if self._generation != self._shaders.generation:  # the programs of the others are gone
+            self._release_arrays()
+            self._generation = self._shaders.generation
         for known, array in self._arrays:
             if known is program:
                 return array
@@ -149,10 +153,13 @@ class Mesh:
         self._arrays.append((program, array))
         return array
 
-    def release(self) -> None:
+    def _release_arrays(self) -> None:
         for _, array in self._arrays:
             array.release()
         self._arrays.clear()
+
+    def release(self) -> None:
+        self._release_arrays()
         self.buffer.release()
         if self._indices is not None:
             self._indices.release()

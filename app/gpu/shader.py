@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import moderngl
 
@@ -20,6 +21,11 @@ VERSION = "#version 410 core"
 _INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
 _DEFINE = re.compile(r"^\s*#define\s+(\w+)(?:\s+(.*?))?\s*$")
 _LOCATION = re.compile(r"\b0[:(](\d+)\)?")  # Mesa: 0:line(column), NVIDIA: 0(line)
+MEMBERS: dict[type, str] = {
+    moderngl.UniformBlock: "block",
+    moderngl.Uniform: "uniform",
+    moderngl.Attribute: "attribute",
+}
 
 
 class ShaderError(Exception):
@@ -53,8 +59,17 @@ class ShaderLibrary:
         return self._empty[program.glo]
 
     def reload(self) -> None:
-        """Compile every program again from disk. Raises ShaderError and changes nothing if one fails."""
-        fresh = {key: self._compile(key[0], dict(key[1]), dict(key[2])) for key in self._programs}  # type: ignore[arg-type, call-overload]
+        """Compile every program again from disk. Raises ShaderError and changes nothing if one fails, or if its names or types
+        are others: what draws with it binds those that it had."""
+        fresh: dict[tuple[object, ...], moderngl.Program] = {}
+        try:
+            for key, known in self._programs.items():
+                fresh[key] = self._compile(key[0], dict(key[1]), dict(key[2]))  # type: ignore[arg-type, call-overload]
+                _check_same_names(str(key[0]), _names(known), _names(fresh[key]))
+        except ShaderError:
+            for program in fresh.values():
+                program.release()
+            raise
         self.release()
         self._programs = fresh
         self.generation += 1
@@ -81,6 +96,28 @@ class ShaderLibrary:
             raise ShaderError(stages["vertex_shader" not in message].explain(message)) from None
 
 
+def _names(program: moderngl.Program) -> dict[str, tuple[object, ...]]:
+    """What a program binds: name -> kind, type, and length or size."""
+    names: dict[str, tuple[object, ...]] = {}
+    for name in program:
+        member: Any = program[name]  # moderngl's stubs lack gl_type
+        kind = MEMBERS.get(type(member))
+        if kind == "block":
+            names[name] = kind, member.size
+        elif kind and not name.startswith("gl_"):
+            names[name] = "texture" if name.startswith("t_") else kind, member.gl_type, member.array_length
+    return names
+
+
+def _check_same_names(program: str, before: dict[str, tuple[object, ...]], now: dict[str, tuple[object, ...]]) -> None:
+    """Raise ShaderError, on one line, where a program does not bind what it did."""
+    changes = [f"{kind} {name} is gone or no longer read" for name, (kind, *_) in before.items() if name not in now]
+    changes += [f"{kind} {name} is new" for name, (kind, *_) in now.items() if name not in before]
+    changes += [f"{now[n][0]} {n} is of another type" for n in now if n in before and now[n] != before[n]]
+    if changes:
+        raise ShaderError(f"{program}: {', '.join(changes)}; start glowtree again for that")
+
+
 class Source:
     """One stage's text, flattened; remembers which line came from which file."""
 
@@ -91,7 +128,7 @@ class Source:
         self._included: set[str] = set()
         self._places = ["version"]  # file and line that each flattened line came from
         lines = [VERSION]
-        self._flatten(name, (root / name).read_text(), lines)
+        self._flatten(name, self._read(name), lines)
         self.text = "\n".join(lines) + "\n"
 
     def _flatten(self, name: str, text: str, lines: list[str]) -> None:
@@ -118,7 +155,13 @@ class Source:
             return
         if not (self._root / path).is_file():
             raise ShaderError(f"app/shaders/{place}: no file app/shaders/{path}")
-        self._flatten(path, (self._root / path).read_text(), lines)
+        self._flatten(path, self._read(path), lines)
+
+    def _read(self, path: str) -> str:
+        try:
+            return (self._root / path).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:  # an editor is just replacing it
+            raise ShaderError(f"app/shaders/{path}: cannot be read: {error}") from None
 
     def explain(self, message: str) -> str:
         """The driver's message with its line numbers turned into file and line."""

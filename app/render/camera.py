@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from app.atlas.node_set import Frame
 from app.scene.model import F64, Camera
 
-POLE = np.radians(89.5)  # orbit and look stop short of straight up and down
+POLE = np.radians(89.5)  # orbiting stops short of straight up and down
 NEAREST = 0.02  # near plane, in scene radii or target distances: what is closer is clamped to it, not cut (frame.py)
 FAR_MARGIN = 1.01  # the scene has radius 1 in the solver frame
 UP = np.array([0.0, 1.0, 0.0])
@@ -32,14 +32,6 @@ class CameraView:
     def from_camera(camera: Camera, distance: float = 1.0) -> CameraView:
         """A scene's camera; ``distance`` [m] to what it looks at, best the distance to the scene's centre."""
         return CameraView(np.array(camera.world_from_camera, np.float64), float(camera.yfov), max(distance, 1e-9))
-
-    @staticmethod
-    def framing(lower: F64, upper: F64, yfov: float = np.radians(40.0)) -> CameraView:
-        """The box between two corners [m] from the front, a little from the side and above."""
-        view = CameraView(np.eye(4), float(yfov), 1.0)
-        view._turn_to(np.radians(25.0), np.radians(15.0))
-        view.focus((lower + upper) / 2, float(np.linalg.norm(upper - lower)) / 2)
-        return view
 
     def copy(self) -> CameraView:
         return CameraView(self.world_from_camera.copy(), self.yfov, self.distance)
@@ -67,11 +59,6 @@ class CameraView:
         yaw, pitch = self._yaw_pitch()
         self._turn_to(yaw + dx, pitch + dy)
         self.world_from_camera[:3, 3] = target - self.forward * self.distance
-
-    def look(self, dx: float, dy: float) -> None:
-        """Turn the head: to the right by dx, up by dy [rad]. Keeps the horizon level."""
-        yaw, pitch = self._yaw_pitch()
-        self._turn_to(yaw - dx, pitch - dy)
 
     def pan(self, dx: float, dy: float) -> None:
         """Move sideways and up, in heights of the picture at the target's distance."""
@@ -107,12 +94,6 @@ class CameraView:
         y = 1.0 / np.tan(self.yfov / 2)
         depth = [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)]
         return np.array([[y / aspect, 0, 0, 0], [0, y, 0, 0], depth, [0, 0, -1, 0]]) @ camera_from_local
-
-    def ray(self, x_ndc: float, y_ndc: float, aspect: float) -> tuple[F64, F64]:
-        """Origin (3,) [m] and unit direction (3,) in the world through a point of the picture (-1 to 1, +y up)."""
-        tangent = np.tan(self.yfov / 2)
-        direction = self.world_from_camera[:3, :3] @ np.array([x_ndc * aspect * tangent, y_ndc * tangent, -1.0])
-        return self.eye.copy(), direction / np.linalg.norm(direction)
 
     # -- angles --------------------------------------------------------------------------------------------------------
 

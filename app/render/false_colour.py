@@ -75,6 +75,7 @@ def _percentile(kind: str, lightmap: Lightmap) -> float:
         shown &= emission.max(-1) == 0
         radiance = albedo * irradiance
     values = radiance[shown] @ LUMINANCE * (WHITE_EFFICACY / np.pi)
+    values = values[np.isfinite(values)]
     return float(np.percentile(values, BRIGHTEST_SHARE)) if len(values) else 0.0
 
 

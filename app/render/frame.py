@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.atlas.lightmap import Lightmap
-from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.render.camera import CameraView
 from app.render.false_colour import LAYER, Scale, false_colour_scale
@@ -30,8 +28,20 @@ class FrameRenderer:
         self._background = Pass(gpu, "render/background", label="background")
         self._picker = Picker(gpu)
         self._surfaces: Surfaces | None = None
+        self._prepared: Surfaces | None = None
         self._picture: _Picture | None = None
         self._last: tuple[Lightmap, CameraView, tuple[int, int]] | None = None
+
+    def prepare(self, lightmap: Lightmap) -> None:
+        """Make what it takes to draw a lightmap, ahead of its first frame; ``give_up`` where that will not come."""
+        self.give_up()
+        self._prepared = Surfaces(self._gpu, lightmap)
+
+    def give_up(self) -> None:
+        """Release what was prepared and not drawn yet."""
+        if self._prepared is not None:
+            self._prepared.release()
+            self._prepared = None
 
     def render(
         self,
@@ -49,7 +59,7 @@ class FrameRenderer:
     ) -> None:
         """Draw into the lower left ``size`` (width, height) [px] of ``target``.
 
-        ambient: A [W/m²] for ``display.ambient``. shooter: the patch to mark for ``display.shooter``: (u, v, u, v) in
+        ambient: A [W/m²] for ``display.ambient``. shooter: the patch to mark for ``display.last_shooter``: (u, v, u, v) in
         atlas texels. scale: of the false colour; left out, it is found from the light, which waits for the GPU.
         samples: per pixel along each axis. whole: show all light as it is now; False bounds the work of a frame, a large
         lightmap is then brought up to date over several. Raises GpuError for a picture larger than a texture can be.
@@ -95,6 +105,7 @@ class FrameRenderer:
         return hit
 
     def release(self) -> None:
+        self.give_up()
         for resource in (self._surfaces, self._picture, self._picker):
             if resource is not None:
                 resource.release()
@@ -103,7 +114,10 @@ class FrameRenderer:
         if self._surfaces is None or self._surfaces.lightmap is not lightmap:
             if self._surfaces:
                 self._surfaces.release()
-            self._surfaces = Surfaces(self._gpu, lightmap)
+            if self._prepared is None or self._prepared.lightmap is not lightmap:
+                self.prepare(lightmap)
+            self._surfaces, self._prepared = self._prepared, None
+            assert self._surfaces is not None
         return self._surfaces
 
     def _picture_for(self, target: Framebuffer, size: tuple[int, int], samples: int) -> _Picture:
@@ -133,35 +147,3 @@ class _Picture:
         self.depth.release()
         if self.own:
             self.colour.release()
-
-
-def render_image(
-    gpu: Gpu,
-    lightmap: Lightmap,
-    view: CameraView,
-    display: DisplayOptions,
-    size: tuple[int, int],
-    *,
-    samples: int = 2,
-    ambient: RGB | None = None,
-    shooter: Rect | None = None,
-    scale: Scale | None = None,
-) -> NDArray[np.uint8]:
-    """One picture of ``size`` (width, height): (height, width, 3) u8 sRGB, top row first. The rest as in
-    ``FrameRenderer.render``. Raises UserError for a size that this GPU cannot draw."""
-    limit = gpu.limits.max_texture // samples
-    if not (1 <= min(size) and max(size) <= limit):
-        raise UserError(f"a picture of {size[0]}×{size[1]} pixels: each side must be 1 to {limit} on this GPU")
-    picture = gpu.texture(size, 4, "f1")
-    target = gpu.target(picture)
-    renderer = FrameRenderer(gpu)
-    try:
-        renderer.render(
-            target, size, lightmap, view, display, ambient=ambient, shooter=shooter, scale=scale, samples=samples
-        )
-        pixels = np.frombuffer(picture.read(), np.uint8).reshape(size[1], size[0], 4)
-    finally:
-        renderer.release()
-        release_targets(gpu, target)
-        picture.release()
-    return np.ascontiguousarray(pixels[::-1, :, :3])

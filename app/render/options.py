@@ -19,7 +19,7 @@ class DisplayOptions(Options):
     smooth: bool = option(True, "bilinear texels instead of nearest")
     ambient: bool = option(False, "add the ambient estimate of light not yet shot (Cohen et al. 1988); display only")
     grid: bool = option(False, "draw the texel grid and the tiles")
-    shooter: bool = option(False, "mark the patch that shot last")
+    last_shooter: bool = option(False, "mark the patch that shot last")
     false_colour: str = option("off", "false colour with a legend: lux or cd/m²", choices=FALSE_COLOURS)
     false_colour_log: bool = option(True, "logarithmic false-colour scale")
     false_colour_max: float = option(

@@ -52,7 +52,7 @@ class Surfaces:
             "u_clip_from_local": uniform_matrix(clip_from_local),
             "u_texel": (1.0 / width, 1.0 / height),
         }
-        marked = shooter if shooter and display.shooter else None
+        marked = shooter if shooter and display.last_shooter else None
         checker = LAYER_SHADERS[layer_name].checker
         overlay = display.grid or checker > 0 or marked is not None
         if overlay:

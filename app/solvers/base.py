@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from app.gpu import Texture
+from app.options import Options
 from app.scene.model import F64
 
 
@@ -54,15 +56,55 @@ class EnergyBook:
         return np.asarray(self.unshot / self.area / np.maximum(1.0 - self.reflectance, 1e-3))
 
 
-class Solver(Protocol):
-    """The whole interface. ``step`` is one bounded unit of work: no UI, no clock."""
-
-    def reset(self) -> None: ...
-    def step(self, shots: int) -> int: ...
-    def poll(self, *, wait: bool = False) -> StepReport: ...
-    def books(self) -> EnergyBook: ...
-    def inspect(self) -> dict[str, Texture]: ...
-    def release(self) -> None: ...
+OptionsT = TypeVar("OptionsT", bound=Options)
 
 
-__all__ = ["EnergyBook", "Solver", "StepReport"]
+class PatchShot(Protocol):
+    """The patch that shot: its lower corner (x, y) and its edge, in texels of the node set."""
+
+    @property
+    def corner(self) -> tuple[int, int]: ...
+    @property
+    def size(self) -> int: ...
+
+
+class Solver(Protocol[OptionsT]):
+    """The whole interface of what writes a lightmap. ``step`` is one bounded unit of work: no UI, no clock.
+
+    options: the knobs that the next shot obeys. report: the newest that ``poll`` has heard. shots: issued so far.
+    """
+
+    options: OptionsT
+    report: StepReport
+    shots: int
+
+    @property
+    def last_shot(self) -> PatchShot | None:
+        """The last shooter that ``poll`` has heard of."""
+
+    def reset(self) -> None:
+        """Forget all light and begin again."""
+
+    def set_options(self, options: OptionsT) -> None:
+        """Use other knobs from the next shot on. Raises UserError."""
+
+    def step(self, shots: int) -> int:
+        """Make up to ``shots`` shots, and no more than one batch of its own; how many were issued."""
+
+    def poll(self, *, wait: bool = False) -> StepReport:
+        """The newest report that has arrived; with ``wait`` that of the last step."""
+
+    def books(self) -> EnergyBook:
+        """Where all emitted energy is now. Reads every texel and waits for the GPU."""
+
+    def passes(self, shots: int) -> dict[str, Callable[[], None]]:
+        """Each part of a step of so many shots by itself, to be timed and warmed up. They spoil the light: reset afterwards."""
+
+    def inspect(self) -> dict[str, Texture]:
+        """Textures that explain the last step, by name; ``items`` and ``depth`` are what its first shooter saw."""
+
+    def release(self) -> None:
+        """Give back what is on the GPU, but for the lightmap."""
+
+
+__all__ = ["EnergyBook", "PatchShot", "Solver", "StepReport"]

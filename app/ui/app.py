@@ -47,7 +47,6 @@ class Ui:
         theme.apply(scale)
         self.state = State(measured=measured, scenes=tuple(scenes))
         self._dialog = FileDialog(suffixes, native=native_dialog)
-        self._scene_name: str | None = None
 
     def use(self) -> None:
         """Make this interface's contexts the current ones."""
@@ -84,9 +83,8 @@ class Ui:
         state.texture_id, state.legend, state.ratio = texture_id, legend, ratio
         state.stats = session.stats if session.opened else None
         state.fps = FPS_MEMORY * state.fps + (1 - FPS_MEMORY) / io.delta_time if state.fps else 1 / io.delta_time
-        if session.name != self._scene_name:
-            self._scene_name = session.name
-            state.forget_scene()
+        if session.opened:
+            state.remember(session.unedited, session.lightmap)
         imgui.new_frame()
         self._build(session, io.delta_time)
         imgui.render()

@@ -66,13 +66,15 @@ def _open(session: Session, state: State) -> None:
 
 
 def _escape(session: Session, state: State) -> None:
-    """Close what is open above the view; with nothing open, quit."""
+    """Close what is open above the view, or stop a scene on its way; with nothing left, quit."""
     if state.show_help:
         state.show_help = False
-    elif session.loading is not None:
+        return
+    if session.loading is not None:
         session.loading.cancel()
-    else:
-        state.requests.append(Request.QUIT)
+        if session.opened:
+            return
+    state.requests.append(Request.QUIT)
 
 
 SHORTCUTS = (
@@ -85,7 +87,7 @@ SHORTCUTS = (
     Shortcut("R", "restart", Key.r, _restart, needs_scene=True),
     Shortcut("F", "look at the picked point, or at the whole scene", Key.f, focus, needs_scene=True),
     Shortcut("Ctrl+O", "open a scene", Key.o, _open, control=True),
-    Shortcut("Esc", "close what is open, else quit", Key.escape, _escape),
+    Shortcut("Esc", "close what is open, stop loading, else quit", Key.escape, _escape),
 )
 
 POINTER = (

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 SIDE_EM = 20.5  # width of the side docks, in font heights: the widest fact fits
 BOTTOM_SHARE = 0.27  # height of the lower dock, of the window
-LEFT_SHARE = 0.43  # of the left dock for the Scene panel, the rest for the Solver
-RIGHT_SHARE = 0.4  # of the right dock for the Display panel, the rest for Inspect
+SCENE_EM, DISPLAY_EM = 27.0, 18.5  # heights that the upper panels need; what is below them gets the rest
+HIGHEST_UPPER = 0.54  # of a low window for them
 WIDEST_SIDES = 0.3  # of a narrow window for each side dock
 
 
@@ -82,8 +82,11 @@ def _build(space: int) -> None:
     _, left, rest = build.dock_builder_split_node_py(space, imgui.Dir.left, side)
     _, right, rest = build.dock_builder_split_node_py(rest, imgui.Dir.right, side / (1 - side))
     _, bottom, _ = build.dock_builder_split_node_py(rest, imgui.Dir.down, BOTTOM_SHARE)
-    _, left_top, left = build.dock_builder_split_node_py(left, imgui.Dir.up, LEFT_SHARE)
-    _, right_top, right = build.dock_builder_split_node_py(right, imgui.Dir.up, RIGHT_SHARE)
+    upper_left, upper_right = (
+        min(height * imgui.get_font_size() / area.y, HIGHEST_UPPER) for height in (SCENE_EM, DISPLAY_EM)
+    )
+    _, left_top, left = build.dock_builder_split_node_py(left, imgui.Dir.up, upper_left)
+    _, right_top, right = build.dock_builder_split_node_py(right, imgui.Dir.up, upper_right)
     nodes = {"left": left, "left top": left_top, "right": right, "right top": right_top, "bottom": bottom}
     for panel in PANELS:
         build.dock_builder_dock_window(panel.title, nodes[panel.dock])

@@ -101,6 +101,7 @@ class State:
     last_message: str | None = None
     requests: list[Request] = field(default_factory=list)
     actions: list[Callable[[], object]] = field(default_factory=list)
+    _known: tuple[object, object] = (None, None)
 
     def act(self, action: Callable[[], object]) -> None:
         """Do this once the frame is built: what it raises cannot leave a window half drawn."""
@@ -120,7 +121,12 @@ class State:
         self.toasts = [t for t in self.toasts if t.text != text][-3:]
         self.toasts.append(Toast(text, error))
 
-    def forget_scene(self) -> None:
-        """Another scene has been opened: nothing of the last one is picked or selected."""
-        self.picked, self.flight, self.atlas, self.material = None, None, None, 0
-        self.emission_colours.clear()
+    def remember(self, scene: object, lightmap: object) -> None:
+        """What is open now, told every frame: nothing of another scene stays picked or selected, nor of another cut of it.
+        Two scenes may have the same name, so that only which objects they are tells them apart."""
+        if lightmap is not self._known[1]:
+            self.picked, self.atlas = None, None
+        if scene is not self._known[0]:
+            self.flight, self.material = None, 0
+            self.emission_colours.clear()
+        self._known = scene, lightmap

@@ -32,7 +32,7 @@ BLUE = _rgba(0x6FA3D8)
 BAD = _rgba(0xE5705F)
 
 # What the energy went into, the same in every plot, bar and table
-ABSORBED, ESCAPED, UNSHOT = AMBER, BLUE, _rgba(0x77756E)
+ABSORBED, ESCAPED, UNSHOT = AMBER, BLUE, _rgba(0x8E8C85)
 
 _C = imgui.Col_
 _COLOURS: dict[imgui.Col_, RGBA] = {

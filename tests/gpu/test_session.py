@@ -88,7 +88,7 @@ def test_solve_stops_after_shots(session: Session) -> None:
 
 
 def test_solve_stops_after_seconds(session: Session) -> None:
-    session.set_shooting(session.shooting.replace(residual=1e-9))
+    session.set_shooting(session.shooting.replace(residual=1e-9, level=0, coarsen=False))
     start = time.perf_counter()
     session.solve(Stop(seconds=0.3))
     assert not session.converged
@@ -177,6 +177,84 @@ def test_another_density_cuts_the_scene_anew(session: Session) -> None:
     wait_for(session)
     assert session.name == "Furnace"
     assert session.lightmap.texel_count == pytest.approx(4 * before, rel=0.3)  # whole patches only
+
+
+def test_cutting_anew_keeps_edits_exposure_and_camera(session: Session) -> None:
+    """Nothing is read again: what was edited before and while it is cut stays, and so does what the user has set."""
+    session.expose_on_open = True
+    before = session.lightmap
+    green = dataclasses.replace(session.scene.materials[0], albedo=(0.1, 0.7, 0.2))
+    session.set_material(0, green)
+    session.display = session.display.replace(exposure=-3.5)
+    session.view.orbit(0.7, 0.2)
+    eye = session.view.eye.copy()
+    session.set_atlas(AtlasOptions(texels=4000))
+    dimmed = dataclasses.replace(green, emission=(0.5, 0.25, 0.125))
+    session.set_material(0, dimmed)  # while it is under way
+    wait_for(session)
+    assert session.lightmap is not before and session.atlas.texels == 4000
+    assert session.scene.materials[0] is dimmed
+    np.testing.assert_array_equal(session.lightmap.irradiance(), 0)
+    residual = session.lightmap.residual()[session.lightmap.nodes.surfaces.face >= 0]
+    np.testing.assert_allclose(residual, np.broadcast_to(np.pi * np.array(dimmed.emission), residual.shape), rtol=1e-6)
+    assert session.stats.emitted == pytest.approx(session.stats.unshot)
+    assert session.display.exposure == -3.5
+    np.testing.assert_array_equal(session.view.eye, eye)
+
+
+def test_a_scene_on_its_way_is_not_lost_to_another_cut(session: Session) -> None:
+    session.open("cornell-box")
+    with pytest.raises(UserError, match="cornell-box is loading"):
+        session.set_atlas(AtlasOptions(texels=2000))
+    wait_for(session)
+    assert session.name == "Cornell box" and session.atlas == ATLAS
+
+
+def test_a_cut_that_is_stopped_changes_nothing(session: Session) -> None:
+    before = session.lightmap
+    session.set_atlas(AtlasOptions(texels=4000))
+    assert session.loading is not None
+    session.loading.cancel()
+    session.poll()
+    assert session.loading is None and session.lightmap is before and session.atlas == ATLAS
+    assert session.parameters["atlas"] == ATLAS.as_dict()
+    assert session.message == "Furnace: stopped; Furnace stays as it is"
+
+
+@pytest.mark.parametrize("parts", range(1, 4))
+def test_what_is_stopped_while_it_is_uploaded_keeps_the_scene(
+    session: Session, forgotten: Callable[[], list[object]], parts: int
+) -> None:
+    session.solve(Stop(shots=8))
+    light = irradiance(session)
+    session.open("cornell-box")
+    assert session.loading is not None
+    until = time.monotonic() + 60
+    while not session.loading.ended:
+        assert time.monotonic() < until
+    before = held(session.gpu)
+    for _ in range(parts):
+        session.poll()
+    assert held(session.gpu) > before
+    session.loading.cancel()
+    session.poll()
+    assert session.loading is None and session.name == "Furnace" and irradiance(session) == light
+    assert session.message == "cornell-box: stopped; Furnace stays as it is"
+    assert not forgotten()
+    session.shoot_once()
+    assert irradiance(session) > light
+
+
+def test_options_changed_while_a_scene_is_uploaded_are_used(session: Session) -> None:
+    session.open("cornell-box")
+    until = time.monotonic() + 60
+    while session.loading is not None and not session.loading.ended:
+        assert time.monotonic() < until
+    session.poll()
+    session.set_shooting(session.shooting.replace(level=4, storage="rgba16f"))
+    wait_for(session)
+    assert session.name == "Cornell box"
+    assert session.solver.options == session.shooting and session.lightmap.storage == "rgba16f"
 
 
 def test_a_bad_file_leaves_the_scene_and_says_why(session: Session, tmp_path: Path) -> None:

@@ -128,6 +128,62 @@ def test_a_dimmed_lamp_reaches_the_book(session: Session) -> None:
     assert session.stats.emitted == pytest.approx(before / 2, rel=1e-5)
 
 
+def counted(monkeypatch: pytest.MonkeyPatch, owner: object, name: str, seconds: float = 0.0) -> list[float]:
+    """When ``owner.name`` is called from now on; each call takes at least ``seconds``."""
+    function, calls = getattr(owner, name), []
+
+    def counting(*args: object) -> object:
+        calls.append(time.perf_counter())
+        time.sleep(seconds)
+        return function(*args)
+
+    monkeypatch.setattr(owner, name, counting)
+    return calls
+
+
+def dim(session: Session, factor: float) -> None:
+    material = session.scene.materials[0]
+    session.set_material(0, dataclasses.replace(material, albedo=tuple(factor * a for a in material.albedo)))
+
+
+def test_an_edit_clears_the_light_once(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened(session, "cornell-box")
+    frames(session, lambda: session.solver.shots >= 5)
+    clears = counted(monkeypatch, session.lightmap, "clear")
+    dim(session, 0.5)
+    assert len(clears) == 1
+    assert not session.lightmap.irradiance().any()
+    assert session.lightmap.albedo().max() > 0
+
+
+@pytest.mark.parametrize("running", [True, False])
+def test_a_slider_that_is_dragged_makes_no_book_until_it_rests(
+    session: Session, monkeypatch: pytest.MonkeyPatch, running: bool
+) -> None:
+    opened(session, "cornell-box")
+    session.running = running
+    looks, shots = counted(monkeypatch, session.solver, "books"), 0
+    for _ in range(10):
+        dim(session, 0.95)
+        session.poll()
+        shots += session.advance(budget_ms=20)
+        time.sleep(0.02)
+    assert not looks
+    assert shots == (10 if running else 0), "the light follows while it is dragged"
+    frames(session, lambda: bool(looks))
+    assert session.books.reflectance == pytest.approx(session.solver.books().reflectance)
+
+
+def test_books_that_take_long_are_made_rarely(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    session.set_shooting(session.shooting.replace(residual=1e-9))
+    opened(session, "cornell-box")
+    looks = counted(monkeypatch, session.solver, "books", seconds=0.04)
+    frames(session, lambda: bool(looks))
+    until = looks[0] + 2.5
+    frames(session, lambda: time.perf_counter() > until)
+    assert len(looks) == 1
+
+
 @pytest.mark.parametrize("storage", ["rgba32f", "rgba16f", "fixed8"])
 def test_the_first_exposure_is_that_of_the_unlit_lightmap(gpu: Gpu, storage: str) -> None:
     session = Session(gpu, atlas=SMALL, shooting=ShootingOptions(storage=storage))

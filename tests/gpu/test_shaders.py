@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import itertools
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+import moderngl
+import numpy as np
 import pytest
 
 from app.atlas.charts import TILE
@@ -27,6 +31,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "LEVEL": tuple(range(MAX_LEVEL + 1)),
     "ROW_PATCHES": tuple(TILE >> level for level in range(MAX_LEVEL + 1)),
     "BLOCK": (OPEN_BLOCK,),
+    "VIEWS": tuple({p.views for p in PROJECTIONS.values()}),
     "MATERIAL_BITS": (16,),
     "ALBEDO_TEXTURE": FLAG,
     "EMISSION_TEXTURE": FLAG,
@@ -38,7 +43,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "DISC_SUBDIVISION": (OPTION["discs"].maximum,),
     "VISIBILITY": tuple(range(len(VISIBILITIES))),
 }
-CONSTANTS = {"TILE", "BORDERED"}
+CONSTANTS = {"TILE", "BORDERED", "BATCH"}
 SLOTS = {
     "projection": tuple(p.glsl for p in PROJECTIONS.values()),
     "layer": tuple(f"render/layers/{layer.shader}.glsl" for layer in LAYER_SHADERS.values()),
@@ -193,6 +198,103 @@ def test_reload_keeps_the_last_good_programs(folder: Broken) -> None:
     folder.library.reload()
     assert folder.library.generation == 1
     assert folder.library.program("a") is not before[0]
+
+
+COVERING = "void main() { gl_Position = vec4(4 * (gl_VertexID & 1) - 1, 2 * (gl_VertexID & 2) - 1, 0, 1); }\n"
+LIT = """
+uniform float u_gain;
+uniform sampler2D t_map;
+layout(location = 0) out vec4 c;
+void main() { c = u_gain * texelFetch(t_map, ivec2(0), 0); }
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("u_gain * texel", "texel", "a: uniform u_gain is gone or no longer read; start glowtree again for that"),
+        ("u_gain", "u_boost", "uniform u_gain is gone or no longer read, uniform u_boost is new"),
+        ("void main", "uniform sampler2D t_more;\nvec4 more = texelFetch(t_more, ivec2(0), 0);\nvoid main", None),
+        ("vec4(1)", "vec4(2)", None),
+        ("float u_gain", "vec4 u_gain", "uniform u_gain is of another type"),
+        ("c = u_gain", "c = texelFetch(t_more, ivec2(0), 0) + u_gain", "texture t_more is new"),
+        ("sampler2D t_map", "usampler2D t_map", "texture t_map is of another type"),
+    ],
+)
+def test_reload_refuses_other_names_and_keeps_the_last_good_programs(
+    gpu: Gpu, folder: Broken, monkeypatch: pytest.MonkeyPatch, old: str, new: str, message: str | None
+) -> None:
+    """A shader that compiles, but binds other names than its pass gives: it would fail at the next draw."""
+    monkeypatch.setattr(gpu, "shaders", folder.library)
+    folder.write("a.vert.glsl", COVERING)
+    folder.write("a.frag.glsl", LIT)
+    lit = Pass(gpu, "a")
+    texture = gpu.texture((4, 4), 4, "f4", np.full(64, 0.5, np.float32).tobytes())
+    picture = gpu.texture((4, 4), 4, "f4")
+    target = gpu.target(picture)
+
+    def drawn() -> float:
+        lit.draw(target, textures={"t_map": texture}, uniforms={"u_gain": 3.0})
+        return float(np.frombuffer(picture.read(), np.float32)[0])
+
+    assert drawn() == 1.5
+    declared = "uniform sampler2D t_more;\n" if "t_more" in new else ""
+    folder.write("a.frag.glsl", declared * ("void" not in old) + LIT.replace(old, new))
+    if message is None:
+        folder.library.reload()
+    else:
+        with pytest.raises(ShaderError, match=re.escape(message)):
+            folder.library.reload()
+        assert folder.library.generation == 0
+    assert drawn() == 1.5
+    gpu.release_all(target, picture, texture)
+
+
+def test_a_file_that_is_gone_at_a_reload(folder: Broken) -> None:
+    folder.write("a.frag.glsl", LIT)
+    kept = folder.library.program("a")
+    (folder.root / "a.frag.glsl").unlink()
+    with pytest.raises(ShaderError, match=r"app/shaders/a\.frag\.glsl: cannot be read"):
+        folder.library.reload()
+    assert folder.library.program("a") is kept
+
+
+def test_reloads_leave_nothing_behind(gpu: Gpu, folder: Broken, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither programs nor vertex arrays, of reloads that succeed and of those that fail."""
+    monkeypatch.setattr(gpu, "shaders", folder.library)
+    folder.write("named.vert.glsl", "in vec3 in_position;\nvoid main() { gl_Position = vec4(in_position, 1.0); }\n")
+    good = "layout(location = 0) out vec4 c;\nvoid main() { c = vec4(1.0); }\n"
+    for name in ("named", "a", "b"):
+        folder.write(f"{name}.frag.glsl", good)
+    mesh, picture = Mesh(gpu, bytes(36), {"in_position": "3f"}), gpu.texture((4, 4), 4, "f4")
+    target = gpu.target(picture)
+    passes = {name: Pass(gpu, name) for name in ("named", "a", "b")}
+
+    def held() -> int:
+        gc.collect()
+        kinds = (moderngl.VertexArray, moderngl.Program)
+        mine = (o for o in gc.get_objects() if isinstance(o, kinds) and o.ctx is gpu.ctx)
+        return sum(not isinstance(o.mglo, moderngl.InvalidObject) for o in mine)
+
+    gc.collect()
+    mode, gpu.ctx.gc_mode = gpu.ctx.gc_mode, "context_gc"  # keeps what was forgotten without being released
+    gpu.ctx.objects.clear()
+    counts = []
+    for k in range(20):
+        folder.write("b.frag.glsl", "void main() { wrong }\n" if k % 4 == 1 else good)
+        with contextlib.suppress(ShaderError):
+            folder.library.reload()
+        for name, draws in passes.items():
+            draws.draw(target, mesh=mesh if name == "named" else None)
+        counts.append(held())
+    gc.collect()
+    forgotten = [o for o in gpu.ctx.objects if not isinstance(o, moderngl.InvalidObject)]
+    gpu.ctx.gc_mode = mode
+    gpu.ctx.objects.clear()
+    assert folder.library.generation == 15
+    assert len(set(counts)) == 1, counts
+    assert not forgotten
+    gpu.release_all(target, picture, mesh)
 
 
 # -- passes bind by name -----------------------------------------------------------------------------------------------

@@ -163,7 +163,11 @@ def test_escape_closes_before_it_quits(desk: Desk) -> None:
     desk.session.loading = SimpleNamespace(stage="unfolding", fraction=0.4, cancel=lambda: cancelled.append(True))
     desk.key(imgui.Key.escape)
     assert cancelled == [True] and Request.QUIT not in desk.requests
-    desk.session.loading = None
+    desk.session.opened = False
+    desk.key(imgui.Key.escape)
+    assert cancelled == [True, True] and desk.requests == [Request.QUIT]
+    desk.session.opened, desk.session.loading = True, None
+    desk.requests.clear()
     desk.key(imgui.Key.o, control=True)
     desk.key(imgui.Key.escape)
     assert Request.QUIT not in desk.requests
@@ -209,7 +213,9 @@ def test_a_slider_changes_its_option_and_goes_back(desk: Desk, where: dict[str, 
     assert desk.session.display.exposure == 0.0
 
 
-def test_an_error_becomes_a_toast(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
+def test_an_error_becomes_a_toast(gpu: Gpu, where: dict[str, tuple[float, float]]) -> None:
+    desk = Desk(gpu, FakeSession(), (1920, 1080))
+
     def refuse(options: ShootingOptions) -> None:
         raise UserError("--level 4: no such level here")
 
@@ -220,6 +226,7 @@ def test_an_error_becomes_a_toast(desk: Desk, where: dict[str, tuple[float, floa
     assert [t.text for t in desk.ui.state.toasts] == ["--level 4: no such level here"]
     desk.frames(10, seconds=1.0)
     assert desk.ui.state.toasts == []
+    desk.release()
 
 
 @pytest.mark.parametrize(
@@ -261,6 +268,41 @@ def test_a_lamp_that_was_switched_off_keeps_its_colour(desk: Desk, monkeypatch: 
 
 
 # -- the view ----------------------------------------------------------------------------------------------------------
+
+
+def test_another_scene_of_the_same_name_is_another_scene(desk: Desk) -> None:
+    state, session = desk.ui.state, desk.session
+
+    def select() -> None:
+        state.picked, state.material, state.atlas = PICKED, 2, AtlasOptions(texels=77)
+        state.emission_colours[3] = (1.0, 0.0, 0.0)
+        desk.frames()
+
+    select()
+    assert state.picked is PICKED and state.material == 2, "nothing is forgotten by itself"
+    session.lightmap = SimpleNamespace(frame=session.lightmap.frame)  # the same scene, cut anew
+    desk.frames()
+    assert state.picked is None and state.atlas == session.atlas
+    assert state.material == 2 and state.emission_colours
+    select()
+    session.unedited, session.lightmap = object(), SimpleNamespace(frame=session.lightmap.frame)
+    desk.frames()
+    assert state.picked is None and state.material == 0
+    assert 3 not in state.emission_colours
+
+
+def test_the_draft_of_a_cut_stays_until_it_is_done(gpu: Gpu, where: dict[str, tuple[float, float]]) -> None:
+    desk, draft = Desk(gpu, FakeSession(), (1920, 1080)), AtlasOptions(texels=777)
+    desk.ui.state.atlas = draft
+    desk.session.loading = SimpleNamespace(stage="unfolding", fraction=0.4, cancel=lambda: None)
+    desk.frames()
+    desk.click(*where["anew"])
+    assert ("set_atlas",) not in desk.session.calls, "a scene is on its way"
+    desk.session.loading = None
+    desk.frames()
+    desk.click(*where["anew"])
+    assert ("set_atlas",) in desk.session.calls and desk.ui.state.atlas == draft
+    desk.release()
 
 
 def test_a_click_picks_and_a_drag_does_not(desk: Desk) -> None:

@@ -17,7 +17,7 @@ LAYERS = [
     {"projections"},
     {"solvers", "reference", "render", "metrics", "bake"},
     {"history", "picking", "opening", "stats"},
-    {"loading"},
+    {"loading", "solving"},
     {"session"},
     {"ui"},
     {"headless_ui", "console"},
@@ -29,8 +29,27 @@ LAYERS = [
 LAYER = {name: i for i, layer in enumerate(LAYERS) for name in layer}
 # packages of GL may be imported only here
 GL = {"gpu", "window"}
-FORBIDDEN = {("ui", "gpu"), ("render", "solvers"), ("bake", "solvers"), ("scene", "gpu"), ("gpu", "scene")}
+READERS = ("render", "metrics", "bake")  # of what solvers write: they know neither how nor by what it was written
+FORBIDDEN = {
+    ("scene", "gpu"),
+    ("gpu", "scene"),
+    ("projections", "scene"),
+    *((reader, writer) for reader in READERS for writer in ("solvers", "projections", "reference")),
+    ("reference", "solvers"),
+    ("solvers", "reference"),
+    ("ui", "gpu"),
+}
+FAMILIES = {path.parent.name for path in APP.glob("solvers/*/__init__.py")}
+BY_PARTS = {"bench"}  # takes the shots of one family apart; all others know solvers by their table and protocol
 FILES = sorted(APP.rglob("*.py"))
+
+
+def outside_of_its_family(path: Path, name: str) -> bool:
+    """Whether ``app.solvers.FAMILY...`` is imported by another family or from outside of the table of solvers."""
+    family = (*name.split("."), "", "")[2] if name.startswith("app.solvers.") else ""
+    place = path.relative_to(APP).parts
+    at_home = place[:2] in (("solvers", family), ("solvers", "__init__.py")) or place[0] in BY_PARTS
+    return family in FAMILIES and not at_home
 
 
 def imported(path: Path) -> set[str]:
@@ -60,6 +79,7 @@ def test_imports_only_from_lower_layers(path: Path) -> None:
     assert own in LAYER, f"app/{own} has no layer: give it one here"
     for name in imported(path):
         top, *rest = name.split(".")
+        assert not outside_of_its_family(path, name), f"{path} imports {name}: only app.solvers is for all"
         if top in ("moderngl", "moderngl_window"):
             assert own in GL, f"{path}: {top} is imported only in {', '.join(sorted(GL))}"
         if top != "app" or not rest or rest[0] == own:
@@ -67,3 +87,32 @@ def test_imports_only_from_lower_layers(path: Path) -> None:
         assert (own, rest[0]) not in FORBIDDEN, f"{path} imports app.{rest[0]}"
         if rest[0] in LAYER:
             assert LAYER[rest[0]] < LAYER[own], f"{path}: {own} may not import app.{rest[0]}"
+
+
+def uses_of_a_solver(path: Path) -> set[str]:
+    """Names that a file asks of something called ``solver``."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Attribute):
+            owner = node.value
+            name = owner.attr if isinstance(owner, ast.Attribute) else owner.id if isinstance(owner, ast.Name) else ""
+            found |= {node.attr} if name == "solver" else set()
+    return found
+
+
+@pytest.mark.parametrize("path", [p for p in FILES if p.relative_to(APP).parts[0] not in ("solvers", "ui")], ids=str)
+def test_the_protocol_names_all_that_is_asked_of_a_solver(path: Path) -> None:
+    from app.solvers import Solver
+
+    named = {n for n in (*vars(Solver), *Solver.__annotations__) if not n.startswith("_")}
+    assert uses_of_a_solver(path) <= named
+
+
+def test_every_solver_has_what_the_protocol_names() -> None:
+    from app.solvers import DEFAULT_SOLVER, SOLVERS, Solver
+
+    assert DEFAULT_SOLVER in SOLVERS
+    methods = {name for name, value in vars(Solver).items() if callable(value) and not name.startswith("_")}
+    assert methods >= {"reset", "set_options", "step", "poll", "books", "passes", "inspect", "release"}
+    for make in SOLVERS.values():
+        assert methods <= set(dir(make))

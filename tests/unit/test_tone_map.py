@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pictures import CURVES, tone_map
 
-from app.render.develop import CURVES, encode_srgb, tone_map
+from app.render.develop import encode_srgb
 from app.render.false_colour import LUMINANCE, Scale, _nice_above, colour_map, value_per_radiance
 from app.render.options import LAYERS, TONE_MAPS, DisplayOptions
 
@@ -94,6 +95,6 @@ def test_every_option_of_the_display_has_its_table_entry() -> None:
     from app.render.layers import LAYER_SHADERS
 
     assert set(LAYER_SHADERS) == set(LAYERS)
-    assert set(CURVES) == set(TONE_MAPS)
+    assert tuple(CURVES) == TONE_MAPS
     assert DisplayOptions().tone_map in CURVES
     assert Scale(1.0, 10.0, "lx").unit == "lx"

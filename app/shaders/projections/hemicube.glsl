@@ -9,6 +9,7 @@
 
 const float R = float(RESOLUTION);
 const float HALF_R = 0.5 * R;
+const vec2 MAP_PX = vec2(3.0, 1.0) * R;
 
 // (a, b, w) of a local vector; a × b = -w keeps the winding of triangles
 vec3 view_from_local(int view, vec3 v) {
@@ -48,6 +49,12 @@ int view_from_px(vec2 px) {
 float depth_from_view(vec3 v) { return v.z; }
 vec2 px_from_view(int view, vec3 v) { return view_origin_px(view) + HALF_R * v.xy / v.z; }
 vec3 sight_from_px(int view, vec2 px) { return vec3((px - view_origin_px(view)) / HALF_R, 1.0); }
+
+// dot(sight, n) of the 2×2 texels around px, in the order of textureGather
+vec4 sights_dot(int view, vec2 px, vec3 n) {
+    vec2 step = 0.5 * n.xy / HALF_R;
+    return dot(sight_from_px(view, px), n) + vec4(step.y - step.x, step.y + step.x, step.x - step.y, -step.x - step.y);
+}
 
 // Solid-angle weight cosθ dω / π of the map's texel at px: sums to 1 over the map. [Cohen85, delta form factors]
 float delta_form_factor(int view, vec2 px) {

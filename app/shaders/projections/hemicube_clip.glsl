@@ -7,13 +7,13 @@ out gl_PerVertex {
     float gl_ClipDistance[4];
 };
 
-// Draws the vertex into its view.
-void project(int view, vec3 local) {
+// Draws the vertex into its view of the map of one shot, one of so many that lie above each other.
+void project(int view, vec3 local, int shot, int shots) {
     vec3 v = view_from_local(view, local);
-    vec2 map_px = vec2(3.0, 1.0) * R;
-    vec2 centre_ndc = 2.0 * view_origin_px(view) / map_px - 1.0;
+    vec2 maps_px = MAP_PX * vec2(1.0, float(shots));
+    vec2 centre_ndc = 2.0 * (view_origin_px(view) + vec2(0.0, float(shot) * MAP_PX.y)) / maps_px - 1.0;
     // z = -w at w = COPLANAR: the near plane; depth itself is written linearly by the fragment
-    gl_Position = vec4(centre_ndc * v.z + 2.0 * HALF_R * v.xy / map_px, v.z - 2.0 * COPLANAR, v.z);
+    gl_Position = vec4(centre_ndc * v.z + 2.0 * HALF_R * v.xy / maps_px, v.z - 2.0 * COPLANAR, v.z);
     gl_ClipDistance[0] = v.z + v.x;
     gl_ClipDistance[1] = v.z - v.x;
     gl_ClipDistance[2] = view == 0 ? v.z + v.y : v.y;

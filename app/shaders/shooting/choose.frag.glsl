@@ -49,7 +49,7 @@ Texel texel_at(ivec2 px) { return load_texel(t_position_area, t_normal_ids, px);
 
 float residual_at(ivec2 px) {
     vec3 r = texelFetch(t_residual, px, 0).rgb;
-    return r.r + r.g + r.b;
+    return abs(r.r + r.g + r.b);
 }
 
 // The strongest texel near the middle of the patch's residual: its plane is the shooter's. On a convex surface no other part of
@@ -107,9 +107,10 @@ Shooter shooter_from_patch(ivec2 corner_px) {
         area += texel.area;
         flux += r * texel.area;
         area_centre += texel.position * texel.area;
-        power_centre += texel.position * texel.area * (r.r + r.g + r.b);
-        power += texel.area * (r.r + r.g + r.b);
-        whole = whole && texel.facet == lead.facet && r.r + r.g + r.b > UNLIT * lead_residual;
+        float own = residual_at(px);
+        power_centre += texel.position * texel.area * own;
+        power += texel.area * own;
+        whole = whole && texel.facet == lead.facet && own > UNLIT * lead_residual;
         lower = min(lower, at);
         upper = max(upper, at);
     }

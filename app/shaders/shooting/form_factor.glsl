@@ -43,16 +43,18 @@ float polygon_form_factor(vec3 centre, vec3 normal, Shooter s) {
     return contour(centre - hu - hv, centre - hu + hv, centre + hu + hv, centre + hu - hv, normal) / TWO_PI;
 }
 
-// cosθ_j cosθ_i / (π r²) at 2×2 Gauss points; height: of the receiver above the shooter's plane
+// cosθ_j cosθ_i / (π r²) at 2×2 Gauss points, or in the middle; height: of the receiver above the shooter's plane
 float far_form_factor(vec3 centre, vec3 normal, float height, Shooter s) {
-    vec3 gu = GAUSS * s.edge_u, gv = GAUSS * s.edge_v;
+    bool one = squared_edge(s) < POINT_RATIO * dot(centre, centre);
+    vec3 gu = one ? vec3(0.0) : GAUSS * s.edge_u, gv = one ? vec3(0.0) : GAUSS * s.edge_v;
+    int points = one ? 1 : 4, k = 0;
     float sum = 0.0;
-    for (int k = 0; k < 4; ++k) {
+    do {
         vec3 d = centre + ((k & 1) == 0 ? gu : -gu) + ((k & 2) == 0 ? gv : -gv);
         float r2 = dot(d, d);
         sum += max(dot(d, normal), 0.0) / (r2 * r2);
-    }
-    return sum * height * s.area / (4.0 * PI);
+    } while (++k < points);
+    return sum * height * s.area / (float(points) * PI);
 }
 
 // Wallace's discs: the shooter as m = DISC_SUBDIVISION² oriented discs of area A/m. [Coombe03, eq. 2; Wallace89]

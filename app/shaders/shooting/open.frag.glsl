@@ -1,25 +1,29 @@
 // Share of the shooter's sight that leaves the scene (r), and that ends on black sides without texels (g), in pieces: each texel
-// sums the weights of such samples in one block of the map. Every other sample in both directions is enough.
+// sums the weights of such samples in one block of the map. The four in the middle of every 4×4 samples stand for these.
 #include "common/item.glsl"
-#define BLOCK 32
+#define BLOCK 8
 
-const int STRIDE = 2;
+const int STRIDE = 4;
 
-uniform sampler2D t_map;
-uniform sampler2D t_weights;  // delta form factors of the samples that are read; sum to 1
-uniform ivec2 u_origin_px;    // of this shot's blocks in the target
+uniform sampler2D t_items;
+uniform sampler2D t_weights;  // delta form factors of every 4×4 samples; sum to 1
+uniform int u_row;            // of the target, where the blocks of the first map begin
 
 layout(location = 0) out vec2 out_open;
 
+float count(bvec4 which) { return dot(vec4(which), vec4(1.0)); }
+
 void main() {
-    ivec2 corner_px = (ivec2(gl_FragCoord.xy) - u_origin_px) * BLOCK;
+    ivec2 corner_px = (ivec2(gl_FragCoord.xy) - ivec2(0, u_row)) * BLOCK;
+    int height = textureSize(t_weights, 0).y;
+    vec2 px_to_uv = 1.0 / vec2(textureSize(t_items, 0));
     vec2 sum = vec2(0.0);
     for (int j = 0; j < BLOCK; j += STRIDE)
         for (int i = 0; i < BLOCK; i += STRIDE) {
-            ivec2 px = corner_px + ivec2(i, j);
-            float weight = texelFetch(t_weights, px / STRIDE, 0).r;
-            float item = texelFetch(t_map, px, 0).r;
-            sum += vec2(item == OPEN ? weight : 0.0, item == UNCHARTED ? weight : 0.0);
+            ivec2 px = corner_px + ivec2(i, j), quad = px / STRIDE;
+            float weight = 0.25 * texelFetch(t_weights, ivec2(quad.x, quad.y % height), 0).r;
+            vec4 items = textureGather(t_items, vec2(px + STRIDE / 2) * px_to_uv);
+            sum += weight * vec2(count(equal(items, vec4(OPEN))), count(equal(items, vec4(UNCHARTED))));
         }
     out_open = sum;
 }

@@ -1,4 +1,5 @@
-// Residual power of each patch, Σ r·A [stored units · solver area], sum of RGB: one texel per patch of 2^level texels.
+// Residual power of each patch, |Σ r·A| [stored units · solver area], sum of RGB: one texel per patch of 2^level texels. Less
+// light than was shot is a negative residual, and is shot like any other [Chen90].
 #define LEVEL 2
 
 uniform sampler2D t_position_area;
@@ -15,5 +16,5 @@ void main() {
             vec3 r = texelFetch(t_residual, texel_px, 0).rgb;
             power += (r.r + r.g + r.b) * texelFetch(t_position_area, texel_px, 0).w;
         }
-    out_power = power;
+    out_power = abs(power);
 }

@@ -1,6 +1,6 @@
-// One shot's light on every texel, blended into H and r:
+// The light of some shots on every texel, blended into H and r:
 //
-//   ΔH_j = r_i F_ji V_ji,   Δr_j = ρ_j ΔH_j      [Coombe03, eq. 1; F_ji from the texel to the shooter's polygon]
+//   ΔH_j = Σ_i r_i F_ji V_ji,   Δr_j = ρ_j ΔH_j      [Coombe03, eq. 1; F_ji from the texel to the shooter's polygon]
 #define FLAT 1
 #include "common/atlas.glsl"
 #include "common/albedo.glsl"
@@ -10,6 +10,7 @@
 #include "shooting/form_factor.glsl"
 #include "shooting/visible.glsl"
 
+flat in uint v_shots;  // a bit for each shot that may light this receiver
 #if FLAT
 in vec3 v_position;
 flat in vec3 v_normal;
@@ -20,34 +21,44 @@ uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
 uniform sampler2D t_materials;
 #endif
-uniform sampler2D t_map;
 
-layout(location = 0) out vec4 out_irradiance;  // a: F_ji V_ji, for the audit
+layout(location = 0) out vec4 out_irradiance;  // a: Σ_i F_ji V_ji, for the audit
 layout(location = 1) out vec4 out_residual;
+
+// (r_i F_ji V_ji, F_ji V_ji)
+vec4 received(vec3 position, vec3 normal, float facet, Shooter s, int shot) {
+    mat3 axes = world_axes(s);
+    vec3 local = (position - s.origin) * axes;
+    float FV = form_factor(position, normal, s) * visible(facet, local, normal * axes, shot);
+    return local.z > COPLANAR ? vec4(s.exitance, 1.0) * FV : vec4(0.0);
+}
 
 void main() {
     ivec2 texel_px = ivec2(gl_FragCoord.xy);
-    Shooter s = this_shooter();
 #if FLAT
     vec3 position = v_position, normal = v_normal;
     vec3 albedo = v_albedo * albedo_texture(texel_px);
     float facet = v_facet;
 #else
     Texel texel = load_texel(t_position_area, t_normal_ids, texel_px);
-    // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it
-    ivec2 in_patch = texel_px - s.patch_px;
-    bool own = all(greaterThanEqual(in_patch, ivec2(0))) && all(lessThan(in_patch, ivec2(s.size_px)));
-    if (texel.area <= 0.0 || own) discard;
     vec3 position = texel.position, normal = texel.normal;
     vec3 albedo = albedo_of(t_materials, texel.material, texel_px);
     float facet = float(texel.facet);
 #endif
-    mat3 axes = world_axes(s);
-    vec3 local = (position - s.origin) * axes;
-    if (local.z <= COPLANAR) discard;
-    float F = form_factor(position, normal, s);
-    float V = visible(facet, local, normal * axes, t_map);
-    vec3 irradiance = s.exitance * F * V;
-    out_irradiance = vec4(irradiance, F * V);
-    out_residual = vec4(albedo * irradiance, 0.0);
+    vec4 sum = vec4(0.0);
+    uint shots = v_shots;
+    do {
+        int shot = findLSB(shots);
+        shots &= shots - 1u;
+        Shooter s = shooter_of(shot);
+        vec4 light = received(position, normal, facet, s, shot);
+#if !FLAT
+        // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it
+        bool own = all(lessThan(uvec2(texel_px - s.patch_px), uvec2(s.size_px)));
+        light = own || texel.area <= 0.0 ? vec4(0.0) : light;
+#endif
+        sum += light;
+    } while (shots != 0u);
+    out_irradiance = sum;
+    out_residual = vec4(albedo * sum.rgb, 0.0);
 }

@@ -1,6 +1,6 @@
 // One quad per receiver: a span of flat tiles, whose texels follow from its corner and edges, or a tile of any shape, whose
-// texels are read. What the shooter's plane or the receiver's own hides entirely is not drawn; nor is, in the near-field
-// pass, what lies in the far field, and the other way round.
+// texels are read. Shots that its own plane or the shooter's hides entirely are left out;
+// so are, in the near-field pass, those in whose far field it lies, and the other way round.
 #define FLAT 1
 #define NEAR_FIELD 0
 #include "common/item.glsl"
@@ -9,6 +9,7 @@
 #include "shooting/far_field.glsl"
 
 uniform vec2 u_size;  // of the node set [texels]
+uniform int u_shots;  // from u_first on
 #if FLAT
 uniform sampler2D t_materials;
 #endif
@@ -18,6 +19,7 @@ in vec4 in_a;     // FLAT: position of the corner, facet     else: centre and ra
 in vec4 in_b;     // FLAT: ∂p/∂u per texel, material         else: mean normal, half thickness along it
 in vec4 in_c;     // FLAT: ∂p/∂v per texel, 0                else: 0
 
+flat out uint v_shots;
 #if FLAT
 out vec3 v_position;
 flat out vec3 v_normal;
@@ -53,7 +55,6 @@ float squared_distance(Shooter s) {
 #endif
 
 void main() {
-    Shooter s = this_shooter();
     vec2 at = in_rect.zw * vec2(gl_VertexID & 1, gl_VertexID >> 1);
     gl_Position = vec4((in_rect.xy + at) / u_size * 2.0 - 1.0, 0.0, 1.0);
 #if FLAT
@@ -62,9 +63,16 @@ void main() {
     v_position = in_a.xyz + at.x * in_b.xyz + at.y * in_c.xyz;
     v_facet = in_a.w;
     v_albedo = texelFetch(t_materials, ivec2(0, int(in_b.w)), 0).rgb;
-    bool drawn = !hidden(s, v_normal, u, v) && in_far_field(s, squared_distance(s, u, v)) != bool(NEAR_FIELD);
-#else
-    bool drawn = !hidden(s) && in_far_field(s, squared_distance(s)) != bool(NEAR_FIELD);
 #endif
-    if (s.size_px == 0 || !drawn) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+    v_shots = 0u;
+    for (int shot = 0; shot < u_shots; ++shot) {
+        Shooter s = shooter_of(shot);
+#if FLAT
+        bool lit = !hidden(s, v_normal, u, v) && in_far_field(s, squared_distance(s, u, v)) != bool(NEAR_FIELD);
+#else
+        bool lit = !hidden(s) && in_far_field(s, squared_distance(s)) != bool(NEAR_FIELD);
+#endif
+        if (s.size_px > 0 && lit) v_shots |= 1u << shot;
+    }
+    if (v_shots == 0u) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }

@@ -1,16 +1,14 @@
-// Item and depth along the sight. The depth buffer gets the same, linear: a perspective one cannot tell a lamp from its ceiling.
+// Item, and depth along the sight. Depth is linear: a perspective one cannot tell a lamp from its ceiling.
 #include "common/item.glsl"
-#include "shooting/shooter_block.glsl"
 
 flat in vec2 v_sides;
+flat in float v_own;
 
-layout(location = 0) out vec2 out_sample;
+layout(location = 0) out float out_item;
 
 void main() {
-    float own = u_shooter_rows[1].w;
-    // the shooter's own polygon is edge-on: nothing of it may cover the rim
-    if (v_sides.r == own || v_sides.g == own) discard;
-    float depth = 1.0 / gl_FragCoord.w;
-    out_sample = vec2(gl_FrontFacing ? v_sides.r : v_sides.g, depth);
-    gl_FragDepth = depth / FAR;
+    out_item = gl_FrontFacing ? v_sides.r : v_sides.g;
+    // the shooter's own polygon is edge-on: nothing of it may cover the rim; at FAR it loses against the open
+    bool own = v_sides.r == v_own || v_sides.g == v_own;
+    gl_FragDepth = own ? 1.0 : 1.0 / (gl_FragCoord.w * FAR);
 }

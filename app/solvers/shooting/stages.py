@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
-from app.gpu import Gpu, Pass
+from app.gpu import Gpu, Pass, Texture
 from app.projections import PROJECTIONS
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 
 BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
-OPEN, FAR = 0.0, 2.0  # item and depth of the open background, see common/item.glsl
+OPEN = 0.0  # item of the open background, see common/item.glsl
 SHOOTER_ROWS = 7  # texels that describe one shooter, see shooter.glsl
 BLOCK_BYTES = 256  # no driver asks for a coarser uniform block alignment
 BLOCK_ROWS = BLOCK_BYTES // 16  # texels in a row of t_shooters: one shooter, padded to a uniform block
 REPORT_TEXELS = 2 + SHOOTER_ROWS  # see report.frag.glsl
-OPEN_BLOCK = 32  # visibility texels along the edge of a block that open.frag.glsl sums
+OPEN_BLOCK = 8  # visibility texels along the edge of a block that open.frag.glsl sums
+MAPS_TEXELS = 2**21  # of visibility that are drawn at once: more gain little and cost memory
 
 
 class ShotBuffers:
@@ -54,27 +55,46 @@ class ChoiceStages:
         release_all(self._gpu, self)
 
 
+class Maps:
+    """What some shots see, at once: their maps of visibility above each other, and how much of each is open."""
+
+    def __init__(self, gpu: Gpu, map_size: tuple[int, int], count: int) -> None:
+        self._gpu, self.count = gpu, count
+        width, height = self.map_size = map_size
+        # two textures of four bytes: llvmpipe clears eight bytes ten times slower
+        self.items = gpu.texture((width, height * count), 1, "f4")
+        self.depth = gpu.depth_texture(self.items.size)
+        self.open_size = (width // OPEN_BLOCK, height // OPEN_BLOCK)  # blocks of one shot
+        self.open = gpu.texture((self.open_size[0], self.open_size[1] * BATCH), 2, "f4")
+        self.target = gpu.target(self.items, depth=self.depth)
+        self.open_target = gpu.target(self.open)
+
+    def release(self) -> None:
+        release_all(self._gpu, self)
+
+
 class ShotStages:
     """Programs and maps that follow from the options: built anew when they change."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
-        self._gpu, self.projection = gpu, PROJECTIONS[options.projection]
+        self._gpu, self.projection, self._visibility = gpu, PROJECTIONS[options.projection], options.visibility
         levels = range(options.level, (MAX_LEVEL if options.coarsen else options.level) + 1)
         self.choices = [ChoiceStages(gpu, lightmap, level) for level in levels]
-        map_size = self.projection.size(options.resolution)
-        self.map = gpu.texture(map_size, 2, "f4")  # item, depth
-        self.depth = gpu.depth_texture(map_size)
-        self.weights = gpu.texture((map_size[0] // 2, map_size[1] // 2), 1, "f4")
-        self.open_size = (map_size[0] // OPEN_BLOCK, map_size[1] // OPEN_BLOCK)  # blocks of one shot
-        self.open = gpu.texture((self.open_size[0], self.open_size[1] * BATCH), 2, "f4")
-        self.visibility_target = gpu.target(self.map, depth=self.depth)
-        self.open_target = gpu.target(self.open)
+        width, height = self.map_size = self.projection.size(options.resolution)
+        self.most_maps = max(1, min(BATCH, MAPS_TEXELS // (width * height)))
+        self.maps = Maps(gpu, self.map_size, 1)
+        self.weights = gpu.texture((width // 4, height // 4), 1, "f4")  # see weights.frag.glsl
 
         resolution = {"RESOLUTION": options.resolution}
         bits = lightmap.defines("MATERIAL_BITS")
         reads = {"projection": self.projection.glsl}
         self.zero = Pass(gpu, "shooting/zero", defines=bits)
-        self.see = Pass(gpu, "shooting/visibility", defines=resolution, slots={"projection": self.projection.clip_glsl})
+        self.see = Pass(
+            gpu,
+            "shooting/visibility",
+            defines=resolution | {"VIEWS": self.projection.views},
+            slots={"projection": self.projection.clip_glsl},
+        )
         self.receive = {
             (flat, near): self._receive(gpu, lightmap, options, flat=flat, near=near)
             for flat in lightmap.receivers
@@ -87,6 +107,20 @@ class ShotStages:
         Pass(gpu, "shooting/weights", defines=resolution, slots=reads).draw(weights_target)
         gpu.release_all(weights_target)
         self.add_books = Pass(gpu, "shooting/books", defines=lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"))
+
+    @property
+    def sight_textures(self) -> dict[str, Texture]:
+        """What a receiver looks its visibility up in."""
+        items = {"t_items": self.maps.items}
+        return items if self._visibility == "item-id" else items | {"t_depth": self.maps.depth}
+
+    def groups(self, shots: int) -> list[tuple[int, int]]:
+        """(first, count) of those shots of a batch that see the scene at once; makes room for their maps."""
+        count = min(shots, self.most_maps)
+        if count > self.maps.count:
+            self.maps.release()
+            self.maps = Maps(self._gpu, self.map_size, count)
+        return [(first, min(count, shots - first)) for first in range(0, shots, count)]
 
     def _receive(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, flat: bool, near: bool) -> Pass:
         defines: dict[str, object] = {

@@ -29,7 +29,6 @@ from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.stages import (
     BATCH,
     BLOCK_BYTES,
-    FAR,
     OPEN,
     SHOOTER_ROWS,
     ChoiceStages,
@@ -111,10 +110,7 @@ class UniformShooting:
         those too weak beside its best are left for later, and not counted once ``poll`` has heard of it."""
         shots = min(shots, BATCH)
         self._choose(shots)
-        for shot in range(shots):
-            self._see(shot)
-            self._receive(self.lightmap.light_target, shot, blend="add")
-            self._look_out(shot)
+        self._for_groups(self._shoot, shots)
         self._book(shots)
         self.shots += shots
         self._tell()
@@ -150,35 +146,38 @@ class UniformShooting:
         rows[0] = 1.0, *patch, 0.0
         self.buffers.rows.write(rows.tobytes())
         self._describe(self.stages.choices[0], 1)
-        self._see(0)
+        self._see(0, 1)
         scratch = [self.gpu.texture(self.lightmap.size, 4, "f4") for _ in range(2)]
         target = self.gpu.target(*scratch)
         target.clear()
-        self._receive(target, 0, blend=None)
+        self._receive(target, 0, 1, blend=None)
         weight = np.frombuffer(scratch[0].read(), np.float32).reshape(*scratch[0].size[::-1], 4)[..., 3]
         area = np.frombuffer(self.lightmap.texture("t_position_area").read(), np.float32).reshape(*weight.shape, 4)[
             ..., 3
         ]
         self.gpu.release_all(target, *scratch)
-        self._look_out(0)
-        blocks = np.frombuffer(self.stages.open.read(), np.float32).reshape(BATCH, -1, 2)[0].astype(np.float64).sum(0)
+        self._look_out(0, 1)
+        blocks = (
+            np.frombuffer(self.stages.maps.open.read(), np.float32).reshape(BATCH, -1, 2)[0].astype(np.float64).sum(0)
+        )
         shooter = np.frombuffer(self.buffers.shooters.read(), np.float32).reshape(BATCH, -1, 4)[0]
         received = float((area.astype(np.float64) * weight).sum() / shooter[0, 3])
         return Audit(received, float(blocks[0]), float(blocks[1]), self._shot_from_rows(shooter))
 
-    def passes(self) -> dict[str, Callable[[], None]]:
-        """Each part of a shot by itself, to be timed. They leave the light wrong: reset afterwards."""
+    def passes(self, shots: int) -> dict[str, Callable[[], None]]:
+        """Each part of a step by itself, to be timed. They leave the light wrong: reset afterwards."""
+        shots = min(shots, BATCH)
         return {
-            "choose": lambda: self._choose(BATCH),
-            "see": lambda: self._see(0),
-            "receive": lambda: self._receive(self.lightmap.light_target, 0, blend="add"),
-            "look out": lambda: self._look_out(0),
-            "book": lambda: self._book(BATCH),
+            "choose": lambda: self._choose(shots),
+            "see": lambda: self._for_groups(self._see, shots),
+            "receive": lambda: self._for_groups(self._light, shots),
+            "look out": lambda: self._for_groups(self._look_out, shots),
+            "book": lambda: self._book(shots),
         }
 
     def inspect(self) -> dict[str, Texture]:
-        """Named intermediates of the last shot."""
-        return {"visibility": self.stages.map, "shooters": self.buffers.shooters}
+        """What the first shot of the last step saw, in the lowest of the maps that lie above each other."""
+        return {"items": self.stages.maps.items, "depth": self.stages.maps.depth}
 
     def release(self) -> None:
         self._drop_reports()
@@ -186,6 +185,20 @@ class UniformShooting:
         self.buffers.release()
 
     # -- one shot ------------------------------------------------------------------------------------------------------
+
+    def _for_groups(self, part: Callable[[int, int], None], shots: int) -> None:
+        """Do this part of a step for all its shots, as many at once as there are maps for."""
+        for first, some in self.stages.groups(shots):
+            part(first, some)
+
+    def _shoot(self, first: int, shots: int) -> None:
+        """Some shots of the batch, from seeing to the light on every texel. [Coombe03, 3]"""
+        self._see(first, shots)
+        self._light(first, shots)
+        self._look_out(first, shots)
+
+    def _light(self, first: int, shots: int) -> None:
+        self._receive(self.lightmap.light_target, first, shots, blend="add")
 
     def _choose(self, shots: int) -> None:
         """Pick the strongest patches and zero them. [Coombe03, 3.4]"""
@@ -215,52 +228,57 @@ class UniformShooting:
         )
         self.buffers.shooter_target.read_into(self.buffers.shooter_blocks, components=4, dtype="f4")
 
-    def _see(self, shot: int) -> None:
-        """Item buffer and depth from the shooter, all views in one draw. [Coombe03, 3.2; Cohen85]"""
-        self.stages.visibility_target.clear(OPEN, FAR, depth=1.0)
+    def _see(self, first: int, shots: int) -> None:
+        """Item buffer and depth from so many shooters of the batch, all views in one draw. [Coombe03, 3.2; Cohen85]"""
+        maps = self.stages.maps
+        used = None if shots == maps.count else (0, 0, maps.items.width, shots * maps.map_size[1])
+        maps.target.clear(OPEN, depth=1.0, viewport=used)
         self.stages.see.draw(
-            self.stages.visibility_target,
-            blocks=self._shooter_block(shot),
+            maps.target,
+            uniforms={"u_maps": maps.count, "u_first": first},
+            blocks=self._shooter_blocks,
             mesh=self.lightmap.occluders,
-            instances=self.stages.projection.views,
+            instances=self.stages.projection.views * shots,
             depth=True,
             clip_distances=4,
         )
 
-    def _receive(self, target: Framebuffer, shot: int, *, blend: str | None) -> None:
-        """The shot's light on every texel that sees it. [Coombe03, eq. 1]"""
+    def _receive(self, target: Framebuffer, first: int, shots: int, *, blend: str | None) -> None:
+        """The light of these shots on every texel that sees them. [Coombe03, eq. 1]"""
         lightmap = self.lightmap
         shaped = lightmap.textures("t_position_area", "t_normal_ids")
         for (flat, _), receive in self.stages.receive.items():
-            textures = lightmap.textures("t_materials", "t_albedo") | {"t_map": self.stages.map}
+            textures = lightmap.textures("t_materials", "t_albedo") | self.stages.sight_textures
             receive.draw(
                 target,
                 textures=textures if flat else textures | shaped,
-                uniforms={"u_size": lightmap.size},
-                blocks=self._shooter_block(shot),
+                uniforms={"u_size": lightmap.size, "u_first": first, "u_shots": shots},
+                blocks=self._shooter_blocks,
                 mesh=lightmap.receivers[flat],
                 blend=blend,
             )
 
-    def _shooter_block(self, shot: int) -> dict[str, tuple[Buffer, int, int]]:
-        return {"ShooterBlock": (self.buffers.shooter_blocks, shot * BLOCK_BYTES, SHOOTER_ROWS * 16)}
+    @property
+    def _shooter_blocks(self) -> dict[str, tuple[Buffer, int, int]]:
+        return {"ShooterBlock": (self.buffers.shooter_blocks, 0, BATCH * BLOCK_BYTES)}
 
-    def _look_out(self, shot: int) -> None:
-        """Add up how much of the shooter's sight leaves the scene."""
-        width, height = self.stages.open_size
+    def _look_out(self, first: int, shots: int) -> None:
+        """Add up how much of the shooters' sight leaves the scene."""
+        maps = self.stages.maps
+        width, height = maps.open_size
         self.stages.add_open.draw(
-            self.stages.open_target,
-            textures={"t_map": self.stages.map, "t_weights": self.stages.weights},
-            uniforms={"u_origin_px": (0, shot * height)},
-            viewport=(0, shot * height, width, height),
+            maps.open_target,
+            textures={"t_items": maps.items, "t_weights": self.stages.weights},
+            uniforms={"u_row": first * height},
+            viewport=(0, first * height, width, shots * height),
         )
 
     def _book(self, shots: int) -> None:
         """Enter in the ledger what the batch sent out of the scene."""
         self.stages.enter.draw(
             self.buffers.ledger_target,
-            textures={"t_open": self.stages.open, "t_shooters": self.buffers.shooters},
-            uniforms={"u_blocks": self.stages.open_size[1]},
+            textures={"t_open": self.stages.maps.open, "t_shooters": self.buffers.shooters},
+            uniforms={"u_blocks": self.stages.maps.open_size[1]},
             blend="add",
             viewport=(0, 0, shots, 2),
         )

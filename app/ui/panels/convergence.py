@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 MOST_POINTS = 400  # per curve: more cannot be told apart in a panel
 SMALLEST = 1e-6  # of the power emitted, for the logarithmic axis
 LEGEND_EM = 20.0  # a narrower plot has no legend: the colours are those of the Solver panel
-TIMINGS_EM = 17.0  # width of the table of passes
+TIMINGS_EM = 19.0  # width of the table of passes: the longest name and its bar
 AXIS = int(implot.AxisFlags_.auto_fit | implot.AxisFlags_.no_highlight)
 NO_LEGEND = int(implot.Flags_.no_legend)
 PLOT = int(implot.Flags_.no_mouse_text | implot.Flags_.no_menus | implot.Flags_.no_box_select)
@@ -25,8 +25,8 @@ PLOT = int(implot.Flags_.no_mouse_text | implot.Flags_.no_menus | implot.Flags_.
 def draw(session: Session, state: State) -> None:
     """The whole panel: two plots side by side, and the passes to the right."""
     history = session.history
-    count = len(history.column("shots"))
-    chosen = np.unique(np.linspace(0, max(count - 1, 0), min(count, MOST_POINTS)).astype(int))
+    rows = np.flatnonzero(np.isfinite(history.column("residual")) & np.isfinite(history.column("absorbed")))
+    chosen = rows[np.unique(np.linspace(0, max(len(rows) - 1, 0), min(len(rows), MOST_POINTS)).astype(int))]
     over_seconds = state.plot_over_seconds and state.measured
     x = history.column("seconds" if over_seconds else "shots")[chosen]
     curves = {n: history.column(n)[chosen] for n in ("residual", "absorbed", "escaped")}
@@ -93,8 +93,8 @@ def _passes(session: Session, state: State) -> None:
     widgets.dim(f"{widgets.number(session.history.shots_per_second, 3)} shots/s")
     if not imgui.begin_table("timings", 2, imgui.TableFlags_.sizing_stretch_prop | imgui.TableFlags_.row_bg):
         return
-    imgui.table_setup_column("pass", imgui.TableColumnFlags_.width_stretch, 0.62)
-    imgui.table_setup_column("ms", imgui.TableColumnFlags_.width_stretch, 0.38)
+    imgui.table_setup_column("pass", imgui.TableColumnFlags_.width_fixed)
+    imgui.table_setup_column("ms", imgui.TableColumnFlags_.width_stretch)
     longest = max(session.timings.values())
     for label, ms in session.timings.items():
         imgui.table_next_row()

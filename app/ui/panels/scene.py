@@ -6,8 +6,10 @@ import dataclasses
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from imgui_bundle import imgui
 
+from app.render.develop import encode_srgb
 from app.ui import theme, widgets
 from app.ui.state import RGB, State
 
@@ -59,14 +61,16 @@ def _statistics(session: Session, state: State) -> None:
 
 
 def _atlas(session: Session, state: State) -> None:
-    """How finely surfaces are cut; takes hold with the button, since it loads the scene anew."""
+    """How finely surfaces are cut; takes hold with the button, since it takes a while. The draft stays until then."""
     draft = session.atlas if state.atlas is None else state.atlas
     assert state.stats is not None
     starts = {"density": float(session.charts.density), "texels": state.stats.texels}
     draft = state.atlas = widgets.edit_options(draft, starts=starts)
-    if draft != session.atlas and imgui.button("Cut anew", imgui.ImVec2(-1, 0)):
-        state.atlas = None
-        state.act(lambda: session.set_atlas(draft))
+    if draft != session.atlas:
+        imgui.begin_disabled(session.loading is not None)
+        if imgui.button("Cut anew", imgui.ImVec2(-1, 0)):
+            state.act(lambda: session.set_atlas(draft))
+        imgui.end_disabled()
 
 
 def _list(session: Session, state: State) -> None:
@@ -148,5 +152,5 @@ def rgb(values: Iterable[float]) -> RGB:
 
 
 def display_colour(linear: RGB) -> RGB:
-    """Linear Rec.709 as a screen shows it (sRGB transfer, IEC 61966-2-1)."""
-    return rgb(12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055 for v in linear)
+    """Linear Rec.709 as a screen shows it."""
+    return rgb(encode_srgb(np.array(linear)).tolist())

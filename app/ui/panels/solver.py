@@ -57,7 +57,7 @@ def toggle(session: Session) -> None:
 def _progress(state: State) -> None:
     stats = state.stats
     assert stats is not None
-    share = min(max(1.0 - stats.residual, 0.0), 1.0)
+    share = min(max(0.0, 1.0 - stats.residual), 1.0)  # 0 where the residual is no number
     imgui.progress_bar(share, imgui.ImVec2(-1, imgui.get_font_size() * BAR_EM), "")
     widgets.tooltip("Power that has been shot, of the power emitted")
     left = "converged" if stats.converged else "still to shoot"
@@ -105,7 +105,7 @@ def _bar(shares: list[tuple[float, theme.RGBA]], total: float) -> None:
     corner = imgui.get_cursor_screen_pos()
     left = corner.x
     for power, colour in shares:
-        right = min(left + width * max(power, 0.0) / total, corner.x + width) if total > 0 else left
+        right = min(left + width * max(0.0, power) / total, corner.x + width) if total > 0 else left
         box = imgui.ImVec2(left, corner.y), imgui.ImVec2(right, corner.y + height)
         imgui.get_window_draw_list().add_rect_filled(*box, theme.colour_u32(colour))
         left = right
