@@ -9,7 +9,6 @@ from app.atlas.lightmap import Lightmap
 from app.atlas.node_set import NodeSet
 from app.gpu import Gpu
 from app.render.frame import FrameRenderer
-from app.scene.model import Material
 from app.solvers import DEFAULT_SOLVER, SOLVERS, ShootingOptions, Solver
 
 
@@ -43,9 +42,3 @@ def prepare(
         yield
         undo.pop_all()
     return lightmap, solver
-
-
-def put_materials(lightmap: Lightmap, materials: tuple[Material, ...]) -> None:
-    """Other factors of albedo and emission for the next reset: nothing is cleared, as the solver does that then."""
-    lightmap.scene = lightmap.scene.with_materials(materials)
-    lightmap.texture("t_materials").write(lightmap.nodes.material_table(lightmap.scene).tobytes())

@@ -20,7 +20,7 @@ from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Texture
 from app.history import History
 from app.loading import Loaded, Loading, load
-from app.opening import prepare, put_materials
+from app.opening import prepare
 from app.picking import Picked, picked_from_hit
 from app.projections import PROJECTIONS
 from app.render.camera import CameraView
@@ -134,7 +134,7 @@ class Session:
             solver.set_options(self.shooting)
         cut_anew = self._opened and scene is self.unedited
         if cut_anew and self.scene is not scene:
-            put_materials(lightmap, self.scene.materials)
+            lightmap.set_materials(self.scene.materials)
             solver.reset()
         self.close()
         self.lightmap, self.solver, self.unedited, self.atlas = lightmap, solver, scene, loaded.atlas
@@ -243,19 +243,17 @@ class Session:
         self.solver.poll(wait=True)
         self._make_books()
         self._settled = True
-        emitted = float(self._books.emitted.sum())
-        if emitted > 0:
-            unshot, escaped = float(self._books.unshot.sum()) / emitted, float(self._books.escaped.sum()) / emitted
+        if self._books.emitted.sum() > 0:
+            unshot = self.solver.unshot_share()
             self.solver.report = replace(self.solver.report, residual=unshot)
-            self.history.add(self.solver.shots, self.seconds, unshot, escaped)
+            self.history.add(self.solver.shots, self.seconds, unshot, self._escaped_share)
             if known and not np.isfinite(unshot + float(self._books.absorbed.sum())):
                 raise not_finite(self)
 
     def restart(self) -> None:
         """Forget all light and begin again."""
         self.solver.reset()
-        nothing = np.zeros(3)
-        self._begin(replace(self._books, absorbed=nothing, escaped=nothing, unshot=self._books.emitted))
+        self._begin_again()
 
     def set_shooting(self, options: ShootingOptions) -> None:
         """Other knobs, from the next shot on; only another storage format begins again."""
@@ -267,13 +265,19 @@ class Session:
                 self._begin(self.solver.books())
 
     def set_material(self, index: int, material: Material) -> None:
-        """Another albedo or emission: charts and texels stay, the light begins again."""
+        """Another albedo or emission: charts, texels and light stay, and the difference is shot."""
         materials = list(self.scene.materials)
         materials[index] = material
-        put_materials(self.lightmap, tuple(materials))
-        self.restart()
+        self.solver.set_materials(tuple(materials))
+        if self.solver.shots == 0:
+            self._begin_again()
+        self.history.add(self.solver.shots, self.seconds, self.solver.report.residual, self._escaped_share)
         self._quiet_after = time.perf_counter() + EDIT_SECONDS
         self._books_due, self._settled = 0.0, False
+
+    def _begin_again(self) -> None:
+        nothing = np.zeros(3)
+        self._begin(replace(self._books, absorbed=nothing, escaped=nothing, unshot=self._books.emitted))
 
     def _begin(self, books: EnergyBook) -> None:
         """books: with nothing shot."""
@@ -304,8 +308,11 @@ class Session:
             self._busy = True
             self._make_books()
         if report.shots != before and not self._settled:
-            escaped = float(report.escaped.sum()) / max(float(self._books.emitted.sum()), 1e-300)
-            self.history.add(report.shots, self.seconds, report.residual, escaped)
+            self.history.add(report.shots, self.seconds, report.residual, self._escaped_share)
+
+    @property
+    def _escaped_share(self) -> float:
+        return float(self.solver.report.escaped.sum()) / max(float(self._books.emitted.sum()), 1e-300)
 
     def _make_books(self) -> None:
         start = time.perf_counter()

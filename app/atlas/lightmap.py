@@ -15,6 +15,8 @@ are stored relative to the largest exitance, which keeps half floats in range an
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,6 +44,10 @@ class Lightmap:
         self.tiles, self.columns, self.rows, self.size = nodes.tiles, nodes.columns, nodes.rows, nodes.size
         self._textures = {name: self._upload(array) for name, array in nodes.arrays.items()}
         self._emit = Pass(gpu, "lightmap/emit", defines=self.defines("MATERIAL_BITS", "EMISSION_TEXTURE"))
+        self._edit = Pass(
+            gpu, "lightmap/edit", defines=self.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
+        )
+        self._scale = Pass(gpu, "lightmap/scale")
         self.mesh = Mesh(gpu, nodes.vertices.tobytes(), VERTEX_FORMAT)
         corners, triangles = nodes.occluders
         self.occluders = Mesh(gpu, corners.tobytes(), OCCLUDER_FORMAT, indices=triangles.tobytes())
@@ -99,10 +105,62 @@ class Lightmap:
         self.clear()
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
-        """Use other albedos and emissions (factors; textures stay) from now on, and start from no light."""
+        """Use other albedos and emissions (factors; textures stay) from now on. The light stays as it is: clear, or edit."""
         self.scene = self.scene.with_materials(materials)
         self._textures["t_materials"].write(self.nodes.material_table(self.scene).tobytes())
-        self.clear()
+
+    def edit_materials(self, materials: tuple[Material, ...], factor: F64) -> None:
+        """Use other albedos and emissions, and enter in r what is to be shot for it: r += ΔE + Δρ·H [Chen90].
+
+        factor (3,): of the emissions until now, by which the light that is there was scaled."""
+        table = self.nodes.material_table(self.scene)
+        table[:, 1, :3] *= factor
+        before = self._upload(table)
+        self.set_materials(materials)
+        self._edit.draw(
+            self.residual_target,
+            textures={"t_before": before}
+            | self.textures("t_position_area", "t_normal_ids", "t_materials", "t_irradiance", "t_albedo", "t_emission"),
+            uniforms={"u_unit": self.unit},
+            blend="add",
+        )
+        self.gpu.release_all(before)
+
+    def scale(self, factor: F64, target: Framebuffer | None = None) -> None:
+        """Multiply H and r, or what ``target`` holds, by a factor (3,) for each channel."""
+        self._scale.draw(target or self.light_target, uniforms={"u_factor": tuple(factor)}, blend="multiply")
+
+    def common_factor(self, materials: tuple[Material, ...]) -> F64:
+        """(3,) a: of all factors for the light that is there, the one that leaves least to shoot for other emissions, min over a
+        of Σ |E' - a E| A for each channel: the median of E'/E, weighted with E A. 1 where a channel emits nothing."""
+        before, after = (np.array([m.emission for m in ms]) for ms in (self.scene.materials, materials))
+        factor = np.ones(3)
+        for c in range(3):
+            emits = before[:, c] > 0
+            ratio, weight = after[emits, c] / before[emits, c], (before * self._emission_weights)[emits, c]
+            order = np.argsort(ratio)
+            if weight.sum() > 0:
+                factor[c] = ratio[order][np.searchsorted(np.cumsum(weight[order]), weight.sum() / 2)]
+        return factor
+
+    @property
+    def emitted(self) -> F64:
+        """Power that the scene's emitters send out, RGB [W]: Σ E A."""
+        weights = self._emission_weights
+        return np.asarray(np.pi * (np.array([m.emission for m in self.scene.materials]) * weights).sum(0))
+
+    @functools.cached_property
+    def _emission_weights(self) -> F64:
+        """(materials, 3) [m²]: the area of each material, weighted with its emission texture."""
+        surfaces = self.nodes.surfaces
+        covered = surfaces.face >= 0
+        material = self.scene.material_ids[self.charts.face_triangle[surfaces.face[covered]]]
+        area = surfaces.area[covered][:, None]
+        tint = np.ones(3) if self.nodes.emission_tiles is None else self.nodes.emission_tiles[covered]
+        weights = np.zeros((len(self.scene.materials), 3))
+        for channel, column in enumerate(np.broadcast_to(area * tint, (len(area), 3)).T):
+            weights[:, channel] = np.bincount(material, column, len(weights))
+        return weights
 
     def clear(self) -> None:
         """H = 0, r = E: nothing has been shot [Coombe03, 3]."""

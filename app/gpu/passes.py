@@ -18,6 +18,7 @@ from app.gpu.shader import ShaderError
 GL_CLIP_DISTANCE0 = 0x3000
 BLEND: dict[str, Any] = {
     "add": (moderngl.ONE, moderngl.ONE),
+    "multiply": (moderngl.ZERO, moderngl.SRC_COLOR),
     "over": (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA),
 }
 

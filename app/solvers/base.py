@@ -10,7 +10,7 @@ import numpy as np
 
 from app.gpu import Texture
 from app.options import Options
-from app.scene.model import F64
+from app.scene.model import F64, Material
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,12 @@ class Solver(Protocol[OptionsT]):
 
     def set_options(self, options: OptionsT) -> None:
         """Use other knobs from the next shot on. Raises UserError."""
+
+    def set_materials(self, materials: tuple[Material, ...]) -> None:
+        """Other albedos and emissions of the scene, from the next step on; solves for the difference if it can."""
+
+    def unshot_share(self) -> float:
+        """The residual as a share of the emitted power, now. Waits for the GPU."""
 
     def step(self, shots: int) -> int:
         """Make up to ``shots`` shots, and no more than one batch of its own; how many were issued."""

@@ -453,6 +453,7 @@ def test_a_frame_follows_storage_and_materials(gpu: Gpu, box: Lightmap) -> None:
     box.set_storage("rgba16f")
     dim = tuple(replace(m, emission=tuple(0.01 * e for e in m.emission)) for m in box.scene.materials)
     box.set_materials(dim)
+    box.clear()
     renderer.render(target, SIZE, box, view_of(box), PLAIN)
     brightest = np.frombuffer(colour.read(), np.uint8).reshape(-1, 4)[:, :3].max(0) / 255
     assert brightest == pytest.approx(encode_srgb(np.array([0.17, 0.12, 0.04])), abs=0.15)

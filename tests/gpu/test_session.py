@@ -111,12 +111,12 @@ def test_solve_runs_to_convergence_and_knows_it(session: Session) -> None:
 # -- what begins again -------------------------------------------------------------------------------------------------
 
 
-def test_another_material_restarts_the_light_and_changes_it(session: Session) -> None:
+def test_another_material_changes_the_light_that_is_there(session: Session) -> None:
     session.solve(Stop())
-    dim, texels = irradiance(session), session.lightmap.texel_count
+    dim, texels, shots = irradiance(session), session.lightmap.texel_count, session.solver.shots
     lightmap = session.lightmap
     session.set_material(0, dataclasses.replace(session.scene.materials[0], albedo=(0.75, 0.75, 0.75)))
-    assert irradiance(session) == 0 and session.solver.shots == 0
+    assert irradiance(session) == dim and session.solver.shots == shots and not session.converged
     assert session.lightmap is lightmap and session.lightmap.texel_count == texels  # nothing was unfolded again
     session.solve(Stop())
     # B = E / (1 - ρ), H = E / (1 - ρ): twice as much at ρ = 0.75 as at 0.5, but for 5 % of light that is not yet shot
@@ -197,7 +197,7 @@ def test_cutting_anew_keeps_edits_exposure_and_camera(session: Session) -> None:
     np.testing.assert_array_equal(session.lightmap.irradiance(), 0)
     residual = session.lightmap.residual()[session.lightmap.nodes.surfaces.face >= 0]
     np.testing.assert_allclose(residual, np.broadcast_to(np.pi * np.array(dimmed.emission), residual.shape), rtol=1e-6)
-    assert session.stats.emitted == pytest.approx(session.stats.unshot)
+    assert session.stats.emitted == pytest.approx(session.stats.unshot, rel=1e-5)  # a sum in single precision
     assert session.display.exposure == -3.5
     np.testing.assert_array_equal(session.view.eye, eye)
 

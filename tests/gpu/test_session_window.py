@@ -95,7 +95,7 @@ def test_numbers_settle_when_shooting_stops(session: Session, stop: str) -> None
     assert session.solver.report.shots == session.solver.shots, "the reports of the last shots have arrived"
     stats = session.stats
     assert (
-        0.9 * stats.residual < stats.unshot / stats.emitted <= stats.residual
+        0.9 * stats.residual < stats.unshot / stats.emitted <= stats.residual * (1 + 1e-6)
     )  # a report is from before its last shot
     last = [session.history.column(name)[-1] for name in ("shots", "residual")]
     assert last == [stats.shots, pytest.approx(stats.unshot / stats.emitted)]
@@ -146,14 +146,14 @@ def dim(session: Session, factor: float) -> None:
     session.set_material(0, dataclasses.replace(material, albedo=tuple(factor * a for a in material.albedo)))
 
 
-def test_an_edit_clears_the_light_once(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_edit_keeps_the_light(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     opened(session, "cornell-box")
     frames(session, lambda: session.solver.shots >= 5)
     clears = counted(monkeypatch, session.lightmap, "clear")
+    light, shots = session.lightmap.irradiance(), session.solver.shots
     dim(session, 0.5)
-    assert len(clears) == 1
-    assert not session.lightmap.irradiance().any()
-    assert session.lightmap.albedo().max() > 0
+    assert not clears and (session.lightmap.irradiance() == light).all()
+    assert session.solver.shots >= shots
 
 
 @pytest.mark.parametrize("running", [True, False])

@@ -48,8 +48,7 @@ vec3 facet_tangent(uint facet, int which) {
 Texel texel_at(ivec2 px) { return load_texel(t_position_area, t_normal_ids, px); }
 
 float residual_at(ivec2 px) {
-    vec3 r = texelFetch(t_residual, px, 0).rgb;
-    return abs(r.r + r.g + r.b);
+    return dot(abs(texelFetch(t_residual, px, 0).rgb), vec3(1.0));
 }
 
 // The strongest texel near the middle of the patch's residual: its plane is the shooter's. On a convex surface no other part of

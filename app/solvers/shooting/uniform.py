@@ -17,13 +17,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
 from app.gpu import Buffer, Framebuffer, Gpu, ReadBack, Texture
-from app.scene.model import F64
+from app.scene.model import F64, Material
 from app.solvers.base import EnergyBook, StepReport
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.stages import (
@@ -91,7 +91,7 @@ class UniformShooting:
         self._drop_reports()
         self._choice = self.stages.choices[0]
         self.shots, self.last_shot = 0, None
-        self._emitted = self._tile_sums()[1][:3]
+        self._emitted = self.lightmap.emitted
         self.report = StepReport(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
 
     def set_options(self, options: ShootingOptions) -> None:
@@ -104,6 +104,30 @@ class UniformShooting:
         if restart:
             self.lightmap.set_storage(options.storage)
             self.reset()
+
+    def set_materials(self, materials: tuple[Material, ...]) -> None:
+        """Other albedos and emissions: the light that is there stays, and the difference is shot, negative too [Chen90]. Begins
+        again where nothing is left to emit, and where the storage holds no negative light."""
+        if self.lightmap.storage == "fixed8" or not any(m.emits for m in materials) or self._emitted.sum() <= 0:
+            self.lightmap.set_materials(materials)
+            self.reset()
+            return
+        self._drop_reports()
+        factor = self.lightmap.common_factor(materials)
+        if (factor != 1).any():
+            self.lightmap.scale(factor)
+            self.lightmap.scale(factor, self.buffers.ledger_target)
+        self.lightmap.edit_materials(materials, factor)
+        self._emitted = self.lightmap.emitted
+        self._choice = self.stages.choices[0]
+        self.report = replace(self.report, residual=self.unshot_share())
+
+    def unshot_share(self) -> float:
+        """The residual now, Σ |r A| over patches, as a share of the emitted power. Waits for the GPU."""
+        self._weigh(self._choice)
+        rows = np.frombuffer(self.buffers.rows.read(), np.float32).reshape(-1, 4)[:, 3].astype(np.float64)
+        emitted = self._emitted.sum()
+        return float(rows.sum()) * self._watt / emitted if emitted > 0 else 0.0
 
     def step(self, shots: int) -> int:
         """Make up to ``shots`` shots (at most BATCH), the strongest patches first. Returns how many were issued: of a batch,
@@ -202,12 +226,9 @@ class UniformShooting:
 
     def _choose(self, shots: int) -> None:
         """Pick the strongest patches and zero them. [Coombe03, 3.4]"""
-        choice, buffers, lightmap = self._choice, self.buffers, self.lightmap
-        choice.add_patches.draw(choice.patch_target, textures=lightmap.textures("t_position_area", "t_residual"))
-        choice.add_rows.draw(
-            buffers.row_target, textures={"t_patches": choice.patches}, uniforms={"u_width": choice.patch_size[0]}
-        )
-        self._describe(choice, shots)
+        lightmap, buffers = self.lightmap, self.buffers
+        self._weigh(self._choice)
+        self._describe(self._choice, shots)
         self.stages.zero.draw(
             lightmap.residual_target,
             textures=lightmap.textures("t_position_area", "t_normal_ids") | {"t_shooters": buffers.shooters},
@@ -215,6 +236,13 @@ class UniformShooting:
             vertices=4,
             instances=shots,
             strip=True,
+        )
+
+    def _weigh(self, choice: ChoiceStages) -> None:
+        """Residual power of every patch of this level, and the strongest of each row of tiles."""
+        choice.add_patches.draw(choice.patch_target, textures=self.lightmap.textures("t_position_area", "t_residual"))
+        choice.add_rows.draw(
+            self.buffers.row_target, textures={"t_patches": choice.patches}, uniforms={"u_width": choice.patch_size[0]}
         )
 
     def _describe(self, choice: ChoiceStages, shots: int) -> None:
