@@ -9,6 +9,7 @@ shoot are whole. A *facet* is a connected flat piece of one chart: nothing in it
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +45,17 @@ class Charts:
     dark_faces: int
     method: str
     warnings: tuple[str, ...] = ()
+
+    def with_faces(self, faces: NDArray[np.int64]) -> Charts:
+        """Only those faces, in that order."""
+        return dataclasses.replace(
+            self,
+            face_triangle=self.face_triangle[faces],
+            face_back=self.face_back[faces],
+            face_uv=self.face_uv[faces],
+            face_chart=self.face_chart[faces],
+            face_facet=self.face_facet[faces],
+        )
 
     @property
     def chart_count(self) -> int:

@@ -8,7 +8,8 @@ Node-set textures hold the leaf tiles of 16×16 texels side by side [Coombe03, 4
     t_residual       storage  r [W/m²]: exitance not yet shot
     t_albedo, t_emission      only where a material has such a texture: the factor is in the material table
 
-and tables: t_pages (tile number from 1 of each 16×16 cell of the virtual atlas), t_facets, t_materials.
+and tables: t_pages and t_leaves (where a place of the virtual atlas is in the node set, and what its slots hold), t_facets,
+t_materials.
 The solver frame is centred on the scene and scaled by its half diagonal, so answers do not depend on unit or origin. H and r
 are stored relative to the largest exitance, which keeps half floats in range and is what 8-bit fixed point needs.
 """

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import TILE, Charts
-from app.atlas.materials import texel_colours
-from app.atlas.receivers import TileTexels, receivers
-from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents, texel_surfaces, uniform_leaves
+from app.atlas.receivers import KIND, TileTexels, receivers, tile_kinds
+from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents, uniform_leaves
+from app.atlas.tiles import Tiles
 from app.errors import UserError
 from app.scene.model import F32, F64, Scene
 
@@ -44,31 +44,94 @@ class Frame:
 
 
 class NodeSet:
-    """Leaf tiles side by side in one rectangle of ``columns``×``rows`` tiles, and the tables that go with them.
+    """Leaf tiles side by side in one rectangle of ``columns``×``rows`` slots, and the tables that go with them.
 
-    arrays: texture name -> (height, width, components) array as the texture holds it; vertices: the triangles' vertex buffer;
-    flat_spans, shaped_tiles: the receivers, see receivers.py.
+    tiles: number of slots; used (tiles,) bool: those that hold a leaf; depth: finest level of leaves, in which pages are counted.
+    leaves, surfaces, albedo_tiles, emission_tiles: of every slot, empty where it is not used.
+    occluders: of the visibility map; vertices: the triangles' vertex buffer; flat_spans, shaped_tiles: the receivers.
     Raises UserError where facets and materials do not fit the 32 bits of a texel's ids.
     """
 
-    def __init__(self, scene: Scene, charts: Charts) -> None:
-        self.scene, self.charts = scene, charts
+    def __init__(
+        self, scene: Scene, charts: Charts, leaves: Leaves | None = None, *, depth: int = 0, slots: int = 0
+    ) -> None:
+        """leaves: by default all of level 0; slots: room for so many, at least."""
+        self.scene, self.charts, self.depth = scene, charts, depth
         self.frame = Frame.of(scene)
         self.material_bits = max(1, (len(scene.materials) - 1).bit_length())
         if charts.facet_count > min(MAX_FACETS, (1 << (32 - self.material_bits)) - 2):
             raise UserError(f"{charts.facet_count} facets × {len(scene.materials)} materials do not fit 32 bits")
-        self.leaves: Leaves = uniform_leaves(charts)
-        self.surfaces: TexelSurfaces = on_their_faces(scene, charts, texel_surfaces(scene, charts, self.leaves))
-        self.tiles = len(self.leaves.x)
-        self.columns = max(1, int(np.ceil(np.sqrt(self.tiles))))
-        self.rows = max(1, -(-self.tiles // self.columns))
-        self.size = (self.columns * TILE, self.rows * TILE)
-        self.texel_count = int((self.surfaces.face >= 0).sum())  # that cover a surface
-        self.albedo_tiles, self.emission_tiles = texel_colours(scene, charts, self.leaves, self.surfaces)
-        self.arrays = self._texel_arrays() | self._tables()
-        self.flat_spans, self.shaped_tiles = self._receivers()
+        self._dpdu, self._dpdv = self._facet_tangents()
+        self._facet_material = np.zeros(charts.facet_count, np.int32)
+        self._facet_material[charts.face_facet] = scene.material_ids[charts.face_triangle]
+        cut = Tiles.cut(scene, charts, uniform_leaves(charts) if leaves is None else leaves)
+        self.columns = max(1, int(np.ceil(np.sqrt(max(len(cut), slots)))))
+        self._make_room(cut, max(len(cut), slots))
+        self.put(np.arange(len(cut)), cut)
         self.occluders = occluders(scene, charts, self.frame)
         self.vertices = _vertices(scene, charts, self.frame)
+
+    def _make_room(self, cut: Tiles, slots: int) -> None:
+        self.rows = max(1, -(-slots // self.columns))
+        self.tiles = slots
+        self.size = (self.columns * TILE, self.rows * TILE)
+        self.used = np.zeros(slots, bool)
+        none = np.full(slots, -1, np.int32)
+        self.leaves = Leaves(none.copy(), none.copy(), none.copy())
+        shape = (slots, TILE, TILE)
+        self.surfaces = TexelSurfaces(
+            np.zeros((*shape, 3)),
+            np.zeros(shape),
+            np.zeros((*shape, 3), np.float32),
+            np.full(shape, -1, np.int32),
+            np.zeros((*shape, 3)),
+        )
+        self.albedo_tiles = None if cut.albedo is None else np.ones((*shape, 3), np.float32)
+        self.emission_tiles = None if cut.emission is None else np.ones((*shape, 3), np.float32)
+        self._kinds = np.zeros(slots, KIND)
+
+    # -- leaves that come and go ---------------------------------------------------------------------------------------
+
+    def put(self, slots: NDArray[np.int64], tiles: Tiles) -> None:
+        """Let these slots hold these tiles."""
+        for mine, given in ((self.leaves, tiles.leaves), (self.surfaces, tiles.surfaces)):
+            for field in dataclasses.fields(mine):
+                getattr(mine, field.name)[slots] = getattr(given, field.name)
+        for own, colours in ((self.albedo_tiles, tiles.albedo), (self.emission_tiles, tiles.emission)):
+            if own is not None:
+                own[slots] = 1.0 if colours is None else colours
+        self._kinds[slots] = tile_kinds(self._tile_texels(tiles), self._facet_material)
+        self.used[slots] = True
+        self.flat_spans, self.shaped_tiles = receivers(
+            self._kinds, np.flatnonzero(self.used), self.leaves, self.columns
+        )
+
+    def free(self, slots: NDArray[np.int64]) -> None:
+        """Let these slots hold nothing. The receivers follow with the next ``put``."""
+        self.used[slots] = False
+        self.leaves.level[slots] = self.leaves.x[slots] = self.leaves.y[slots] = -1
+        self.surfaces.face[slots] = -1
+        self.surfaces.area[slots] = 0.0
+
+    @property
+    def texel_count(self) -> int:
+        """Texels that cover a surface."""
+        return int((self.surfaces.face >= 0).sum())
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """Texture name -> (height, width, components) array as the texture holds it."""
+        tiles = self.tile_arrays(np.arange(self.tiles))
+        return {name: self.image_from_tiles(array) for name, array in tiles.items()} | self._tables()
+
+    @property
+    def pages_per_texel(self) -> float:
+        """Along an edge, of the page table, for each texel of level 0."""
+        return float(2**self.depth) / TILE
+
+    def corner(self, slot: int) -> tuple[int, int]:
+        """Column and row of a slot's first texel."""
+        return slot % self.columns * TILE, slot // self.columns * TILE
 
     def tiles_from_image(self, image: Array) -> Array:
         """A node-set image (height, width, c) as tiles (tiles, 16, 16, c)."""
@@ -83,18 +146,31 @@ class NodeSet:
         return np.ascontiguousarray(cells).reshape(self.rows * TILE, self.columns * TILE, -1)
 
     def atlas_image(self, tiles: NDArray[ScalarT]) -> NDArray[ScalarT]:
-        """Tiles (tiles, 16, 16, …) laid out in the virtual atlas (H, W, …), row 0 at v = 0; 0 between charts."""
-        width, height = self.charts.size
-        cells = np.zeros((height // TILE, width // TILE, *tiles.shape[1:]), tiles.dtype)
-        cells[self.leaves.y, self.leaves.x] = tiles
-        return np.swapaxes(cells, 1, 2).reshape(height, width, *tiles.shape[3:])
+        """Slots (tiles, 16, 16, …) laid out in the virtual atlas (H, W, …) at its finest level, row 0 at v = 0; 0 between charts.
+        Larger texels are repeated: the collapse of the quadtrees to a flat texture [Coombe03, 4.4]."""
+        width, height = (side << self.depth for side in self.charts.size)
+        out = np.zeros((height, width, *tiles.shape[3:]), tiles.dtype)
+        for level in range(self.depth + 1):
+            mine = np.flatnonzero(self.leaves.level == level)
+            side = 1 << (self.depth - level)
+            edge = TILE * side
+            cells = out.reshape(height // edge, edge, width // edge, edge, *tiles.shape[3:]).swapaxes(1, 2)
+            cells[self.leaves.y[mine], self.leaves.x[mine]] = tiles[mine].repeat(side, 1).repeat(side, 2)
+        return out
+
+    def slot_at(self, uv: tuple[float, float]) -> int:
+        """The slot of the leaf at a place of the virtual atlas [texels of level 0]; -1 where there is none."""
+        tile = np.floor(np.array(uv)[:, None] / TILE * 2.0**self.leaves.level).astype(np.int64)
+        found = np.flatnonzero(self.used & (self.leaves.x == tile[0]) & (self.leaves.y == tile[1]))
+        return int(found[0]) if len(found) else -1
 
     def atlas_rect(self, corner: tuple[int, int], size: int) -> tuple[float, float, float, float]:
         """The square of ``size`` texels at ``corner`` of the node set, as (u, v, u, v) in the virtual atlas."""
-        tile = min((corner[1] // TILE) * self.columns + corner[0] // TILE, self.tiles - 1)
-        u = float(self.leaves.x[tile] * TILE + corner[0] % TILE)
-        v = float(self.leaves.y[tile] * TILE + corner[1] % TILE)
-        return u, v, u + size, v + size
+        slot = min((corner[1] // TILE) * self.columns + corner[0] // TILE, self.tiles - 1)
+        texel = 0.5 ** max(int(self.leaves.level[slot]), 0)
+        u = float(self.leaves.x[slot] * TILE + corner[0] % TILE) * texel
+        v = float(self.leaves.y[slot] * TILE + corner[1] % TILE) * texel
+        return u, v, u + size * texel, v + size * texel
 
     def material_table(self, scene: Scene) -> F32:
         """(materials, 2, 4): albedo ρ, exitance E = πL [W/m²]."""
@@ -103,60 +179,61 @@ class NodeSet:
         table[:, 1, :3] = np.pi * np.array([m.emission for m in scene.materials])
         return table
 
-    def _texel_arrays(self) -> dict[str, Array]:
-        s, charts = self.surfaces, self.charts
-        covered = s.face >= 0
-        position = np.where(covered[..., None], self.frame.local_from_world(s.position), 0.0)
-        area = s.area[..., None] / self.frame.scale**2
-        facet = (charts.face_facet[s.face] + 1).astype(np.uint32)
-        material = self.scene.material_ids[charts.face_triangle[s.face]].astype(np.uint32)
+    def tile_arrays(self, slots: NDArray[np.int64]) -> dict[str, Array]:
+        """Texture name -> (n, 16, 16, components) of these slots, as the texture holds them."""
+        charts, face = self.charts, self.surfaces.face[slots]
+        covered = face >= 0
+        position = np.where(covered[..., None], self.frame.local_from_world(self.surfaces.position[slots]), 0.0)
+        area = self.surfaces.area[slots][..., None] / self.frame.scale**2
+        facet = (charts.face_facet[face] + 1).astype(np.uint32)
+        material = self.scene.material_ids[charts.face_triangle[face]].astype(np.uint32)
         ids = np.where(covered, facet << np.uint32(self.material_bits) | material, np.uint32(0))
-        out = {
+        out: dict[str, Array] = {
             "t_position_area": np.concatenate([position, area], -1).astype(np.float32),
-            "t_normal_ids": np.stack([octahedral(s.normal), ids.astype(np.uint32)], -1),
+            "t_normal_ids": np.stack([octahedral(self.surfaces.normal[slots]), ids.astype(np.uint32)], -1),
         }
         for name, tiles in (("t_albedo", self.albedo_tiles), ("t_emission", self.emission_tiles)):
             if tiles is not None:
-                out[name] = np.concatenate([tiles, np.ones_like(tiles[..., :1])], -1).astype(np.float16)
-        return {name: self.image_from_tiles(tiles) for name, tiles in out.items()}
+                out[name] = np.concatenate([tiles[slots], np.ones_like(tiles[slots][..., :1])], -1).astype(np.float16)
+        return out
+
+    def slot_tables(self) -> dict[str, Array]:
+        """Tables that follow the leaves. t_pages (H, W, 1) u32: the slot, from 1, of each cell of 16×16 texels of the finest
+        level; t_leaves (rows, columns, 4) f32: x, y [tiles of its level] and size of a texel [texels of level 0] of each
+        slot, 0 where it is free."""
+        width, height = ((side << self.depth) // TILE for side in self.charts.size)
+        pages = np.zeros((height, width, 1), np.uint32)
+        for level in range(self.depth + 1):
+            mine = np.flatnonzero(self.leaves.level == level)
+            side = 1 << (self.depth - level)
+            cells = pages.reshape(height // side, side, width // side, side).swapaxes(1, 2)
+            cells[self.leaves.y[mine], self.leaves.x[mine]] = (mine + 1).astype(np.uint32)[:, None, None]
+        leaves = np.zeros((self.rows * self.columns, 4), np.float32)
+        size = np.where(self.used, 0.5**self.leaves.level, 0.0)
+        leaves[: self.tiles, :3] = np.column_stack([self.leaves.x, self.leaves.y, size])
+        return {"t_pages": pages, "t_leaves": leaves.reshape(self.rows, self.columns, 4)}
 
     def _tables(self) -> dict[str, Array]:
-        width, height = (side // TILE for side in self.charts.size)
-        pages = np.zeros((height, width, 1), np.uint32)
-        pages[self.leaves.y, self.leaves.x, 0] = np.arange(1, self.tiles + 1)
-        return {
-            "t_pages": pages,
-            "t_facets": self._facet_table(),
-            "t_materials": self.material_table(self.scene),
-        }
+        return self.slot_tables() | {"t_facets": self._facet_table(), "t_materials": self.material_table(self.scene)}
 
     def _facet_table(self) -> F32:
-        """(rows, TABLE_WIDTH, 4): per facet, from 1, two entries: ∂p/∂u and ∂p/∂v."""
+        """(rows, TABLE_WIDTH, 4): per facet, from 1, two entries: ∂p/∂u and ∂p/∂v per texel of level 0."""
         rows = -(-2 * (self.charts.facet_count + 1) // TABLE_WIDTH)
         table = np.zeros((rows * TABLE_WIDTH, 4), np.float32)
-        dpdu, dpdv = self._facet_tangents()
-        table[2 : 2 * len(dpdu) + 2 : 2, :3] = dpdu
-        table[3 : 2 * len(dpdv) + 3 : 2, :3] = dpdv
+        table[2 : 2 * len(self._dpdu) + 2 : 2, :3] = self._dpdu
+        table[3 : 2 * len(self._dpdv) + 3 : 2, :3] = self._dpdv
         return table.reshape(rows, TABLE_WIDTH, 4)
 
-    def _receivers(self) -> tuple[F32, F32]:
-        s, charts = self.surfaces, self.charts
-        dpdu, dpdv = self._facet_tangents()
-        material = np.zeros(charts.facet_count, np.int32)
-        material[charts.face_facet] = self.scene.material_ids[charts.face_triangle]
-        return receivers(
-            TileTexels(
-                position=self.frame.local_from_world(s.position),
-                normal=s.normal,
-                area=s.area / self.frame.scale**2,
-                facet=np.where(s.face >= 0, charts.face_facet[s.face], -1).astype(np.int32),
-                dpdu=dpdu,
-                dpdv=dpdv,
-                material=material,
-                x=self.leaves.x,
-                y=self.leaves.y,
-                columns=self.columns,
-            )
+    def _tile_texels(self, tiles: Tiles) -> TileTexels:
+        s, charts = tiles.surfaces, self.charts
+        return TileTexels(
+            position=self.frame.local_from_world(s.position),
+            normal=s.normal,
+            area=s.area / self.frame.scale**2,
+            facet=np.where(s.face >= 0, charts.face_facet[s.face], -1).astype(np.int32),
+            size=np.exp2(-tiles.leaves.level.astype(np.float64)),
+            dpdu=self._dpdu,
+            dpdv=self._dpdv,
         )
 
     def _facet_tangents(self) -> tuple[F64, F64]:
@@ -164,25 +241,6 @@ class NodeSet:
         out = np.zeros((2, self.charts.facet_count, 3))
         out[:, self.charts.face_facet] = faces_tangents(self.scene, self.charts)
         return out[0] / self.frame.scale, out[1] / self.frame.scale
-
-
-FOLD = 1e-4  # of a texel's width: further off the plane of its leading face, a mean of faces is off the surface
-
-
-def on_their_faces(scene: Scene, charts: Charts, surfaces: TexelSurfaces) -> TexelSurfaces:
-    """Texels that fold over several faces, put onto the one that they show most of, with its normal. Their mean lies inside or
-    outside of the surface, where the surface itself would hide it."""
-    covered = surfaces.face >= 0
-    face = surfaces.face[covered]
-    triangle = charts.face_triangle[face]
-    normal = scene.normals_areas[0][triangle] * np.where(charts.face_back[face], -1.0, 1.0)[:, None]
-    position = surfaces.position[covered]
-    height = np.abs(((position - scene.corners[triangle, 0]) * normal).sum(-1))
-    folded = height > FOLD * np.sqrt(surfaces.area[covered])
-    positions, normals = surfaces.position.copy(), surfaces.normal.copy()
-    positions[covered] = np.where(folded[:, None], surfaces.leading[covered], position)
-    normals[covered] = normal
-    return dataclasses.replace(surfaces, position=positions, normal=normals)
 
 
 def octahedral(normals: NDArray[np.floating]) -> NDArray[np.uint32]:

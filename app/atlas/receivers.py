@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import TILE
+from app.atlas.texels import Leaves
 from app.scene.model import F32, F64
 
 # One instance: in_rect, in_a, in_b, in_c of shooting/receive.vert.glsl
@@ -23,26 +24,57 @@ NEVER_CULLED = 4.0  # thicker than the scene, whose diameter is 2
 
 @dataclass(frozen=True, eq=False)
 class TileTexels:
-    """Texels of all tiles in the solver frame: position, normal (t, 16, 16, 3), area (t, 16, 16), facet (t, 16, 16) from 0 or
-    -1; dpdu, dpdv (facets, 3) per texel; material (facets,); x, y: the leaves' place in the atlas [tiles]; columns of the node
-    set."""
+    """Texels of some tiles in the solver frame: position, normal (t, 16, 16, 3), area (t, 16, 16), facet (t, 16, 16) from 0 or
+    -1; size (t,): of a texel, in texels of level 0; dpdu, dpdv (facets, 3) per texel of level 0."""
 
     position: F64
     normal: NDArray[np.floating]
     area: F64
     facet: NDArray[np.int32]
+    size: F64
     dpdu: F64
     dpdv: F64
-    material: NDArray[np.int32]
-    x: NDArray[np.int32]
-    y: NDArray[np.int32]
-    columns: int
 
 
-def receivers(texels: TileTexels) -> tuple[F32, F32]:
-    """(spans, 16) f32 of flat tiles and (tiles, 16) f32 of the others, see RECEIVER_FORMAT."""
-    facet, flat = _flat_tiles(texels)
-    return _spans(texels, facet, flat), _tiles(texels, np.flatnonzero(~flat))
+# What a tile is as a receiver: whether it is flat; its in_a, in_b, in_c
+KIND = np.dtype([("flat", "?"), ("a", "f4", 4), ("b", "f4", 4), ("c", "f4", 4)])
+
+
+def tile_kinds(t: TileTexels, material: NDArray[np.int32]) -> NDArray[np.void]:
+    """(t,) KIND of each tile; material (facets,)."""
+    facet, flat = _flat_tiles(t)
+    out = np.zeros(len(facet), KIND)
+    out["flat"] = flat
+    owner = facet[flat]
+    size = t.size[flat, None]
+    out["a"][flat] = np.column_stack([_corners(t, facet)[flat], owner + 1])
+    out["b"][flat] = np.column_stack([t.dpdu[owner] * size, material[owner]])
+    out["c"][flat, :3] = t.dpdv[owner] * size
+    out["a"][~flat], out["b"][~flat] = _bounds(t, ~flat)
+    return out
+
+
+def receivers(kinds: NDArray[np.void], used: NDArray[np.int64], leaves: Leaves, columns: int) -> tuple[F32, F32]:
+    """(spans, 16) f32 of flat tiles and (tiles, 16) f32 of the others, see RECEIVER_FORMAT, of the ``used`` slots (n,), in order.
+
+    kinds and leaves of all slots; columns of the node set. Neighbouring flat tiles of one facet, side by side in atlas and
+    node set, are one quad.
+    """
+    flat = used[kinds["flat"][used]]
+    shaped = used[~kinds["flat"][used]]
+    before = flat - 1
+    joins = np.isin(before, flat) & (flat % columns != 0) & (kinds["a"][before, 3] == kinds["a"][flat, 3])
+    joins &= (leaves.level[before] == leaves.level[flat]) & (leaves.y[before] == leaves.y[flat])
+    joins &= leaves.x[before] + 1 == leaves.x[flat]
+    start = np.flatnonzero(~joins)
+    length = np.diff(np.append(start, len(flat)))
+    return _quads(kinds, flat[start], length, columns), _quads(kinds, shaped, np.ones(len(shaped), int), columns)
+
+
+def _quads(kinds: NDArray[np.void], slot: NDArray[np.int64], length: NDArray[np.int64], columns: int) -> F32:
+    rect = np.stack([slot % columns * TILE, slot // columns * TILE, length * TILE, np.full(len(slot), TILE)], 1)
+    kind = kinds[slot]
+    return np.concatenate([rect, kind["a"], kind["b"], kind["c"]], 1).astype(np.float32)
 
 
 def _flat_tiles(t: TileTexels) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
@@ -51,7 +83,7 @@ def _flat_tiles(t: TileTexels) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
     count = len(t.facet)
     facet = t.facet.reshape(count, -1).max(1)
     flat = np.where(covered, t.facet, facet[:, None, None]).reshape(count, -1).min(1) == facet
-    du, dv = t.dpdu[facet], t.dpdv[facet]
+    du, dv = t.dpdu[facet] * t.size[:, None], t.dpdv[facet] * t.size[:, None]
     whole = np.linalg.norm(np.cross(du, dv), axis=-1)
     flat &= (
         (np.abs(t.area / whole[:, None, None] - 1) < FLAT_ERROR)
@@ -73,43 +105,20 @@ def _corners(t: TileTexels, facet: NDArray[np.int32]) -> F64:
     first = (t.facet >= 0).reshape(len(facet), -1).argmax(1)
     row, column = first // TILE, first % TILE
     at = t.position[np.arange(len(facet)), row, column]
-    return np.asarray(at - (column + 0.5)[:, None] * t.dpdu[facet] - (row + 0.5)[:, None] * t.dpdv[facet])
+    du, dv = t.dpdu[facet] * t.size[:, None], t.dpdv[facet] * t.size[:, None]
+    return np.asarray(at - (column + 0.5)[:, None] * du - (row + 0.5)[:, None] * dv)
 
 
-def _spans(t: TileTexels, facet: NDArray[np.int32], flat: NDArray[np.bool_]) -> F32:
-    """Neighbouring flat tiles of one facet, side by side in atlas and node set, as one quad each."""
-    slot = np.flatnonzero(flat)
-    if not len(slot):
-        return np.zeros((0, 16), np.float32)
-    before = slot - 1
-    joins = flat[before] & (facet[before] == facet[slot]) & (slot % t.columns != 0)
-    joins &= (t.x[before] + 1 == t.x[slot]) & (t.y[before] == t.y[slot])
-    start = np.flatnonzero(~joins)
-    length = np.diff(np.append(start, len(slot)))
-    slot, owner = slot[start], facet[slot[start]]
-    out = np.zeros((len(slot), 16), np.float32)
-    out[:, :4] = np.stack(
-        [slot % t.columns * TILE, slot // t.columns * TILE, length * TILE, np.full(len(slot), TILE)], 1
-    )
-    out[:, 4:7], out[:, 7] = _corners(t, facet)[slot], owner + 1
-    out[:, 8:11], out[:, 11] = t.dpdu[owner], t.material[owner]
-    out[:, 12:15] = t.dpdv[owner]
-    return out
-
-
-def _tiles(t: TileTexels, slot: NDArray[np.int64]) -> F32:
-    """Tiles of any shape: a bounding sphere, and the mean normal with the half thickness along it."""
-    covered = (t.facet[slot] >= 0)[..., None]
-    position = np.where(covered, t.position[slot], 0.0)
+def _bounds(t: TileTexels, which: NDArray[np.bool_]) -> tuple[F64, F64]:
+    """Tiles of any shape: a bounding sphere (n, 4), and the mean normal with the half thickness along it (n, 4)."""
+    covered = (t.facet[which] >= 0)[..., None]
+    position = np.where(covered, t.position[which], 0.0)
     centre = position.sum((1, 2)) / np.maximum(covered.sum((1, 2)), 1)
     offset = np.where(covered, position - centre[:, None, None], 0.0)
-    axis = np.where(covered, t.normal[slot], 0.0).sum((1, 2))
+    axis = np.where(covered, t.normal[which], 0.0).sum((1, 2))
     axis /= np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-30)
-    aligned = np.where(covered[..., 0], np.einsum("tijc,tc->tij", t.normal[slot], axis), 1.0).min((1, 2), initial=1.0)
+    aligned = np.where(covered[..., 0], np.einsum("tijc,tc->tij", t.normal[which], axis), 1.0).min((1, 2), initial=1.0)
     thickness = np.abs(np.einsum("tijc,tc->tij", offset, axis)).max((1, 2), initial=0.0)
-    out = np.zeros((len(slot), 16), np.float32)
-    out[:, :4] = np.stack([slot % t.columns * TILE, slot // t.columns * TILE, *np.full((2, len(slot)), TILE)], 1)
-    out[:, 4:7], out[:, 7] = centre, np.linalg.norm(offset, axis=-1).max((1, 2), initial=0.0)
-    out[:, 8:11] = axis
-    out[:, 11] = np.where(aligned > 1 - 1e-6, thickness, NEVER_CULLED)
-    return out
+    radius = np.linalg.norm(offset, axis=-1).max((1, 2), initial=0.0)
+    thickness = np.where(aligned > 1 - 1e-6, thickness, NEVER_CULLED)
+    return np.column_stack([centre, radius]), np.column_stack([axis, thickness])

@@ -37,6 +37,10 @@ class Leaves:
     def __len__(self) -> int:
         return len(self.level)
 
+    def only(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Leaves:
+        """Those of the leaves."""
+        return Leaves(self.level[which], self.x[which], self.y[which])
+
 
 @dataclass(frozen=True, eq=False)
 class TexelSurfaces:

@@ -75,10 +75,11 @@ class Picker:
 
 
 def _with_texel(hit: PickHit, facet: int, uv: tuple[float, float], lightmap: Lightmap) -> PickHit:
-    column, row = int(uv[0]), int(uv[1])
-    found = np.flatnonzero((lightmap.nodes.leaves.x == column // TILE) & (lightmap.nodes.leaves.y == row // TILE))
-    if len(found) == 0:
+    tile = lightmap.nodes.slot_at(uv)
+    if tile < 0:
         return hit
-    tile, inside = int(found[0]), (column % TILE, row % TILE)
+    leaves = lightmap.nodes.leaves
+    finer = 2 ** int(leaves.level[tile])
+    inside = (int(uv[0] * finer) - int(leaves.x[tile]) * TILE, int(uv[1] * finer) - int(leaves.y[tile]) * TILE)
     texel = (tile % lightmap.columns * TILE + inside[0], tile // lightmap.columns * TILE + inside[1])
     return PickHit(hit.triangle, hit.back, hit.material, hit.position, facet, uv, texel, tile, inside)

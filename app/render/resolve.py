@@ -23,7 +23,6 @@ from app.scene.model import RGB
 
 BORDERED = TILE + 2
 TEXELS_PER_FRAME = 1 << 17  # that are brought up to date in one frame, where not all must be
-OUTSIDE = 0xFFFF  # a page that no atlas has
 T = TypeVar("T")
 
 
@@ -44,7 +43,6 @@ class DisplayTexels:
             "t_charts": self._chart_table(),
             "t_places": self._place_table(),
             "t_source": gpu.texture(self.size, 1, "u4"),
-            "t_leaves": self._leaf_table(),
         }
         self._find_sources = Pass(gpu, "render/source")
         self._source_target = gpu.target(self._tables["t_source"])
@@ -97,8 +95,8 @@ class DisplayTexels:
         if end > self._sourced_rows:
             self._find_sources.draw(
                 self._source_target,
-                textures={"t_leaves": self._tables["t_leaves"]} | self._lightmap.textures("t_pages", "t_position_area"),
-                uniforms={"u_columns": float(self._lightmap.columns)},
+                textures=self._lightmap.textures("t_pages", "t_leaves", "t_position_area"),
+                uniforms={"u_pages": (float(self._lightmap.columns), self._lightmap.nodes.pages_per_texel)},
                 viewport=(0, self._sourced_rows, self.size[0], end - self._sourced_rows),
             )
             self._sourced_rows = end
@@ -122,20 +120,16 @@ class DisplayTexels:
         return self._gpu.texture((TABLE_WIDTH, rows), 1, "u4", chart_of_facet.tobytes())
 
     def _place_table(self) -> Texture:
-        """Where the first texel of each page of the atlas is among the display texels, RG32F."""
-        lightmap, leaves = self._lightmap, self._lightmap.nodes.leaves
-        width, height = (side // TILE for side in lightmap.charts.size)
-        tile = np.arange(lightmap.tiles)
-        places = np.zeros((height, width, 2), np.float32)
-        places[leaves.y, leaves.x] = np.stack([tile % lightmap.columns, tile // lightmap.columns], -1) * BORDERED + 1
-        return self._gpu.texture((width, height), 2, "f4", places.tobytes())
-
-    def _leaf_table(self) -> Texture:
-        """The page of each tile of the node set, RG32UI; OUTSIDE where the node set has room for more tiles."""
-        lightmap, leaves = self._lightmap, self._lightmap.nodes.leaves
-        pages = np.full((lightmap.rows * lightmap.columns, 2), OUTSIDE, np.uint32)
-        pages[: lightmap.tiles] = np.stack([leaves.x, leaves.y], -1)
-        return self._gpu.texture((lightmap.columns, lightmap.rows), 2, "u4", pages.tobytes())
+        """For each page of the atlas, the display texel of a place uv [texels of level 0]: z·uv + (x, y), RGBA32F."""
+        nodes = self._lightmap.nodes
+        pages = nodes.slot_tables()["t_pages"][..., 0].astype(np.int64)
+        slot = np.maximum(pages - 1, 0)
+        first = np.stack([slot % nodes.columns, slot // nodes.columns], -1) * BORDERED + 1
+        tile = np.stack([nodes.leaves.x[slot], nodes.leaves.y[slot]], -1)
+        places = np.zeros((*pages.shape, 4), np.float32)
+        places[..., :2] = first - tile * TILE
+        places[..., 2] = 2.0 ** nodes.leaves.level[slot]
+        return self._gpu.texture(pages.shape[::-1], 4, "f4", places.tobytes())
 
 
 def declared(program: Pass, offered: dict[str, T]) -> dict[str, T]:

@@ -50,7 +50,7 @@ class Surfaces:
         width, height = self._texels.size
         uniforms: dict[str, object] = {
             "u_clip_from_local": uniform_matrix(clip_from_local),
-            "u_texel": (1.0 / width, 1.0 / height),
+            "u_texel": (1.0 / width, 1.0 / height, self.lightmap.nodes.pages_per_texel),
         }
         marked = shooter if shooter and display.last_shooter else None
         checker = LAYER_SHADERS[layer_name].checker

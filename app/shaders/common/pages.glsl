@@ -1,10 +1,15 @@
-// From the virtual atlas to the node set, through the page table (slot = tile + 1, 0 = no tile). [Coombe03, 4.2]
+// From the virtual atlas to the node set: the page table holds the slot (from 1, 0 = none) of each 16×16 cell of the finest
+// level, t_leaves what each slot holds. [Coombe03, 4.2]
 uniform usampler2D t_pages;
+uniform sampler2D t_leaves;   // tile x, y at its level, size of a texel [texels of level 0]; size 0: free
+uniform vec2 u_pages;         // columns of the node set, cells per texel of level 0
 
-// Column and row in the node set of an atlas tile; negative where there is no tile. Floats: exact up to 2^22 tiles, and
-// far cheaper than integer division.
-vec2 tile_from_page(ivec2 page, float columns) {
-    float tile = float(texelFetch(t_pages, page, 0).x) - 1.0;
-    float row = floor((tile + 0.5) / columns);
-    return vec2(tile - row * columns, row);
+// Column and row in the node set of the leaf at a place of the atlas [texels of level 0]; negative where there is none.
+// Floats: exact up to 2^22 slots, and far cheaper than integer division.
+ivec2 slot_at(vec2 uv) {
+    ivec2 cell = ivec2(floor(uv * u_pages.y));
+    if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, textureSize(t_pages, 0)))) return ivec2(-1);
+    float slot = float(texelFetch(t_pages, cell, 0).x) - 1.0;
+    float row = floor((slot + 0.5) / u_pages.x);
+    return ivec2(slot - row * u_pages.x, row);
 }

@@ -2,8 +2,8 @@
 #define OVERLAY 0
 
 uniform sampler2D t_display;  // developed for the screen
-uniform sampler2D t_places;   // per 16×16 page of the atlas: where its first display texel is
-uniform vec2 u_texel;         // size of a display texel
+uniform sampler2D t_places;   // per page of the atlas: display texel = z · uv + xy
+uniform vec3 u_texel;         // size of a display texel; pages per texel of level 0
 
 in vec4 v_uv;
 flat in vec3 v_unlit_front;
@@ -17,9 +17,8 @@ layout(location = 0) out vec4 out_colour;
 
 void main() {
     vec2 uv = gl_FrontFacing ? v_uv.xy : v_uv.zw;
-    vec2 page = floor(uv * 0.0625);
-    vec2 at = texelFetch(t_places, max(ivec2(page), 0), 0).xy + uv - page * 16.0;
-    vec3 colour = textureLod(t_display, at * u_texel, 0.0).rgb;
+    vec3 place = texelFetch(t_places, max(ivec2(uv * u_texel.z), 0), 0).xyz;
+    vec3 colour = textureLod(t_display, (uv * place.z + place.xy) * u_texel.xy, 0.0).rgb;
     if (uv.x < 0.0) colour = gl_FrontFacing ? v_unlit_front : v_unlit_back;
 #if OVERLAY
     vec4 per_px = max(fwidth(v_uv), 1e-6);

@@ -16,6 +16,7 @@ uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
 uniform sampler2D t_residual;
 uniform sampler2D t_facets;
+uniform sampler2D t_leaves;
 uniform sampler2D t_rows;
 uniform int u_rows;
 
@@ -88,7 +89,8 @@ Shooter shooter_from_patch(ivec2 corner_px) {
     Shooter s;
     s.size_px = 0;
     if (lead.area <= 0.0) return s;
-    vec3 dpdu = facet_tangent(lead.facet, 0), dpdv = facet_tangent(lead.facet, 1);
+    float texel_size = texelFetch(t_leaves, corner_px / TILE, 0).z;
+    vec3 dpdu = facet_tangent(lead.facet, 0) * texel_size, dpdv = facet_tangent(lead.facet, 1) * texel_size;
     float reach = patch_reach(dpdu, dpdv, SIZE);
     // the facet's own normal: the texels' packed ones tilt by 2^-15, enough to see what lies in the same plane
     s.normal = normalize(cross(dpdu, dpdv));

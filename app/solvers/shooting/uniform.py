@@ -249,7 +249,7 @@ class UniformShooting:
         """Write the shooters of the batch from the strongest patches of the rows."""
         choice.choose.draw(
             self.buffers.shooter_target,
-            textures=self.lightmap.textures("t_position_area", "t_normal_ids", "t_residual", "t_facets")
+            textures=self.lightmap.textures("t_position_area", "t_normal_ids", "t_residual", "t_facets", "t_leaves")
             | {"t_rows": self.buffers.rows},
             uniforms={"u_rows": self.lightmap.rows},
             viewport=(0, 0, SHOOTER_ROWS, shots),

@@ -1,0 +1,66 @@
+"""What the texels of some leaf tiles are: cut from the scene's charts, whatever the tiles' level."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.charts import Charts
+from app.atlas.materials import texel_colours
+from app.atlas.texels import Leaves, TexelSurfaces, texel_surfaces
+from app.scene.model import F32, Scene
+
+FOLD = 1e-4  # of a texel's width: further off the plane of its leading face, a mean of faces is off the surface
+
+
+@dataclass(frozen=True, eq=False)
+class Tiles:
+    """n leaves, the surfaces of their texels, and their albedo and emission textures (n, 16, 16, 3), None where no material
+    has one."""
+
+    leaves: Leaves
+    surfaces: TexelSurfaces
+    albedo: F32 | None
+    emission: F32 | None
+
+    def __len__(self) -> int:
+        return len(self.leaves)
+
+    @staticmethod
+    def cut(scene: Scene, charts: Charts, leaves: Leaves, faces: NDArray[np.int64] | None = None) -> Tiles:
+        """The texels of ``leaves``; faces: those that may meet them, else all are tried."""
+        some = charts if faces is None else charts.with_faces(faces)
+        surfaces = on_their_faces(scene, some, texel_surfaces(scene, some, leaves))
+        albedo, emission = texel_colours(scene, some, leaves, surfaces)
+        if faces is not None:
+            face = np.where(surfaces.face >= 0, faces[surfaces.face], -1).astype(np.int32)
+            surfaces = dataclasses.replace(surfaces, face=face)
+        return Tiles(leaves, surfaces, albedo, emission)
+
+    def only(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Tiles:
+        """Those of the tiles."""
+        return Tiles(
+            self.leaves.only(which),
+            TexelSurfaces(**{f.name: getattr(self.surfaces, f.name)[which] for f in dataclasses.fields(TexelSurfaces)}),
+            None if self.albedo is None else self.albedo[which],
+            None if self.emission is None else self.emission[which],
+        )
+
+
+def on_their_faces(scene: Scene, charts: Charts, surfaces: TexelSurfaces) -> TexelSurfaces:
+    """Texels that fold over several faces, put onto the one that they show most of, with its normal. Their mean lies inside or
+    outside of the surface, where the surface itself would hide it."""
+    covered = surfaces.face >= 0
+    face = surfaces.face[covered]
+    triangle = charts.face_triangle[face]
+    normal = scene.normals_areas[0][triangle] * np.where(charts.face_back[face], -1.0, 1.0)[:, None]
+    position = surfaces.position[covered]
+    height = np.abs(((position - scene.corners[triangle, 0]) * normal).sum(-1))
+    folded = height > FOLD * np.sqrt(surfaces.area[covered])
+    positions, normals = surfaces.position.copy(), surfaces.normal.copy()
+    positions[covered] = np.where(folded[:, None], surfaces.leading[covered], position)
+    normals[covered] = normal
+    return dataclasses.replace(surfaces, position=positions, normal=normals)
