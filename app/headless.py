@@ -16,6 +16,7 @@ import numpy as np
 from PIL import Image
 
 from app import __version__
+from app.atlas.collapse import collapse
 from app.atlas.options import AtlasOptions
 from app.bake import prepare_directory, write_bake
 from app.console import Console
@@ -66,8 +67,7 @@ def bake(flags: argparse.Namespace) -> int:
         failure = _solve(session, flags, console)
         clock = time.perf_counter()
         lightmap = session.lightmap
-        irradiance = lightmap.atlas_image(lightmap.irradiance())
-        covered = lightmap.atlas_image(lightmap.nodes.surfaces.face >= 0)
+        irradiance, covered = collapse(lightmap.nodes, lightmap.irradiance())
         session.load_seconds["read back"] = time.perf_counter() - clock
         finite = np.asarray(np.isfinite(irradiance).all(-1))
         lost = int((covered & ~finite).sum())

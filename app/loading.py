@@ -12,6 +12,7 @@ from app.atlas.charts import Charts
 from app.atlas.node_set import NodeSet
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
+from app.atlas.quadtree import quadtree_nodes
 from app.errors import UserError
 from app.render.exposure import first_exposure
 from app.scene.load import load_scene
@@ -47,6 +48,7 @@ def read_and_unfold(
         scene,
         density=atlas.density,
         texels=atlas.texels,
+        roots=atlas.adaptive,
         progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share),
     )
     return scene, charts, {"read": middle - start, "unfold": time.perf_counter() - middle}
@@ -60,7 +62,7 @@ def load(
     scene, charts, seconds = read_and_unfold(source, atlas, default_light, tell)
     start = time.perf_counter()
     tell("cutting into texels", 0.6)
-    nodes = NodeSet(scene, charts)
+    nodes = quadtree_nodes(scene, charts) if atlas.adaptive else NodeSet(scene, charts)
     exposure = first_exposure(nodes)
     tell("done", 1.0)
     return Loaded(nodes, atlas, exposure, seconds | {"texels": time.perf_counter() - start})

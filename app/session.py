@@ -31,7 +31,7 @@ from app.render.items import ItemImage
 from app.render.options import DisplayOptions
 from app.render.surfaces import Rect
 from app.scene.model import RGB, Camera, Material, Scene
-from app.solvers import EnergyBook, ShootingOptions, Solver
+from app.solvers import DEFAULT_SOLVER, EnergyBook, ShootingOptions, Solver
 from app.solving import not_finite, share_done, solve
 from app.stats import Stats, Stop, stats_of
 
@@ -129,7 +129,13 @@ class Session:
     def _swap(self, loaded: Loaded) -> Generator[None, None, None]:
         """Open what was loaded, in parts that each take a fraction of it. Raises UserError; what is open stays then."""
         clock, scene = time.perf_counter(), loaded.nodes.scene
-        lightmap, solver = yield from prepare(self.gpu, loaded.nodes, self.shooting, self.renderer)
+        lightmap, solver = yield from prepare(
+            self.gpu,
+            loaded.nodes,
+            self.shooting,
+            self.renderer,
+            solver_name="adaptive" if loaded.atlas.adaptive else DEFAULT_SOLVER,
+        )
         if solver.options != self.shooting:  # changed between two parts
             solver.set_options(self.shooting)
         cut_anew = self._opened and scene is self.unedited
@@ -190,7 +196,7 @@ class Session:
 
     @property
     def converged(self) -> bool:
-        return self.solver.report.residual <= self.shooting.residual
+        return self.solver.report.residual <= self.shooting.residual and self.solver.settled
 
     @property
     def shooting_goes_on(self) -> bool:

@@ -21,13 +21,14 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import Charts
-from app.atlas.node_set import OCCLUDER_FORMAT, VERTEX_FORMAT, Frame, NodeSet, ScalarT
+from app.atlas.charts import TILE, Charts
+from app.atlas.node_set import OCCLUDER_FORMAT, VERTEX_FORMAT, Frame, NodeSet
 from app.atlas.receivers import RECEIVER_FORMAT
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.scene.model import F32, F64, Material, Scene
 
 STORAGE = {"rgba32f": "f4", "rgba16f": "f2", "fixed8": "f1"}  # name: moderngl dtype
+LIGHT = ("t_irradiance", "t_residual")
 _DTYPES = {"f4": np.float32, "f2": np.float16, "f1": np.uint8}
 _BYTES = {"f4": 4, "u4": 4, "f2": 2, "f1": 1}
 
@@ -42,21 +43,17 @@ class Lightmap:
     def __init__(self, gpu: Gpu, nodes: NodeSet, *, storage: str = "rgba32f") -> None:
         self.gpu, self.nodes, self.scene, self.charts = gpu, nodes, nodes.scene, nodes.charts
         self.frame: Frame = nodes.frame
-        self.tiles, self.columns, self.rows, self.size = nodes.tiles, nodes.columns, nodes.rows, nodes.size
         self._textures = {name: self._upload(array) for name, array in nodes.arrays.items()}
         self._emit = Pass(gpu, "lightmap/emit", defines=self.defines("MATERIAL_BITS", "EMISSION_TEXTURE"))
         self._edit = Pass(
             gpu, "lightmap/edit", defines=self.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
         )
-        self._scale = Pass(gpu, "lightmap/scale")
+        self._scale, self._copy = Pass(gpu, "lightmap/scale"), Pass(gpu, "common/copy")
         self.mesh = Mesh(gpu, nodes.vertices.tobytes(), VERTEX_FORMAT)
         corners, triangles = nodes.occluders
         self.occluders = Mesh(gpu, corners.tobytes(), OCCLUDER_FORMAT, indices=triangles.tobytes())
-        self.receivers = {
-            flat: Mesh(gpu, quads.tobytes(), RECEIVER_FORMAT, per_instance=True)
-            for flat, quads in ((True, nodes.flat_spans), (False, nodes.shaped_tiles))
-            if len(quads)
-        }
+        self.receivers = receiver_meshes(gpu, nodes.flat_spans, nodes.shaped_tiles)
+        self.version = 0  # counts changes of the leaves
         self._targets: list[Framebuffer] = []
         self.set_storage(storage)
 
@@ -96,14 +93,17 @@ class Lightmap:
 
     def set_storage(self, storage: str) -> None:
         """Choose how H and r are stored (a key of STORAGE), and start from no light."""
-        light = ("t_irradiance", "t_residual")
-        self.gpu.release_all(*self._targets, *(self._textures.pop(name) for name in light if name in self._textures))
-        for name in light:
-            self._textures[name] = self.gpu.texture(self.size, 4, STORAGE[storage])
+        self.gpu.release_all(*self._targets, *(self._textures.pop(name) for name in LIGHT if name in self._textures))
         self.storage = storage
+        self._make_light()
+        self.clear()
+
+    def _make_light(self) -> None:
+        for name in LIGHT:
+            self._textures[name] = self.gpu.texture(self.size, 4, STORAGE[self.storage])
         irradiance, residual = self._textures["t_irradiance"], self._textures["t_residual"]
         self._targets = [self.gpu.target(irradiance, residual), self.gpu.target(residual)]
-        self.clear()
+        self._targets[1].color_mask = (True, True, True, False)  # of alpha, see receive.frag.glsl
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Use other albedos and emissions (factors; textures stay) from now on. The light stays as it is: clear, or edit."""
@@ -163,6 +163,54 @@ class Lightmap:
             weights[:, channel] = np.bincount(material, column, len(weights))
         return weights
 
+    def write_tiles(self, slots: NDArray[np.int64]) -> None:
+        """Take over these slots of the node set, and the tables and receivers that follow. Their light stays as it is."""
+        for name, tiles in self.nodes.tile_arrays(slots).items():
+            texture = self._textures[name]
+            for slot, tile in zip(slots.tolist(), tiles, strict=True):
+                texture.write(np.ascontiguousarray(tile).tobytes(), viewport=(*self.nodes.corner(slot), TILE, TILE))
+        for name, table in self.nodes.slot_tables().items():
+            self._textures[name].write(table.tobytes())
+        self.gpu.release_all(*self.receivers.values())
+        self.receivers = receiver_meshes(self.gpu, self.nodes.flat_spans, self.nodes.shaped_tiles)
+        self.version += 1
+
+    def enlarge(self) -> None:
+        """Take over a node set that has got more rows. The light stays."""
+        old = {name: self._textures[name] for name in LIGHT}
+        others = [name for name in self.nodes.arrays if name in self._textures]
+        self.gpu.release_all(*(self._textures.pop(name) for name in others))
+        self._textures |= {name: self._upload(array) for name, array in self.nodes.arrays.items()}
+        self.gpu.release_all(*self._targets)
+        self._make_light()
+        for name, target in zip(LIGHT, (self.gpu.target(self._textures[n]) for n in LIGHT), strict=True):
+            target.clear()
+            self._copy.draw(
+                target,
+                textures={"t_source": old[name]},
+                uniforms={"u_offset_px": (0, 0)},
+                viewport=(0, 0, *old[name].size),
+            )
+            self.gpu.release_all(target, old[name])
+        self.version += 1
+
+    @property
+    def columns(self) -> int:
+        return self.nodes.columns
+
+    @property
+    def rows(self) -> int:
+        return self.nodes.rows
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self.nodes.size
+
+    @property
+    def tiles(self) -> int:
+        """Leaves."""
+        return int(self.nodes.used.sum())
+
     def clear(self) -> None:
         """H = 0, r = E: nothing has been shot [Coombe03, 3]."""
         self.unit = max((np.pi * max(m.emission) for m in self.scene.materials), default=0.0) or 1.0
@@ -208,10 +256,6 @@ class Lightmap:
         """B = E + ρH of every texel (tiles, 16, 16, 3) f32 [W/m²]. Waits for the GPU."""
         return self.emission() + self.albedo() * self.irradiance()
 
-    def atlas_image(self, tiles: NDArray[ScalarT]) -> NDArray[ScalarT]:
-        """Per-tile values (tiles, 16, 16, …) laid out in the virtual atlas (H, W, …), row 0 at v = 0; 0 between charts."""
-        return self.nodes.atlas_image(tiles)
-
     @property
     def texel_count(self) -> int:
         """Texels that cover a surface."""
@@ -239,3 +283,12 @@ class Lightmap:
         material = self.scene.material_ids[self.charts.face_triangle[surfaces.face]]
         out = np.where((surfaces.face >= 0)[..., None], np.array(factors, np.float32)[material], np.float32(0))
         return out if colours is None else out * colours
+
+
+def receiver_meshes(gpu: Gpu, flat_spans: F32, shaped_tiles: F32) -> dict[bool, Mesh]:
+    """What light falls on, see receivers.py: by whether it is flat; what there is none of is left out."""
+    return {
+        flat: Mesh(gpu, quads.tobytes(), RECEIVER_FORMAT, per_instance=True)
+        for flat, quads in ((True, flat_spans), (False, shaped_tiles))
+        if len(quads)
+    }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,30 +65,36 @@ class NodeSet:
         self._facet_material = np.zeros(charts.facet_count, np.int32)
         self._facet_material[charts.face_facet] = scene.material_ids[charts.face_triangle]
         cut = Tiles.cut(scene, charts, uniform_leaves(charts) if leaves is None else leaves)
-        self.columns = max(1, int(np.ceil(np.sqrt(max(len(cut), slots)))))
         self._make_room(cut, max(len(cut), slots))
         self.put(np.arange(len(cut)), cut)
         self.occluders = occluders(scene, charts, self.frame)
         self.vertices = _vertices(scene, charts, self.frame)
 
     def _make_room(self, cut: Tiles, slots: int) -> None:
-        self.rows = max(1, -(-slots // self.columns))
-        self.tiles = slots
+        self.columns = max(1, int(np.ceil(np.sqrt(slots))))
+        none = np.full(0, -1, np.int32)
+        self.leaves = Leaves(none, none, none)
+        shape = (0, TILE, TILE)
+        vectors, colours = np.zeros((*shape, 3)), np.zeros((*shape, 3), np.float32)
+        self.surfaces = TexelSurfaces(vectors, np.zeros(shape), colours, np.zeros(shape, np.int32), vectors)
+        self.albedo_tiles = None if cut.albedo is None else colours
+        self.emission_tiles = None if cut.emission is None else colours
+        self._kinds, self.used = np.zeros(0, KIND), np.zeros(0, bool)
+        self.enlarge(slots)
+
+    def enlarge(self, slots: int) -> None:
+        """Have so many slots, more than now, in rows as long as before: what is there stays in its place."""
+        more = slots - len(self.used)
+        self.leaves = _longer(self.leaves, more, -1)
+        self.surfaces = _longer(self.surfaces, more, 0)
+        self.surfaces.face[-more:] = -1
+        if self.albedo_tiles is not None:
+            self.albedo_tiles = _stretched(self.albedo_tiles, more, 1.0)
+        if self.emission_tiles is not None:
+            self.emission_tiles = _stretched(self.emission_tiles, more, 1.0)
+        self._kinds, self.used = _stretched(self._kinds, more, 0), _stretched(self.used, more, False)
+        self.tiles, self.rows = slots, max(1, -(-slots // self.columns))
         self.size = (self.columns * TILE, self.rows * TILE)
-        self.used = np.zeros(slots, bool)
-        none = np.full(slots, -1, np.int32)
-        self.leaves = Leaves(none.copy(), none.copy(), none.copy())
-        shape = (slots, TILE, TILE)
-        self.surfaces = TexelSurfaces(
-            np.zeros((*shape, 3)),
-            np.zeros(shape),
-            np.zeros((*shape, 3), np.float32),
-            np.full(shape, -1, np.int32),
-            np.zeros((*shape, 3)),
-        )
-        self.albedo_tiles = None if cut.albedo is None else np.ones((*shape, 3), np.float32)
-        self.emission_tiles = None if cut.emission is None else np.ones((*shape, 3), np.float32)
-        self._kinds = np.zeros(slots, KIND)
 
     # -- leaves that come and go ---------------------------------------------------------------------------------------
 
@@ -102,9 +108,11 @@ class NodeSet:
                 own[slots] = 1.0 if colours is None else colours
         self._kinds[slots] = tile_kinds(self._tile_texels(tiles), self._facet_material)
         self.used[slots] = True
-        self.flat_spans, self.shaped_tiles = receivers(
-            self._kinds, np.flatnonzero(self.used), self.leaves, self.columns
-        )
+        self.flat_spans, self.shaped_tiles = self.receivers_of(np.flatnonzero(self.used))
+
+    def receivers_of(self, slots: NDArray[np.int64]) -> tuple[F32, F32]:
+        """Flat spans and shaped tiles of these slots, in ascending order, see receivers.py."""
+        return receivers(self._kinds, slots, self.leaves, self.columns)
 
     def free(self, slots: NDArray[np.int64]) -> None:
         """Let these slots hold nothing. The receivers follow with the next ``put``."""
@@ -144,19 +152,6 @@ class NodeSet:
         grid[: self.tiles] = tiles
         cells = grid.reshape(self.rows, self.columns, TILE, TILE, -1).swapaxes(1, 2)
         return np.ascontiguousarray(cells).reshape(self.rows * TILE, self.columns * TILE, -1)
-
-    def atlas_image(self, tiles: NDArray[ScalarT]) -> NDArray[ScalarT]:
-        """Slots (tiles, 16, 16, …) laid out in the virtual atlas (H, W, …) at its finest level, row 0 at v = 0; 0 between charts.
-        Larger texels are repeated: the collapse of the quadtrees to a flat texture [Coombe03, 4.4]."""
-        width, height = (side << self.depth for side in self.charts.size)
-        out = np.zeros((height, width, *tiles.shape[3:]), tiles.dtype)
-        for level in range(self.depth + 1):
-            mine = np.flatnonzero(self.leaves.level == level)
-            side = 1 << (self.depth - level)
-            edge = TILE * side
-            cells = out.reshape(height // edge, edge, width // edge, edge, *tiles.shape[3:]).swapaxes(1, 2)
-            cells[self.leaves.y[mine], self.leaves.x[mine]] = tiles[mine].repeat(side, 1).repeat(side, 2)
-        return out
 
     def slot_at(self, uv: tuple[float, float]) -> int:
         """The slot of the leaf at a place of the virtual atlas [texels of level 0]; -1 where there is none."""
@@ -241,6 +236,19 @@ class NodeSet:
         out = np.zeros((2, self.charts.facet_count, 3))
         out[:, self.charts.face_facet] = faces_tangents(self.scene, self.charts)
         return out[0] / self.frame.scale, out[1] / self.frame.scale
+
+
+ArraysT = TypeVar("ArraysT", Leaves, TexelSurfaces)
+
+
+def _longer(arrays: ArraysT, more: int, value: float) -> ArraysT:
+    """So many more entries of ``value`` at the end of every array."""
+    fields = [field.name for field in dataclasses.fields(arrays)]
+    return type(arrays)(*(_stretched(getattr(arrays, name), more, value) for name in fields))
+
+
+def _stretched(array: Any, more: int, value: float) -> Any:
+    return np.concatenate([array, np.full((more, *array.shape[1:]), value, array.dtype)])
 
 
 def octahedral(normals: NDArray[np.floating]) -> NDArray[np.uint32]:

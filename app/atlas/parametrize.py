@@ -26,6 +26,7 @@ Progress = Callable[[str, float], None]
 
 TEXELS_PER_FACE = 8
 DEFAULT_TEXELS = (32_000, 2_000_000)  # from a plain room to what two cores still shoot at interactive rates
+ROOT_SHARE = 16  # of the texels that uniform ones would have: two levels below the roots are as fine as these
 MAX_TEXELS = 1 << 24
 WHOLE_PATCHES_FROM = 6  # texels: shorter sides of rectangles are not rounded to whole patches
 
@@ -53,12 +54,14 @@ def parametrize(
     *,
     density: float | None = None,
     texels: int | None = None,
+    roots: bool = False,
     progress: Progress | None = None,
     time_limit: float | None = None,
 ) -> Charts:
     """Unfold the lit sides of a scene into an atlas.
 
-    density [texels/m], or texels: how many to aim at; by default 8 for each lit side, within 32 000 and 2 million.
+    density [texels/m], or texels: how many to aim at; by default 8 for each lit side, within 32 000 and 2 million, and for
+    ``roots`` of quadtrees a sixteenth of that.
     Rectangles are made of whole patches, so that a small number of texels is met only roughly, and below one
     texel per chart not at all. time_limit [s] for xatlas. progress(stage, share) is called from time to time and may
     raise to cancel.
@@ -74,7 +77,7 @@ def parametrize(
     layout, method, warnings = _unfold(scene, lit, points, corners, facet, time_limit, progress)
     report("pack", 0.0)
     if density is None:
-        aim = texels if texels is not None else int(np.clip(TEXELS_PER_FACE * len(lit.triangle), *DEFAULT_TEXELS))
+        aim = texels if texels is not None else default_texels(len(lit.triangle), roots)
         density = _density_for(layout, aim)
     need = _texel_count(layout, density)
     if need > MAX_TEXELS:
@@ -98,6 +101,12 @@ def parametrize(
         method=method,
         warnings=warnings,
     )
+
+
+def default_texels(sides: int, roots: bool) -> int:
+    """How many texels to aim at where nobody says."""
+    uniform = int(np.clip(TEXELS_PER_FACE * sides, *DEFAULT_TEXELS))
+    return uniform // ROOT_SHARE if roots else uniform
 
 
 def _check(density: float | None, texels: int | None) -> None:

@@ -62,12 +62,12 @@ def write_bake(
 ) -> BakeFiles:
     """Write the lightmap, the scene that uses it and the report into ``directory``, which is made if need be.
 
-    irradiance (H, W, 3) f32 [W/m²] in the virtual atlas, row 0 at v = 0, finite wherever ``covered`` (H, W).
+    irradiance (H, W, 3) f32 [W/m²] over the virtual atlas, row 0 at v = 0, finite wherever ``covered`` (H, W).
     In the report, numbers that are not finite become null. UserError if the folder cannot be written.
     """
-    width, height = charts.size
-    assert irradiance.shape == (height, width, 3), f"irradiance {irradiance.shape} for an atlas of {width}×{height}"
-    assert covered.shape == (height, width)
+    finer = irradiance.shape[0] // charts.size[1]
+    assert irradiance.shape == (charts.size[1] * finer, charts.size[0] * finer, 3), f"{irradiance.shape}, {charts.size}"
+    assert covered.shape == irradiance.shape[:2]
     assert np.isfinite(irradiance[covered]).all(), "irradiance that is not finite"
     prepare_directory(directory)
     files = BakeFiles(directory / IRRADIANCE_NAME, directory / SCENE_NAME, directory / REPORT_NAME)

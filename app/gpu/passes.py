@@ -68,6 +68,7 @@ class Pass:
         blend: str | None = None,
         depth: bool = False,
         strip: bool = False,
+        points: bool = False,
         clip_distances: int = 0,
     ) -> None:
         """Draw once into ``target``. Without a mesh, ``vertices`` without attributes. A block is (buffer, offset, size in bytes).
@@ -90,7 +91,7 @@ class Pass:
         ctx.enable_only(flags)
         if blend:
             ctx.blend_func = BLEND[blend]
-        mode = moderngl.TRIANGLE_STRIP if strip else moderngl.TRIANGLES
+        mode = moderngl.POINTS if points else moderngl.TRIANGLE_STRIP if strip else moderngl.TRIANGLES
         for plane in range(clip_distances):
             ctx.enable_direct(GL_CLIP_DISTANCE0 + plane)
         with self.gpu.timers.measure(self.label):

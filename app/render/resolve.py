@@ -44,11 +44,17 @@ class DisplayTexels:
             "t_places": self._place_table(),
             "t_source": gpu.texture(self.size, 1, "u4"),
         }
+        self._version = lightmap.version
         self._find_sources = Pass(gpu, "render/source")
         self._source_target = gpu.target(self._tables["t_source"])
         self._sourced_rows = 0
         self._passes: dict[tuple[str, Layer, str], Pass] = {}
         self._next_row = 0
+
+    @property
+    def fits(self) -> bool:
+        """Whether the lightmap is still as large as it was."""
+        return self.size == (self._lightmap.columns * BORDERED, self._lightmap.rows * BORDERED)
 
     def resolve(
         self, layer_name: str, display: DisplayOptions, *, scale: Scale | None, ambient: RGB, whole: bool
@@ -58,6 +64,8 @@ class DisplayTexels:
         If not ``whole``, TEXELS_PER_FRAME of them, in turn.
         """
         layer, lightmap = LAYER_SHADERS[layer_name], self._lightmap
+        if self._version != lightmap.version:
+            self._follow_leaves()
         shader, uniforms = curve(display, scale, exposed=layer.light is not None)
         first, rows = self._band(whole)
         uniforms |= {
@@ -80,6 +88,13 @@ class DisplayTexels:
         self._colour.filter = (filtering, filtering)
         return {"t_display": self._colour, "t_unlit": self._unlit, "t_places": self._tables["t_places"]}
 
+    def _follow_leaves(self) -> None:
+        """The leaves have changed: find everything anew, all at once, or a band would show texels of others."""
+        self._version = self._lightmap.version
+        self._tables.pop("t_places").release()
+        self._tables["t_places"] = self._place_table()
+        self._find_rows(0, self.size[1])
+
     def release(self) -> None:
         release_targets(self._gpu, self._target, self._unlit_target, self._source_target)
         for texture in (self._colour, self._unlit, *self._tables.values()):
@@ -93,15 +108,19 @@ class DisplayTexels:
         rows = min(rows, height - first)
         end = first + rows
         if end > self._sourced_rows:
-            self._find_sources.draw(
-                self._source_target,
-                textures=self._lightmap.textures("t_pages", "t_leaves", "t_position_area"),
-                uniforms={"u_pages": (float(self._lightmap.columns), self._lightmap.nodes.pages_per_texel)},
-                viewport=(0, self._sourced_rows, self.size[0], end - self._sourced_rows),
-            )
-            self._sourced_rows = end
+            self._find_rows(self._sourced_rows, end)
         self._next_row = end % height
         return first, rows
+
+    def _find_rows(self, first: int, end: int) -> None:
+        """The sources of these rows of display texels."""
+        self._find_sources.draw(
+            self._source_target,
+            textures=self._lightmap.textures("t_pages", "t_leaves", "t_position_area"),
+            uniforms={"u_pages": (float(self._lightmap.columns), self._lightmap.nodes.pages_per_texel)},
+            viewport=(0, first, self.size[0], end - first),
+        )
+        self._sourced_rows = end
 
     def _pass(self, name: str, layer: Layer, shader: str) -> Pass:
         key = name, layer, shader

@@ -19,7 +19,7 @@ class Surfaces:
     """Draws one lightmap. Whoever makes it releases it."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
-        self.lightmap = lightmap
+        self._gpu, self.lightmap = gpu, lightmap
         self._texels = DisplayTexels(gpu, lightmap)
         self._passes = {
             overlay: Pass(gpu, "render/surfaces", defines={"OVERLAY": overlay}, label="surfaces")
@@ -45,6 +45,9 @@ class Surfaces:
         ``DisplayTexels.resolve``.
         """
         lit_by = ambient if ambient and display.ambient else DARK
+        if not self._texels.fits:
+            self._texels.release()
+            self._texels = DisplayTexels(self._gpu, self.lightmap)
         textures = self._texels.resolve(layer_name, display, scale=scale, ambient=lit_by, whole=whole)
 
         width, height = self._texels.size

@@ -5,10 +5,14 @@ from collections.abc import Callable
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu
 from app.solvers.base import EnergyBook, Solver, StepReport
+from app.solvers.shooting.adaptive import AdaptiveShooting
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.uniform import UniformShooting
 
-SOLVERS: dict[str, Callable[[Gpu, Lightmap, ShootingOptions], Solver[ShootingOptions]]] = {"shooting": UniformShooting}
+SOLVERS: dict[str, Callable[[Gpu, Lightmap, ShootingOptions], Solver[ShootingOptions]]] = {
+    "shooting": UniformShooting,
+    "adaptive": AdaptiveShooting,
+}
 DEFAULT_SOLVER = "shooting"
 
 __all__ = ["DEFAULT_SOLVER", "SOLVERS", "EnergyBook", "ShootingOptions", "Solver", "StepReport", "UniformShooting"]

@@ -77,6 +77,7 @@ class Solver(Protocol[OptionsT]):
     options: OptionsT
     report: StepReport
     shots: int
+    note: str | None  # what the user should know of the solution, if anything
 
     @property
     def last_shot(self) -> PatchShot | None:
@@ -90,6 +91,10 @@ class Solver(Protocol[OptionsT]):
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions of the scene, from the next step on; solves for the difference if it can."""
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing but shots is left to do."""
 
     def unshot_share(self) -> float:
         """The residual as a share of the emitted power, now. Waits for the GPU."""

@@ -37,19 +37,23 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "EMISSION_TEXTURE": FLAG,
     "OVERLAY": FLAG,
     "SAMPLES": (1, 4),
+    "ADAPTIVE": FLAG,
     "FLAT": FLAG,
     "NEAR_FIELD": FLAG,
     "DISC": FLAG,
     "DISC_SUBDIVISION": (OPTION["discs"].maximum,),
+    "COUNT": FLAG,
     "VISIBILITY": tuple(range(len(VISIBILITIES))),
 }
 CONSTANTS = {"TILE", "BORDERED", "BATCH"}
 SLOTS = {
     "projection": tuple(p.glsl for p in PROJECTIONS.values()),
+    "vertex": tuple(p.drawing["vertex"] for p in PROJECTIONS.values()),
+    "fragment": tuple(p.drawing["fragment"] for p in PROJECTIONS.values()),
     "layer": tuple(f"render/layers/{layer.shader}.glsl" for layer in LAYER_SHADERS.values()),
     "curve": ("render/false_colour.glsl", *(f"render/tone_maps/{name}.glsl" for name in TONE_MAPS)),
 }
-CLIP_SLOTS = {"projection": tuple(p.clip_glsl for p in PROJECTIONS.values())}  # of the program that draws the map
+DRAWINGS = [p.drawing for p in PROJECTIONS.values()]
 PROGRAMS = sorted(str(path.relative_to(SHADERS))[: -len(".frag.glsl")] for path in SHADERS.rglob("*.frag.glsl"))
 
 
@@ -62,9 +66,10 @@ def fillings(name: str) -> Iterator[dict[str, str]]:
     """Every choice for each slot of a program."""
     text = "".join((SHADERS / stage).read_text() for stage in stages(name))
     wanted = sorted(set(re.findall(r"#include <(\w+)>", text)))
-    choices = SLOTS | (CLIP_SLOTS if name == "shooting/visibility" else {})
-    for files in itertools.product(*(dict.fromkeys(choices[slot]) for slot in wanted)):
-        yield dict(zip(wanted, files, strict=True))
+    for files in itertools.product(*(dict.fromkeys(SLOTS[slot]) for slot in wanted)):
+        filling = dict(zip(wanted, files, strict=True))
+        if "vertex" not in filling or filling in DRAWINGS:  # both sides of one projection
+            yield filling
 
 
 def combinations(name: str, slots: Mapping[str, str]) -> Iterator[dict[str, object]]:

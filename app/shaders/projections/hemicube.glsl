@@ -56,6 +56,9 @@ vec4 sights_dot(int view, vec2 px, vec3 n) {
     return dot(sight_from_px(view, px), n) + vec4(step.y - step.x, step.y + step.x, step.x - step.y, -step.x - step.y);
 }
 
+// 1 for each of these that lies on the hemisphere
+vec4 on_hemisphere(vec2 px) { return vec4(1.0); }
+
 // Solid-angle weight cosθ dω / π of the map's texel at px: sums to 1 over the map. [Cohen85, delta form factors]
 float delta_form_factor(int view, vec2 px) {
     vec3 sight = sight_from_px(view, px);

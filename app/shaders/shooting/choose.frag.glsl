@@ -3,20 +3,18 @@
 // The polygon is the patch's own parallelogram, so that neighbouring patches tile their surface exactly. Visibility is
 // sampled from the middle of the residual; where part of the patch holds none (something stands on it), or the patch is not
 // flat, from its leading texel.
-#define LEVEL 2
 #include "common/atlas.glsl"
+#include "shooting/patch_level.glsl"
 #include "shooting/shooter.glsl"
 #include "shooting/belongs.glsl"
 
 const float WEAKEST = 0.1;  // a shot under a tenth of the batch's best waits for a later batch
 const float UNLIT = 0.01;   // a texel under 1 % of the leading one's residual counts as covered by something
-const int SIZE = 1 << LEVEL;
 
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
 uniform sampler2D t_residual;
 uniform sampler2D t_facets;
-uniform sampler2D t_leaves;
 uniform sampler2D t_rows;
 uniform int u_rows;
 
@@ -54,11 +52,11 @@ float residual_at(ivec2 px) {
 
 // The strongest texel near the middle of the patch's residual: its plane is the shooter's. On a convex surface no other part of
 // the patch then lies above that plane.
-Texel leading_texel(ivec2 corner_px, out float lead_residual) {
+Texel leading_texel(ivec2 corner_px, int size, out float lead_residual) {
     vec3 middle = vec3(0.0);
     float power = 0.0, strongest = 0.0;
-    for (int i = 0; i < SIZE * SIZE; ++i) {
-        ivec2 px = corner_px + ivec2(i % SIZE, i / SIZE);
+    for (int i = 0; i < size * size; ++i) {
+        ivec2 px = corner_px + ivec2(i % size, i / size);
         Texel texel = texel_at(px);
         float own = residual_at(px) * texel.area;
         middle += own * texel.position;
@@ -69,8 +67,8 @@ Texel leading_texel(ivec2 corner_px, out float lead_residual) {
     Texel lead;
     lead.area = lead_residual = 0.0;
     float nearest = 3e38;
-    for (int i = 0; i < SIZE * SIZE; ++i) {
-        ivec2 px = corner_px + ivec2(i % SIZE, i / SIZE);
+    for (int i = 0; i < size * size; ++i) {
+        ivec2 px = corner_px + ivec2(i % size, i / size);
         Texel texel = texel_at(px);
         vec3 offset = texel.position - middle;
         bool strong = residual_at(px) * texel.area > 0.5 * strongest;
@@ -84,14 +82,19 @@ Texel leading_texel(ivec2 corner_px, out float lead_residual) {
 }
 
 Shooter shooter_from_patch(ivec2 corner_px) {
+    int size = 1 << patch_level(corner_px / TILE);
     float lead_residual;
-    Texel lead = leading_texel(corner_px, lead_residual);
+    Texel lead = leading_texel(corner_px, size, lead_residual);
     Shooter s;
     s.size_px = 0;
     if (lead.area <= 0.0) return s;
+    vec3 dpdu = facet_tangent(lead.facet, 0), dpdv = facet_tangent(lead.facet, 1);
+#if ADAPTIVE
     float texel_size = texelFetch(t_leaves, corner_px / TILE, 0).z;
-    vec3 dpdu = facet_tangent(lead.facet, 0) * texel_size, dpdv = facet_tangent(lead.facet, 1) * texel_size;
-    float reach = patch_reach(dpdu, dpdv, SIZE);
+    dpdu *= texel_size;
+    dpdv *= texel_size;
+#endif
+    float reach = patch_reach(dpdu, dpdv, size);
     // the facet's own normal: the texels' packed ones tilt by 2^-15, enough to see what lies in the same plane
     s.normal = normalize(cross(dpdu, dpdv));
     if (dot(s.normal, lead.normal) < 0.0) s.normal = -s.normal;
@@ -99,9 +102,9 @@ Shooter shooter_from_patch(ivec2 corner_px) {
     vec3 area_centre = vec3(0.0), power_centre = vec3(0.0), flux = vec3(0.0);
     float area = 0.0, power = 0.0;
     bool whole = true;
-    ivec2 lower = ivec2(SIZE), upper = ivec2(-1);
-    for (int i = 0; i < SIZE * SIZE; ++i) {
-        ivec2 at = ivec2(i % SIZE, i / SIZE), px = corner_px + at;
+    ivec2 lower = ivec2(size), upper = ivec2(-1);
+    for (int i = 0; i < size * size; ++i) {
+        ivec2 at = ivec2(i % size, i / size), px = corner_px + at;
         Texel texel = texel_at(px);
         if (!belongs(texel, s.normal, lead.position, reach)) continue;
         vec3 r = texelFetch(t_residual, px, 0).rgb;
@@ -119,7 +122,7 @@ Shooter shooter_from_patch(ivec2 corner_px) {
     s.exitance = flux / area;
     s.facet = lead.facet;
     s.patch_px = corner_px;
-    s.size_px = SIZE;
+    s.size_px = size;
     s.lead = lead.position;
     s.reach = reach;
 
@@ -144,6 +147,6 @@ void main() {
     Shooter s;
     s.size_px = 0;
     if (row.x > 0.0 && (shot == 0 || row.x >= WEAKEST * ranked_row(0).x))
-        s = shooter_from_patch(ivec2(row.yz) * SIZE);
+        s = shooter_from_patch(ivec2(row.yz));
     out_row = s.size_px > 0 ? shooter_row(s, int(gl_FragCoord.x)) : vec4(0.0);
 }

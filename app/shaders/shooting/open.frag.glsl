@@ -6,12 +6,10 @@
 const int STRIDE = 4;
 
 uniform sampler2D t_items;
-uniform sampler2D t_weights;  // delta form factors of every 4×4 samples; sum to 1
+uniform sampler2D t_weights;  // what each of those four stands for, see weights.frag.glsl
 uniform int u_row;            // of the target, where the blocks of the first map begin
 
 layout(location = 0) out vec2 out_open;
-
-float count(bvec4 which) { return dot(vec4(which), vec4(1.0)); }
 
 void main() {
     ivec2 corner_px = (ivec2(gl_FragCoord.xy) - ivec2(0, u_row)) * BLOCK;
@@ -21,9 +19,9 @@ void main() {
     for (int j = 0; j < BLOCK; j += STRIDE)
         for (int i = 0; i < BLOCK; i += STRIDE) {
             ivec2 px = corner_px + ivec2(i, j), quad = px / STRIDE;
-            float weight = 0.25 * texelFetch(t_weights, ivec2(quad.x, quad.y % height), 0).r;
+            vec4 weights = texelFetch(t_weights, ivec2(quad.x, quad.y % height), 0);
             vec4 items = textureGather(t_items, vec2(px + STRIDE / 2) * px_to_uv);
-            sum += weight * vec2(count(equal(items, vec4(OPEN))), count(equal(items, vec4(UNCHARTED))));
+            sum += vec2(dot(weights, vec4(equal(items, vec4(OPEN)))), dot(weights, vec4(equal(items, vec4(UNCHARTED)))));
         }
     out_open = sum;
 }

@@ -1,19 +1,45 @@
-// Residual power of each patch, |Σ r·A| [stored units · solver area], summed over RGB: one texel per patch of 2^level texels. Less
-// light than was shot is a negative residual, and is shot like any other [Chen90].
-#define LEVEL 2
+// Residual power of patches, |Σ r·A| [stored units · solver area], summed over RGB. Less light than was shot is a negative residual,
+// and is shot like any other [Chen90].
+//
+// Uniform: one texel per patch of 2^LEVEL texels. Quadtrees: one texel per block of 4×4, with the strongest patch that begins in it.
+#include "common/atlas.glsl"
+#include "shooting/patch_level.glsl"
 
 uniform sampler2D t_position_area;
 uniform sampler2D t_residual;
 
-layout(location = 0) out float out_power;
+layout(location = 0) out vec4 out_patch;  // power, corner of the patch [texels], Σ of the powers in the block
+
+float patch_power(ivec2 corner_px, int size) {
+    vec3 power = vec3(0.0);
+    for (int j = 0; j < size; ++j)
+        for (int i = 0; i < size; ++i) {
+            ivec2 px = corner_px + ivec2(i, j);
+            power += texelFetch(t_residual, px, 0).rgb * texelFetch(t_position_area, px, 0).w;
+        }
+    return dot(abs(power), vec3(1.0));
+}
+
+#if ADAPTIVE
+const int BLOCK = 4;
 
 void main() {
-    ivec2 corner_px = ivec2(gl_FragCoord.xy) << LEVEL;
-    vec3 power = vec3(0.0);
-    for (int j = 0; j < (1 << LEVEL); ++j)
-        for (int i = 0; i < (1 << LEVEL); ++i) {
-            ivec2 texel_px = corner_px + ivec2(i, j);
-            power += texelFetch(t_residual, texel_px, 0).rgb * texelFetch(t_position_area, texel_px, 0).w;
+    ivec2 block_px = ivec2(gl_FragCoord.xy) * BLOCK;
+    int level = patch_level(block_px / TILE), size = 1 << max(level, 0);
+    out_patch = vec4(0.0);
+    if (level < 0 || any(notEqual(block_px & (size - 1), ivec2(0)))) return;
+    for (int j = 0; j < BLOCK; j += size)
+        for (int i = 0; i < BLOCK; i += size) {
+            ivec2 corner_px = block_px + ivec2(i, j);
+            float power = patch_power(corner_px, size);
+            out_patch.w += power;
+            if (power > out_patch.x) out_patch.xyz = vec3(power, corner_px);
         }
-    out_power = dot(abs(power), vec3(1.0));
 }
+#else
+void main() {
+    ivec2 corner_px = ivec2(gl_FragCoord.xy) << LEVEL;
+    float power = patch_power(corner_px, 1 << LEVEL);
+    out_patch = vec4(power, corner_px, power);
+}
+#endif

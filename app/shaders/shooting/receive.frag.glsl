@@ -22,15 +22,16 @@ uniform usampler2D t_normal_ids;
 uniform sampler2D t_materials;
 #endif
 
-layout(location = 0) out vec4 out_irradiance;  // a: Σ_i F_ji V_ji, for the audit
+// a: Σ_i P_i F_ji V_ji and Σ_i P_i F_ji, with P the sum of |r| over RGB: how much of its light a texel sees
+layout(location = 0) out vec4 out_irradiance;
 layout(location = 1) out vec4 out_residual;
 
-// (r_i F_ji V_ji, F_ji V_ji)
-vec4 received(vec3 position, vec3 normal, float facet, Shooter s, int shot) {
+// F_ji, V_ji
+vec2 received(vec3 position, vec3 normal, float facet, Shooter s, int shot) {
     mat3 axes = world_axes(s);
     vec3 local = (position - s.origin) * axes;
-    float FV = form_factor(position, normal, s) * visible(facet, local, normal * axes, shot);
-    return local.z > COPLANAR ? vec4(s.exitance, 1.0) * FV : vec4(0.0);
+    vec2 FV = vec2(form_factor(position, normal, s), visible(facet, local, normal * axes, shot));
+    return local.z > COPLANAR ? FV : vec2(0.0);
 }
 
 void main() {
@@ -45,20 +46,22 @@ void main() {
     vec3 albedo = albedo_of(t_materials, texel.material, texel_px);
     float facet = float(texel.facet);
 #endif
-    vec4 sum = vec4(0.0);
+    vec3 light = vec3(0.0);
+    vec2 share = vec2(0.0);
     uint shots = v_shots;
     do {
         int shot = findLSB(shots);
         shots &= shots - 1u;
         Shooter s = shooter_of(shot);
-        vec4 light = received(position, normal, facet, s, shot);
+        vec2 FV = received(position, normal, facet, s, shot);
 #if !FLAT
         // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it
         bool own = all(lessThan(uvec2(texel_px - s.patch_px), uvec2(s.size_px)));
-        light = own || texel.area <= 0.0 ? vec4(0.0) : light;
+        FV = own || texel.area <= 0.0 ? vec2(0.0) : FV;
 #endif
-        sum += light;
+        light += s.exitance * FV.x * FV.y;
+        share += dot(abs(s.exitance), vec3(1.0)) * FV.x * vec2(FV.y, 1.0);
     } while (shots != 0u);
-    out_irradiance = sum;
-    out_residual = vec4(albedo * sum.rgb, 0.0);
+    out_irradiance = vec4(light, share.x);
+    out_residual = vec4(albedo * light, share.y);
 }

@@ -35,7 +35,8 @@ float visible(float facet, vec3 local, vec3 normal_local, int shot) {
     bvec4 open = greaterThanEqual(shown, depth * (1.0 - DEPTH_SLACK));
     seen = bvec4(seen.x || open.x, seen.y || open.y, seen.z || open.z, seen.w || open.w);
 #endif
-    float sum = dot(vec4(seen), vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)));
+    vec4 weight = vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)) * on_hemisphere(middle);
+    float share = dot(vec4(seen), weight) / dot(weight, vec4(1.0));
     // the other side of what is seen: a shell without thickness has texels on both, in the same place
-    return plane < 0.0 ? sum : 0.0;
+    return plane < 0.0 ? share : 0.0;
 }

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.atlas.lightmap import STORAGE
+from app.atlas.quadtree import MAX_DEPTH
 from app.options import Options, option
 from app.projections import PROJECTIONS
 
 MAX_LEVEL = 4  # a patch is a whole tile
 FORM_FACTORS = ("polygon", "disc")
+CRITERIA = ("gradient", "shadow")
 VISIBILITIES = ("item-id", "depth", "combined")  # in the order of VISIBILITY in shooting/visible.glsl
 
 
@@ -32,5 +34,24 @@ class ShootingOptions(Options):
     projection: str = option("hemicube", "how the shooter sees the scene", choices=tuple(PROJECTIONS))
     resolution: int = option(
         256, "edge of a full face of the visibility map", unit="px", minimum=64, maximum=2048, multiple=64
+    )
+    depth: int = option(
+        4, "finest level of quadtree leaves, each half the texel of the one above", minimum=0, maximum=MAX_DEPTH
+    )
+    criterion: str = option(
+        "gradient", "a leaf splits where the light's gradient jumps, or where light and shadow mix", choices=CRITERIA
+    )
+    gradient: float = option(
+        0.1,
+        "jump of irradiance between texels that splits a leaf, over the scene's mean",
+        minimum=1e-4,
+        maximum=10,
+        logarithmic=True,
+    )
+    shadow: float = option(
+        0.02, "share of a leaf's texels in shadow, or in light, that splits it", minimum=0, maximum=0.5
+    )
+    budget: int = option(
+        2_000_000, "texels that quadtree leaves may hold in all", minimum=65_536, maximum=16_000_000, logarithmic=True
     )
     storage: str = option("rgba32f", "format that holds irradiance and residual", choices=tuple(STORAGE))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, Pass, Texture
-from app.projections import PROJECTIONS
+from app.projections import PROJECTIONS, Occluders
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 
 BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
@@ -14,6 +14,8 @@ SHOOTER_ROWS = 7  # texels that describe one shooter, see shooter.glsl
 BLOCK_BYTES = 256  # no driver asks for a coarser uniform block alignment
 BLOCK_ROWS = BLOCK_BYTES // 16  # texels in a row of t_shooters: one shooter, padded to a uniform block
 REPORT_TEXELS = 2 + SHOOTER_ROWS  # see report.frag.glsl
+BLOCK_LEVEL = 2  # quadtrees: blocks of 4×4 texels, see patches.frag.glsl
+ROOT_LEVEL = 2  # quadtrees: at this level a texel of the root shoots by itself
 OPEN_BLOCK = 8  # visibility texels along the edge of a block that open.frag.glsl sums
 MAPS_TEXELS = 2**21  # of visibility that are drawn at once: more gain little and cost memory
 
@@ -27,6 +29,7 @@ class ShotBuffers:
         self.shooters = gpu.texture((BLOCK_ROWS, BATCH), 4, "f4")
         self.shooter_blocks = gpu.buffer(BATCH * BLOCK_BYTES)  # the same, as uniforms
         self.ledger = gpu.texture((BATCH, 2), 4, "f4")
+        self.occluders = Occluders(gpu, lightmap)
         self.report = gpu.texture((REPORT_TEXELS, 1), 4, "f4")
         self.books = [gpu.texture((lightmap.columns, lightmap.rows), 4, "f4") for _ in range(3)]
         self.row_target = gpu.target(self.rows)
@@ -35,21 +38,31 @@ class ShotBuffers:
         self.report_target = gpu.target(self.report)
         self.books_target = gpu.target(*self.books)
 
+    def enlarged(self, lightmap: Lightmap) -> ShotBuffers:
+        """For a lightmap that has got more rows: the ledger stays, these are released. Waits for the GPU."""
+        larger = ShotBuffers(self._gpu, lightmap)
+        larger.ledger.write(self.ledger.read())
+        self.release()
+        return larger
+
     def release(self) -> None:
         release_all(self._gpu, self)
 
 
 class ChoiceStages:
-    """Choosing among the patches of one level."""
+    """Choosing among the patches of one level; in quadtrees, of that level at the root and of finer ones below."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, level: int) -> None:
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, level: int, *, adaptive: bool) -> None:
         self._gpu, self.level = gpu, level
-        self.patch_size = (lightmap.size[0] >> level, lightmap.size[1] >> level)
-        self.patches = gpu.texture(self.patch_size, 1, "f4")
+        grid = BLOCK_LEVEL if adaptive else level
+        self.patch_size = (lightmap.size[0] >> grid, lightmap.size[1] >> grid)
+        self.patches = gpu.texture(self.patch_size, 4, "f4")
         self.patch_target = gpu.target(self.patches)
-        self.add_patches = Pass(gpu, "shooting/patches", defines={"LEVEL": level})
-        self.add_rows = Pass(gpu, "shooting/rows", defines={"ROW_PATCHES": TILE >> level})
-        self.choose = Pass(gpu, "shooting/choose", defines={"LEVEL": level} | lightmap.defines("MATERIAL_BITS"))
+        kind = {"LEVEL": level - ROOT_LEVEL if adaptive else level, "ADAPTIVE": adaptive}
+        self.add_patches = Pass(gpu, "shooting/patches", defines=kind)
+        self.add_rows = Pass(gpu, "shooting/rows", defines={"ROW_PATCHES": TILE >> grid})
+        self.choose = Pass(gpu, "shooting/choose", defines=kind | lightmap.defines("MATERIAL_BITS"))
+        self.leaves = ("t_leaves",) if adaptive else ()  # what patches and choose bind besides
 
     def release(self) -> None:
         release_all(self._gpu, self)
@@ -76,14 +89,14 @@ class Maps:
 class ShotStages:
     """Programs and maps that follow from the options: built anew when they change."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, adaptive: bool = False) -> None:
         self._gpu, self.projection, self._visibility = gpu, PROJECTIONS[options.projection], options.visibility
         levels = range(options.level, (MAX_LEVEL if options.coarsen else options.level) + 1)
-        self.choices = [ChoiceStages(gpu, lightmap, level) for level in levels]
+        self.choices = [ChoiceStages(gpu, lightmap, level, adaptive=adaptive) for level in levels]
         width, height = self.map_size = self.projection.size(options.resolution)
         self.most_maps = max(1, min(BATCH, MAPS_TEXELS // (width * height)))
         self.maps = Maps(gpu, self.map_size, 1)
-        self.weights = gpu.texture((width // 4, height // 4), 1, "f4")  # see weights.frag.glsl
+        self.weights = gpu.texture((width // 4, height // 4), 4, "f4")  # see weights.frag.glsl
 
         resolution = {"RESOLUTION": options.resolution}
         bits = lightmap.defines("MATERIAL_BITS")
@@ -93,11 +106,13 @@ class ShotStages:
             gpu,
             "shooting/visibility",
             defines=resolution | {"VIEWS": self.projection.views},
-            slots={"projection": self.projection.clip_glsl},
+            slots=self.projection.drawing,
         )
+        self.see_small = Pass(gpu, "shooting/small", defines=resolution, slots=reads)
+        self.count_small = Pass(gpu, "shooting/small", defines=resolution | {"COUNT": 1}, slots=reads)
         self.receive = {
             (flat, near): self._receive(gpu, lightmap, options, flat=flat, near=near)
-            for flat in lightmap.receivers
+            for flat in ((True, False) if adaptive else lightmap.receivers)
             for near in (False, True)
         }
         self.add_open = Pass(gpu, "shooting/open", defines={"BLOCK": OPEN_BLOCK})

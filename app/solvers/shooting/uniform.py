@@ -16,13 +16,13 @@ Works badly where the middle of a patch sees something else than the rest of it 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
-from app.gpu import Buffer, Framebuffer, Gpu, ReadBack, Texture
+from app.gpu import Buffer, Framebuffer, Gpu, Mesh, ReadBack, Texture
 from app.scene.model import F64, Material
 from app.solvers.base import EnergyBook, StepReport
 from app.solvers.shooting.options import ShootingOptions
@@ -72,15 +72,21 @@ class Audit:
 class UniformShooting:
     """Shoots ``lightmap`` to convergence. Whoever makes it releases it."""
 
+    adaptive = False  # whether leaves come and go
+    note: str | None = None
+
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
         if lightmap.storage != options.storage:
             lightmap.set_storage(options.storage)
         self.buffers = ShotBuffers(gpu, lightmap)
-        self.stages = ShotStages(gpu, lightmap, options)
+        self.stages = self._make_stages(options)
         self.last_shot: Shot | None = None
         self._reports: deque[tuple[ChoiceStages, ReadBack]] = deque()
         self.reset()
+
+    def _make_stages(self, options: ShootingOptions) -> ShotStages:
+        return ShotStages(self.gpu, self.lightmap, options, adaptive=self.adaptive)
 
     # -- the solver's interface ----------------------------------------------------------------------------------------
 
@@ -97,13 +103,16 @@ class UniformShooting:
     def set_options(self, options: ShootingOptions) -> None:
         """Use other knobs from the next shot on. Another storage format starts again."""
         restart = options.storage != self.options.storage
-        fresh = ShotStages(self.gpu, self.lightmap, options)
-        self.stages.release()
-        self.stages, self.options = fresh, options
-        self._choice = fresh.choices[0]
+        self._remake_stages(options)
         if restart:
             self.lightmap.set_storage(options.storage)
             self.reset()
+
+    def _remake_stages(self, options: ShootingOptions) -> None:
+        fresh = self._make_stages(options)
+        self.stages.release()
+        self.stages, self.options = fresh, options
+        self._choice = fresh.choices[0]
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light that is there stays, and the difference is shot, negative too [Chen90]. Begins
@@ -121,6 +130,11 @@ class UniformShooting:
         self._emitted = self.lightmap.emitted
         self._choice = self.stages.choices[0]
         self.report = replace(self.report, residual=self.unshot_share())
+
+    @property
+    def settled(self) -> bool:
+        """Always: only shots are left to do."""
+        return True
 
     def unshot_share(self) -> float:
         """The residual now, Σ |r A| over patches, as a share of the emitted power. Waits for the GPU."""
@@ -167,7 +181,7 @@ class UniformShooting:
     def audit(self, patch: tuple[int, int]) -> Audit:
         """What becomes of a shot from this patch if it shot now. Changes no light. The patch must hold some residual."""
         rows = np.zeros((self.lightmap.rows, 4), np.float32)
-        rows[0] = 1.0, *patch, 0.0
+        rows[0] = 1.0, *(corner << self.options.level for corner in patch), 0.0
         self.buffers.rows.write(rows.tobytes())
         self._describe(self.stages.choices[0], 1)
         self._see(0, 1)
@@ -185,7 +199,8 @@ class UniformShooting:
             np.frombuffer(self.stages.maps.open.read(), np.float32).reshape(BATCH, -1, 2)[0].astype(np.float64).sum(0)
         )
         shooter = np.frombuffer(self.buffers.shooters.read(), np.float32).reshape(BATCH, -1, 4)[0]
-        received = float((area.astype(np.float64) * weight).sum() / shooter[0, 3])
+        power = shooter[0, 3] * np.abs(shooter[5, :3].astype(np.float64)).sum()
+        received = float((area.astype(np.float64) * weight).sum() / power)
         return Audit(received, float(blocks[0]), float(blocks[1]), self._shot_from_rows(shooter))
 
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
@@ -240,7 +255,8 @@ class UniformShooting:
 
     def _weigh(self, choice: ChoiceStages) -> None:
         """Residual power of every patch of this level, and the strongest of each row of tiles."""
-        choice.add_patches.draw(choice.patch_target, textures=self.lightmap.textures("t_position_area", "t_residual"))
+        textures = self.lightmap.textures("t_position_area", "t_residual", *choice.leaves)
+        choice.add_patches.draw(choice.patch_target, textures=textures)
         choice.add_rows.draw(
             self.buffers.row_target, textures={"t_patches": choice.patches}, uniforms={"u_width": choice.patch_size[0]}
         )
@@ -249,7 +265,7 @@ class UniformShooting:
         """Write the shooters of the batch from the strongest patches of the rows."""
         choice.choose.draw(
             self.buffers.shooter_target,
-            textures=self.lightmap.textures("t_position_area", "t_normal_ids", "t_residual", "t_facets", "t_leaves")
+            textures=self.lightmap.textures("t_position_area", "t_normal_ids", "t_residual", "t_facets", *choice.leaves)
             | {"t_rows": self.buffers.rows},
             uniforms={"u_rows": self.lightmap.rows},
             viewport=(0, 0, SHOOTER_ROWS, shots),
@@ -261,28 +277,72 @@ class UniformShooting:
         maps = self.stages.maps
         used = None if shots == maps.count else (0, 0, maps.items.width, shots * maps.map_size[1])
         maps.target.clear(OPEN, depth=1.0, viewport=used)
+        projection, occluders = self.stages.projection, self.buffers.occluders
+        casters = projection.casters(occluders, self.options.resolution)
         self.stages.see.draw(
             maps.target,
+            textures=casters.textures,
             uniforms={"u_maps": maps.count, "u_first": first},
             blocks=self._shooter_blocks,
-            mesh=self.lightmap.occluders,
-            instances=self.stages.projection.views * shots,
+            mesh=casters.mesh,
+            vertices=casters.vertices,
+            instances=projection.views * shots,
             depth=True,
-            clip_distances=4,
+            clip_distances=projection.clip_distances,
+        )
+        self.stages.see_small.draw(
+            maps.target,
+            textures={"t_triangles": occluders.texture},
+            uniforms={"u_maps": maps.count, "u_first": first},
+            blocks=self._shooter_blocks,
+            vertices=occluders.count,
+            instances=shots,
+            points=True,
+            depth=True,
         )
 
-    def _receive(self, target: Framebuffer, first: int, shots: int, *, blend: str | None) -> None:
-        """The light of these shots on every texel that sees them. [Coombe03, eq. 1]"""
+    def vanished(self) -> int:
+        """Triangles that the first shooter of the last step sees, but between the samples of its map: each was drawn as one
+        sample. Waits for the GPU."""
+        texture = self.gpu.texture((1, 1), 1, "f4")
+        target = self.gpu.target(texture)
+        target.clear()
+        self.stages.count_small.draw(
+            target,
+            textures={"t_triangles": self.buffers.occluders.texture},
+            uniforms={"u_maps": 1, "u_first": 0},
+            blocks=self._shooter_blocks,
+            vertices=self.buffers.occluders.count,
+            points=True,
+            blend="add",
+        )
+        count = int(np.frombuffer(texture.read(), np.float32)[0])
+        self.gpu.release_all(target, texture)
+        return count
+
+    def _receive(
+        self,
+        target: Framebuffer,
+        first: int,
+        shots: int,
+        *,
+        blend: str | None,
+        meshes: Mapping[bool, Mesh] | None = None,
+    ) -> None:
+        """The light of these shots on every texel that sees them, or on these receivers only. [Coombe03, eq. 1]"""
         lightmap = self.lightmap
         shaped = lightmap.textures("t_position_area", "t_normal_ids")
+        meshes = lightmap.receivers if meshes is None else meshes
         for (flat, _), receive in self.stages.receive.items():
+            if flat not in meshes:
+                continue
             textures = lightmap.textures("t_materials", "t_albedo") | self.stages.sight_textures
             receive.draw(
                 target,
                 textures=textures if flat else textures | shaped,
                 uniforms={"u_size": lightmap.size, "u_first": first, "u_shots": shots},
                 blocks=self._shooter_blocks,
-                mesh=lightmap.receivers[flat],
+                mesh=meshes[flat],
                 blend=blend,
             )
 

@@ -1,0 +1,64 @@
+"""Light that moves with the leaves of a lightmap: pushed down to children, pulled up to parents [Coombe03, 4.2]."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.charts import TILE
+from app.atlas.lightmap import Lightmap
+from app.atlas.quadtree import Change
+from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
+from app.scene.model import F32
+
+LIFTED_COLUMNS = 32  # tiles side by side among those that are lifted
+QUAD_FORMAT = {"in_rect": "4f", "in_from": "2f"}
+
+
+class Regrowth:
+    """The passes; what a change needs besides goes with it."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._lift = Pass(gpu, "lightmap/lift")
+        self._push = Pass(gpu, "lightmap/push")
+        self._pull = Pass(gpu, "lightmap/pull")
+
+    def apply(self, lightmap: Lightmap, change: Change) -> None:
+        """Bring the lightmap's textures up to date with its node set, where ``change`` has just been made."""
+        gpu, split = self._gpu, change.split
+        old, new = (change.parents, change.children) if split else (change.children, change.parents)
+        lifted, nth = np.unique(old, return_inverse=True)
+        rows = -(-len(lifted) // LIFTED_COLUMNS)
+        size = (LIFTED_COLUMNS * TILE, rows * TILE)
+        place = np.arange(len(lifted))
+        aside = np.stack([place % LIFTED_COLUMNS, place // LIFTED_COLUMNS], 1) * TILE
+        textures = [gpu.texture(size, 4, "f4"), gpu.texture(size, 4, "f4"), gpu.texture(size, 1, "f4")]
+        target = gpu.target(*textures)
+        surfaces = lightmap.textures("t_position_area", "t_irradiance", "t_residual")
+        self._draw(self._lift, target, quads(aside, TILE, corners(lightmap, lifted)), surfaces)
+        lightmap.write_tiles(np.unique(np.concatenate([old, new])))
+
+        lights = dict(zip(("t_lifted_irradiance", "t_lifted_residual", "t_lifted_area"), textures, strict=True))
+        if split:
+            pushed = quads(corners(lightmap, new), TILE, aside[nth] + change.corner * (TILE // 2))
+            self._draw(self._push, lightmap.light_target, pushed, lights | lightmap.textures("t_position_area"))
+        else:
+            pulled = quads(corners(lightmap, new) + change.corner * (TILE // 2), TILE // 2, aside[nth])
+            self._draw(self._pull, lightmap.light_target, pulled, lights)
+        gpu.release_all(target, *textures)
+
+    def _draw(self, how: Pass, target: Framebuffer, rects: F32, textures: dict[str, Texture]) -> None:
+        mesh = Mesh(self._gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)
+        how.draw(target, textures=textures, uniforms={"u_size": target.size}, mesh=mesh)
+        self._gpu.release_all(mesh)
+
+
+def quads(corner: NDArray[np.int64], edge: int, source: NDArray[np.int64]) -> F32:
+    """(n, 6) f32 instances of QUAD_FORMAT: squares at ``corner`` (n, 2) that come from ``source`` (n, 2) [texels]."""
+    return np.column_stack([corner, np.full((len(corner), 2), edge), source]).astype(np.float32)
+
+
+def corners(lightmap: Lightmap, slots: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n, 2) column and row of each slot's first texel."""
+    return np.stack([slots % lightmap.columns, slots // lightmap.columns], 1) * TILE

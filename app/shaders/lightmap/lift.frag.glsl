@@ -1,0 +1,18 @@
+// Copies tiles aside, before others take their light over: H with the texel's area, and r.
+uniform sampler2D t_position_area;
+uniform sampler2D t_irradiance;
+uniform sampler2D t_residual;
+
+flat in vec2 v_corner;
+flat in vec2 v_from;
+
+layout(location = 0) out vec4 out_irradiance;
+layout(location = 1) out vec4 out_residual;
+layout(location = 2) out float out_area;
+
+void main() {
+    ivec2 px = ivec2(gl_FragCoord.xy - v_corner + v_from);
+    out_irradiance = texelFetch(t_irradiance, px, 0);
+    out_residual = texelFetch(t_residual, px, 0);
+    out_area = texelFetch(t_position_area, px, 0).w;
+}

@@ -1,0 +1,16 @@
+// A small triangle in the map of visibility, or the count of them.
+#include "common/item.glsl"
+#define COUNT 0
+
+flat in vec2 v_seen;
+
+layout(location = 0) out float out_item;
+
+void main() {
+#if COUNT
+    out_item = 1.0;
+#else
+    out_item = v_seen.x;
+    gl_FragDepth = v_seen.y / FAR;
+#endif
+}

@@ -1,0 +1,260 @@
+"""Progressive radiosity on texture quadtrees: leaves split where the light bends, merge where it does not [Coombe03, 4].
+
+After each batch every leaf is judged on the GPU, and the host hears of it one step later: how much the gradient of H jumps in it,
+or how many of its texels lie in shadow [Wallner10, 5]. Light is pushed down to children and pulled up to parents.
+
+A leaf that came late inherited interpolated light from earlier shots. So all shots so far are made again into fresh leaves, a
+batch per step, and their sum takes the place of what was inherited:
+
+    C = Σ_i r_i F_ji V_ji - H_j,   H_j += C,   r_j += ρ_j C
+
+The solution then does not depend on when the tree grew. New shots meanwhile reach fresh leaves as any other.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.charts import TILE
+from app.atlas.lightmap import Lightmap, receiver_meshes
+from app.atlas.quadtree import Change, Quadtree
+from app.atlas.regrow import QUAD_FORMAT, Regrowth, corners, quads
+from app.gpu import Framebuffer, Gpu, Mesh, Pass, ReadBack, Texture
+from app.scene.model import Material
+from app.solvers.shooting.log import ShotLog
+from app.solvers.shooting.options import ShootingOptions
+from app.solvers.shooting.uniform import UniformShooting
+
+# A second difference of smooth light grows fourfold when texels double: leaves merge below a quarter of the threshold, and half
+# of that again, so that what was merged is not split at once.
+MERGE = 1 / 8
+TREE = ("depth", "criterion", "gradient", "shadow")  # options that only the tree obeys
+PER_STEP = 64  # leaves that split or families that merge in one step: bounded work for a frame
+
+
+class AdaptiveShooting(UniformShooting):
+    """Shoots a lightmap whose node set has room for more leaves than it holds. Whoever makes it releases it."""
+
+    adaptive = True
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
+        self.tree = Quadtree(lightmap.nodes)
+        self._regrowth = Regrowth(gpu)
+        self._log = ShotLog(gpu)
+        self._judge = Pass(gpu, "shooting/judge")
+        self._inherit = Pass(gpu, "shooting/inherit")
+        self._correct = Pass(gpu, "shooting/correct", defines=lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"))
+        self.gpu, self.lightmap = gpu, lightmap
+        self._sized: list[Framebuffer | Texture] = []
+        self._make_targets()
+        self._judged: deque[tuple[int, ReadBack]] = deque()
+        self._fresh: set[int] = set()  # slots whose light is partly inherited
+        self._redone: _Redo | None = None
+        self._redone_at = 0  # shots in the log when they were last made again: at twice as many, it is time
+        self._asked = False  # the user turned a knob of the tree: do not wait
+        self._calm = False  # the last look at the leaves found nothing to do
+        super().__init__(gpu, lightmap, options)
+
+    # -- the solver's interface ----------------------------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Forget all light. The leaves stay: those that are not needed merge."""
+        self._log.clear()
+        self._end_redo()
+        self._drop_judged()
+        self._fresh.clear()
+        self._calm, self._redone_at = False, 0
+        super().reset()
+
+    def set_options(self, options: ShootingOptions) -> None:
+        self._calm = False
+        if options.replace(**{name: getattr(self.options, name) for name in TREE}) == self.options:
+            self.options, self._asked = options, True
+        else:
+            super().set_options(options)
+
+    def set_materials(self, materials: tuple[Material, ...]) -> None:
+        factor = self.lightmap.common_factor(materials)
+        self._end_redo()
+        self._calm = False
+        super().set_materials(materials)
+        self._log.scale(factor)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the tree has stopped growing and all its leaves hold what the shots gave them."""
+        return self._calm and not self._fresh and self._redone is None
+
+    def step(self, shots: int) -> int:
+        """First what there is to do for fresh leaves, a batch of earlier shots at a time, then shots while light is left."""
+        made = 0
+        done = bool(self._log.count) and self.report.residual <= self.options.residual
+        if self._redone is not None:
+            made = self._redo()
+        elif self._fresh and self._log.count >= (0 if done or self._asked else 2 * self._redone_at):
+            made = self._begin_redo()
+        elif not done:
+            made = super().step(shots)
+        if self._redone is None:
+            self._look()
+        return made or shots
+
+    def release(self) -> None:
+        self._end_redo()
+        self._drop_judged()
+        self._log.release()
+        self.gpu.release_all(*self._sized)
+        super().release()
+
+    def _book(self, shots: int) -> None:
+        super()._book(shots)
+        self._log.add(self.buffers, shots)
+
+    # -- judging and growing -------------------------------------------------------------------------------------------
+
+    def _look(self) -> None:
+        """Judge all leaves; act on the last judgement that has arrived."""
+        if len(self._judged) > 1:
+            version, readback = self._judged.popleft()
+            data = np.frombuffer(readback.take(), np.float32).reshape(-1, 4)
+            if version == self.lightmap.version:
+                self._calm = not self._grow(data[: self.lightmap.nodes.tiles].astype(np.float64))
+        self._judge.draw(
+            self._roughness_target, textures=self.lightmap.textures("t_position_area", "t_irradiance", "t_residual")
+        )
+        self._judged.append((self.lightmap.version, ReadBack(self.gpu, self._roughness_target)))
+
+    def _grow(self, judged: NDArray[np.float64]) -> bool:
+        """Split and merge where the judgement (slots, 4), see judge.frag.glsl, says so. Whether anything changed."""
+        nodes, options = self.lightmap.nodes, self.options
+        level = nodes.leaves.level
+        rough, smooth = self._opinion(judged)
+        grows = np.flatnonzero(nodes.used & (level < options.depth) & rough)
+        grows = grows[np.argsort(-judged[grows, 0])][:PER_STEP]
+        splits = self.tree.splits(grows.tolist(), options.depth)[:PER_STEP]
+        if splits:
+            self._make_room(4 * len(splits))
+            self.note = None
+            splits = splits[: self.tree.room // 4]
+        if splits:
+            self._apply(self.tree.split(splits))
+            return True
+        families = self.tree.merges(np.flatnonzero(nodes.used & ((level > options.depth) | smooth)))[:PER_STEP]
+        if families:
+            self._apply(self.tree.merge(families))
+            return True
+        return False
+
+    def _make_room(self, slots: int) -> None:
+        """Have so many free slots, if the budget allows; else say so."""
+        nodes = self.lightmap.nodes
+        if self.tree.room >= slots:
+            return
+        most = self.options.budget // TILE**2
+        wanted = max(nodes.tiles * 3 // 2, nodes.tiles + slots)
+        if min(wanted, most) > nodes.tiles:
+            self._end_redo()
+            self._drop_reports()
+            self.tree.enlarge(min(wanted, most))
+            self.lightmap.enlarge()
+            self._make_targets()
+            self.buffers = self.buffers.enlarged(self.lightmap)
+            self._remake_stages(self.options)
+        if self.tree.room < slots:
+            self.note = f"leaves stop growing: the budget of {self.options.budget:,} texels is reached"
+
+    def _make_targets(self) -> None:
+        """What is as large as the node set."""
+        if self._sized:
+            self.gpu.release_all(*self._sized)
+        lightmap = self.lightmap
+        self._roughness = self.gpu.texture((lightmap.columns, lightmap.rows), 4, "f4")
+        self._roughness_target = self.gpu.target(self._roughness)
+        self._correction = self.gpu.texture(lightmap.size, 4, "f4")
+        self._correction_target = self.gpu.target(self._correction)
+        self._sized = [self._roughness_target, self._roughness, self._correction_target, self._correction]
+
+    def _opinion(self, judged: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which leaves should split, and which need not be as fine as they are."""
+        options = self.options
+        if options.criterion == "shadow":
+            share = judged[:, 3]
+            mixed = (share > options.shadow) & (share < 1 - options.shadow)
+            return mixed, (share == 0) | (share == 1)
+        mean = judged[:, 1].sum() / max(judged[:, 2].sum(), 1e-300)
+        jump = judged[:, 0] / max(mean, 1e-300)
+        return jump > options.gradient, jump < MERGE * options.gradient
+
+    def _apply(self, change: Change) -> None:
+        self._end_redo()
+        self._regrowth.apply(self.lightmap, change)
+        gone, came = (change.parents, change.children) if change.split else (change.children, change.parents)
+        self._fresh.difference_update(gone.tolist())
+        if change.split or not self._fresh.isdisjoint(gone.tolist()):
+            self._fresh.update(came.tolist())
+
+    # -- earlier shots into fresh leaves -------------------------------------------------------------------------------
+
+    def _begin_redo(self) -> int:
+        slots = np.array(sorted(self._fresh), np.int64)
+        self._redone = _Redo(self.gpu, self.lightmap, slots, self._log.count)
+        self._inherit.draw(
+            self._correction_target,
+            textures=self.lightmap.textures("t_irradiance"),
+            uniforms={"u_size": self.lightmap.size},
+            mesh=self._redone.quads,
+        )
+        return self._redo()
+
+    def _redo(self) -> int:
+        """One batch of the log once more, for fresh leaves only; after the last, its sum takes its place. How many shots."""
+        redo = self._redone
+        assert redo is not None
+        if redo.next < redo.end:
+            shots = min(self._log.recall(self.buffers, redo.next), redo.end - redo.next)
+            for first, some in self.stages.groups(shots):
+                self._see(first, some)
+                self._receive(self._correction_target, first, some, blend="add", meshes=redo.receivers)
+            redo.next += shots
+            return shots
+        self._correct.draw(
+            self.lightmap.light_target,
+            textures=self.lightmap.textures("t_normal_ids", "t_materials", "t_albedo")
+            | {"t_correction": self._correction},
+            uniforms={"u_size": self.lightmap.size},
+            mesh=redo.quads,
+            blend="add",
+        )
+        self._fresh.difference_update(redo.slots.tolist())
+        self._redone_at, self._asked = redo.end, False
+        self._end_redo()
+        self.report = replace(self.report, residual=self.unshot_share())
+        return 0
+
+    def _end_redo(self) -> None:
+        if self._redone is not None:
+            self._redone.release()
+            self._redone = None
+
+    def _drop_judged(self) -> None:
+        while self._judged:
+            self._judged.popleft()[1].take()
+
+
+class _Redo:
+    """Fresh leaves on their way: their slots, quads and receivers, and which shots are still to be made into them."""
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, slots: NDArray[np.int64], shots: int) -> None:
+        self._gpu, self.slots, self.next, self.end = gpu, slots, 0, shots
+        nodes = lightmap.nodes
+        place = corners(lightmap, slots)
+        self.quads = Mesh(gpu, quads(place, TILE, place).tobytes(), QUAD_FORMAT, per_instance=True)
+        flat, shaped = nodes.receivers_of(slots)
+        self.receivers = receiver_meshes(gpu, flat, shaped)
+
+    def release(self) -> None:
+        self._gpu.release_all(self.quads, *self.receivers.values())
