@@ -44,8 +44,9 @@ class Quadtree:
     def __init__(self, nodes: NodeSet) -> None:
         self.nodes = nodes
         self.slots: dict[Tile, int] = {}
-        for slot in np.flatnonzero(nodes.used):
-            self.slots[self.tile(int(slot))] = int(slot)
+        self._below: dict[Tile, int] = {}
+        for slot in np.flatnonzero(nodes.used).tolist():
+            self._enter(self.tile(slot), slot)
         self._first = frozenset(self.slots)
         self._charts_of: dict[Tile, frozenset[int]] = {}
         self._free = [int(s) for s in np.flatnonzero(~nodes.used)[::-1]]
@@ -122,12 +123,12 @@ class Quadtree:
     def _replace(self, old: NDArray[np.int64], tiles: Tiles) -> NDArray[np.int64]:
         """Slots of the new tiles. The old ones' are free only afterwards: their light is still to be read."""
         for slot in old.tolist():
-            del self.slots[self.tile(slot)]
+            self._leave(self.tile(slot))
         fresh = np.array([self._free.pop() for _ in range(len(tiles))], np.int64)
         self.nodes.free(old)
         self.nodes.put(fresh, tiles)
         for slot in fresh.tolist():
-            self.slots[self.tile(slot)] = slot
+            self._enter(self.tile(slot), slot)
         self._free.extend(old.tolist())
         return fresh
 
@@ -179,11 +180,22 @@ class Quadtree:
 
     def _is_split(self, tile: Tile) -> bool:
         """Whether there are leaves below this tile."""
+        return self._below.get(tile, 0) > 0
+
+    def _enter(self, tile: Tile, slot: int) -> None:
+        self.slots[tile] = slot
+        self._count(tile, 1)
+
+    def _leave(self, tile: Tile) -> None:
+        del self.slots[tile]
+        self._count(tile, -1)
+
+    def _count(self, tile: Tile, change: int) -> None:
+        """Keep the number of leaves below every tile."""
         level, x, y = tile
-        if tile in self.slots or level >= self.nodes.depth:
-            return False
-        children = [(level + 1, 2 * x + (c & 1), 2 * y + (c >> 1)) for c in range(4)]
-        return any(c in self.slots or self._is_split(c) for c in children)
+        for k in range(1, level + 1):
+            above = (level - k, x >> k, y >> k)
+            self._below[above] = self._below.get(above, 0) + change
 
 
 def quadtree_nodes(scene: Scene, charts: Charts) -> NodeSet:

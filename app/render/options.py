@@ -6,19 +6,21 @@ from dataclasses import dataclass
 
 from app.options import Options, option
 
-LAYERS = ("combined", "irradiance", "residual", "albedo", "charts", "texels")
+LAYERS = ("combined", "irradiance", "residual", "albedo", "charts", "leaves", "texels")
 TONE_MAPS = ("clamp", "reinhard", "aces", "agx", "neutral")
 FALSE_COLOURS = ("off", "illuminance", "luminance")  # lux, cd/m²
 
 
 @dataclass(frozen=True)
 class DisplayOptions(Options):
-    layer: str = option("combined", "what is shown: B, H, r, albedo, charts or texel density", choices=LAYERS)
+    layer: str = option(
+        "combined", "what is shown: B, H, r, albedo, charts, quadtree levels or texel density", choices=LAYERS
+    )
     exposure: float = option(0.0, "exposure; where not given, found from the light", unit="EV", minimum=-24, maximum=24)
     tone_map: str = option("agx", "tone curve", choices=TONE_MAPS)
     smooth: bool = option(True, "bilinear texels instead of nearest")
     ambient: bool = option(False, "add the ambient estimate of light not yet shot (Cohen et al. 1988); display only")
-    grid: bool = option(False, "draw the texel grid and the tiles")
+    grid: bool = option(False, "draw texels and tiles, in a quadtree each level in its colour")
     last_shooter: bool = option(False, "mark the patch that shot last")
     false_colour: str = option("off", "false colour with a legend: lux or cd/m²", choices=FALSE_COLOURS)
     false_colour_log: bool = option(True, "logarithmic false-colour scale")

@@ -12,14 +12,14 @@ import numpy as np
 
 from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
-from app.atlas.node_set import TABLE_WIDTH
-from app.gpu import Gpu, Pass, Texture
+from app.atlas.node_set import TABLE_WIDTH, NodeSet
+from app.gpu import Gpu, Mesh, Pass, Texture
 from app.render.develop import curve
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS, Layer
 from app.render.options import DisplayOptions
 from app.render.targets import release_targets
-from app.scene.model import RGB
+from app.scene.model import F32, RGB
 
 BORDERED = TILE + 2
 TEXELS_PER_FRAME = 1 << 17  # that are brought up to date in one frame, where not all must be
@@ -45,6 +45,8 @@ class DisplayTexels:
             "t_source": gpu.texture(self.size, 1, "u4"),
         }
         self._version = lightmap.version
+        self._edges: Mesh | None = None
+        self._find_edges()
         self._find_sources = Pass(gpu, "render/source")
         self._source_target = gpu.target(self._tables["t_source"])
         self._sourced_rows = 0
@@ -73,7 +75,7 @@ class DisplayTexels:
             "u_ambient": ambient,
             "u_target_texel": 1.0 / (lightmap.charts.density * lightmap.frame.scale),
         }
-        names = ("t_normal_ids", "t_materials", "t_albedo", "t_emission", "t_facets")
+        names = ("t_normal_ids", "t_materials", "t_albedo", "t_emission", "t_facets", "t_leaves")
         textures = self._tables | lightmap.textures(*names)
         textures |= {"t_light": lightmap.texture(layer.light)} if layer.light else {}
         for name, target, viewport in (
@@ -83,6 +85,13 @@ class DisplayTexels:
             resolve = self._pass(name, layer, shader)
             bound, values = declared(resolve, textures), declared(resolve, uniforms)
             resolve.draw(target, textures=bound, uniforms=values, viewport=viewport)
+        if self._edges is not None:
+            edges = self._pass("edges", layer, shader)
+            uniforms |= {"u_size": self.size, "u_pages": self._pages}
+            textures |= lightmap.textures("t_pages", "t_position_area")
+            edges.draw(
+                self._target, textures=declared(edges, textures), uniforms=declared(edges, uniforms), mesh=self._edges
+            )
         smooth = layer.smooth and display.smooth
         filtering = self._gpu.ctx.LINEAR if smooth else self._gpu.ctx.NEAREST
         self._colour.filter = (filtering, filtering)
@@ -94,9 +103,23 @@ class DisplayTexels:
         self._tables.pop("t_places").release()
         self._tables["t_places"] = self._place_table()
         self._find_rows(0, self.size[1])
+        self._find_edges()
+
+    def _find_edges(self) -> None:
+        """Where leaves meet those of another level."""
+        if self._edges is not None:
+            self._gpu.release_all(self._edges)
+        edges = unequal_edges(self._lightmap.nodes)
+        self._edges = Mesh(self._gpu, edges.tobytes(), EDGE_FORMAT, per_instance=True) if len(edges) else None
+
+    @property
+    def _pages(self) -> tuple[float, float]:
+        return float(self._lightmap.columns), self._lightmap.nodes.pages_per_texel
 
     def release(self) -> None:
         release_targets(self._gpu, self._target, self._unlit_target, self._source_target)
+        if self._edges is not None:
+            self._gpu.release_all(self._edges)
         for texture in (self._colour, self._unlit, *self._tables.values()):
             texture.release()
 
@@ -117,7 +140,7 @@ class DisplayTexels:
         self._find_sources.draw(
             self._source_target,
             textures=self._lightmap.textures("t_pages", "t_leaves", "t_position_area"),
-            uniforms={"u_pages": (float(self._lightmap.columns), self._lightmap.nodes.pages_per_texel)},
+            uniforms={"u_pages": self._pages},
             viewport=(0, first, self.size[0], end - first),
         )
         self._sourced_rows = end
@@ -149,6 +172,39 @@ class DisplayTexels:
         places[..., :2] = first - tile * TILE
         places[..., 2] = 2.0 ** nodes.leaves.level[slot]
         return self._gpu.texture(pages.shape[::-1], 4, "f4", places.tobytes())
+
+
+SIDES = ((-1, 0), (1, 0), (0, -1), (0, 1))  # of a leaf, towards its neighbours
+EDGE_FORMAT = {"in_rect": "4f", "in_outward": "3f"}
+
+
+def unequal_edges(nodes: NodeSet) -> F32:
+    """(n, 7) f32 instances of EDGE_FORMAT: half edges of leaves that meet a leaf of another level."""
+    if nodes.depth == 0:
+        return np.zeros((0, 7), np.float32)
+    slots = np.flatnonzero(nodes.used)
+    level = nodes.leaves.level[slots]
+    pages = np.pad(nodes.slot_tables()["t_pages"][..., 0].astype(np.int64), 1)
+    side = 1 << (nodes.depth - level)  # pages along an edge of each leaf
+    left, bottom = nodes.leaves.x[slots] * side + 1, nodes.leaves.y[slots] * side + 1
+    corner = np.stack([slots % nodes.columns, slots // nodes.columns], 1) * BORDERED
+    found = []
+    for dx, dy in SIDES:
+        for half in (0, 1):
+            along = side // 4 + half * (side // 2)
+            x = left + (along if dy else np.where(dx > 0, side, -1))
+            y = bottom + (along if dx else np.where(dy > 0, side, -1))
+            near = pages[y, x] - 1
+            finer = np.where(near >= 0, nodes.leaves.level[near] - level, 0)
+            which = np.flatnonzero(finer != 0)
+            start = 1 + half * (TILE // 2)
+            place = ((BORDERED - 1) * (dx > 0), start) if dx else (start, (BORDERED - 1) * (dy > 0))
+            extent = (1, TILE // 2) if dx else (TILE // 2, 1)
+            count = len(which)
+            found.append(
+                np.column_stack([corner[which] + place, np.tile([*extent, dx, dy], (count, 1)), np.sign(finer[which])])
+            )
+    return np.concatenate(found).astype(np.float32)
 
 
 def declared(program: Pass, offered: dict[str, T]) -> dict[str, T]:

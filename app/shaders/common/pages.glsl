@@ -1,8 +1,8 @@
 // From the virtual atlas to the node set: the page table holds the slot (from 1, 0 = none) of each 16×16 cell of the finest
 // level, t_leaves what each slot holds. [Coombe03, 4.2]
+#include "common/leaves.glsl"
 uniform usampler2D t_pages;
-uniform sampler2D t_leaves;   // tile x, y at its level, size of a texel [texels of level 0]; size 0: free
-uniform vec2 u_pages;         // columns of the node set, cells per texel of level 0
+uniform vec2 u_pages;  // columns of the node set, cells per texel of level 0
 
 // Column and row in the node set of the leaf at a place of the atlas [texels of level 0]; negative where there is none.
 // Floats: exact up to 2^22 slots, and far cheaper than integer division.

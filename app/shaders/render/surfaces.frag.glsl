@@ -22,7 +22,7 @@ void main() {
     if (uv.x < 0.0) colour = gl_FrontFacing ? v_unlit_front : v_unlit_back;
 #if OVERLAY
     vec4 per_px = max(fwidth(v_uv), 1e-6);
-    if (uv.x >= 0.0) colour = overlaid(colour, uv, gl_FrontFacing ? per_px.xy : per_px.zw);
+    if (uv.x >= 0.0) colour = overlaid(colour, uv, gl_FrontFacing ? per_px.xy : per_px.zw, place.z);
 #endif
     out_colour = vec4(colour, 1.0);
 }

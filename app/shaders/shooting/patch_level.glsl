@@ -6,7 +6,7 @@
 const int MAX_LEVEL = 4;  // a whole tile
 
 #if ADAPTIVE
-uniform sampler2D t_leaves;
+#include "common/leaves.glsl"
 
 // slot: of the leaf in the node set; -1: holds none
 int patch_level(ivec2 slot) {

@@ -33,6 +33,8 @@ from app.solvers.shooting.uniform import UniformShooting
 # of that again, so that what was merged is not split at once.
 MERGE = 1 / 8
 TREE = ("depth", "criterion", "gradient", "shadow")  # options that only the tree obeys
+REDO_AFTER = 4  # times as many shots as at the last time, so that all redoing costs a third of all shots
+LOOK_AFTER = 32  # shots between two judgements of a tree that did not change at the last
 PER_STEP = 64  # leaves that split or families that merge in one step: bounded work for a frame
 
 
@@ -54,7 +56,8 @@ class AdaptiveShooting(UniformShooting):
         self._judged: deque[tuple[int, ReadBack]] = deque()
         self._fresh: set[int] = set()  # slots whose light is partly inherited
         self._redone: _Redo | None = None
-        self._redone_at = 0  # shots in the log when they were last made again: at twice as many, it is time
+        self._redone_at = 0  # shots in the log when they were last made again
+        self._look_at = 0
         self._asked = False  # the user turned a knob of the tree: do not wait
         self._calm = False  # the last look at the leaves found nothing to do
         super().__init__(gpu, lightmap, options)
@@ -67,7 +70,7 @@ class AdaptiveShooting(UniformShooting):
         self._end_redo()
         self._drop_judged()
         self._fresh.clear()
-        self._calm, self._redone_at = False, 0
+        self._calm, self._redone_at, self._look_at = False, 0, 0
         super().reset()
 
     def set_options(self, options: ShootingOptions) -> None:
@@ -95,12 +98,13 @@ class AdaptiveShooting(UniformShooting):
         done = bool(self._log.count) and self.report.residual <= self.options.residual
         if self._redone is not None:
             made = self._redo()
-        elif self._fresh and self._log.count >= (0 if done or self._asked else 2 * self._redone_at):
+        elif self._fresh and self._log.count >= (0 if done or self._asked else REDO_AFTER * self._redone_at):
             made = self._begin_redo()
         elif not done:
             made = super().step(shots)
-        if self._redone is None:
+        if self._redone is None and (not self._calm or done or self._log.count >= self._look_at):
             self._look()
+            self._look_at = self._log.count + LOOK_AFTER
         return made or shots
 
     def release(self) -> None:

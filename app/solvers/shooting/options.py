@@ -42,7 +42,7 @@ class ShootingOptions(Options):
         "gradient", "a leaf splits where the light's gradient jumps, or where light and shadow mix", choices=CRITERIA
     )
     gradient: float = option(
-        0.1,
+        0.8,
         "jump of irradiance between texels that splits a leaf, over the scene's mean",
         minimum=1e-4,
         maximum=10,
