@@ -33,6 +33,7 @@ class Stats:
     converged: bool
     texels: int
     tiles: int
+    uniform_texels: int  # if all leaves of a quadtree were of its finest level
     triangles: int
     charts: int
     memory_mib: float
@@ -54,6 +55,7 @@ def stats_of(session: Session) -> Stats:
         converged=session.converged,
         texels=lightmap.texel_count,
         tiles=lightmap.tiles,
+        uniform_texels=lightmap.nodes.uniform_texels(session.shooting.depth),
         triangles=len(session.scene.triangles),
         charts=session.charts.chart_count,
         memory_mib=sum(lightmap.memory.values()) / 2**20,

@@ -80,6 +80,7 @@ class NodeSet:
         self.albedo_tiles = None if cut.albedo is None else colours
         self.emission_tiles = None if cut.emission is None else colours
         self._kinds, self.used = np.zeros(0, KIND), np.zeros(0, bool)
+        self._texels = np.zeros(0, np.int64)  # of each slot, that cover a surface
         self.enlarge(slots)
 
     def enlarge(self, slots: int) -> None:
@@ -93,6 +94,7 @@ class NodeSet:
         if self.emission_tiles is not None:
             self.emission_tiles = _stretched(self.emission_tiles, more, 1.0)
         self._kinds, self.used = _stretched(self._kinds, more, 0), _stretched(self.used, more, False)
+        self._texels = _stretched(self._texels, more, 0)
         self.tiles, self.rows = slots, max(1, -(-slots // self.columns))
         self.size = (self.columns * TILE, self.rows * TILE)
 
@@ -106,6 +108,7 @@ class NodeSet:
         for own, colours in ((self.albedo_tiles, tiles.albedo), (self.emission_tiles, tiles.emission)):
             if own is not None:
                 own[slots] = 1.0 if colours is None else colours
+        self._texels[slots] = (tiles.surfaces.face >= 0).sum((1, 2))
         self._kinds[slots] = tile_kinds(self._tile_texels(tiles), self._facet_material)
         self.used[slots] = True
         self.flat_spans, self.shaped_tiles = self.receivers_of(np.flatnonzero(self.used))
@@ -124,7 +127,12 @@ class NodeSet:
     @property
     def texel_count(self) -> int:
         """Texels that cover a surface."""
-        return int((self.surfaces.face >= 0).sum())
+        return int(self._texels[self.used].sum())
+
+    def uniform_texels(self, depth: int) -> int:
+        """About as many as there would be if all leaves were of that level."""
+        used = np.flatnonzero(self.used)
+        return int((self._texels[used] * 4.0 ** (depth - self.leaves.level[used])).sum())
 
     @property
     def arrays(self) -> dict[str, Array]:

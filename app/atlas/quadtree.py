@@ -23,7 +23,7 @@ Tile = tuple[int, int, int]  # level, x, y
 SIDES = ((-1, 0), (1, 0), (0, -1), (0, 1))
 WHOLE_CHART = TILE  # texels along the longer edge of a chart that emits: fewer make a lamp of too few shooters
 MAX_DEPTH = 6  # of leaves below the roots
-FIRST_ROOM = 256  # slots
+FIRST_ROOM = 512  # slots
 SMALLEST = 4  # texels along the longer edge of any chart: one patch that shoots
 
 
@@ -121,15 +121,15 @@ class Quadtree:
     # -- inside --------------------------------------------------------------------------------------------------------
 
     def _replace(self, old: NDArray[np.int64], tiles: Tiles) -> NDArray[np.int64]:
-        """Slots of the new tiles. The old ones' are free only afterwards: their light is still to be read."""
+        """Slots of the new tiles, the old ones' among them: merging needs no room. See Regrowth, which reads their light first."""
         for slot in old.tolist():
             self._leave(self.tile(slot))
-        fresh = np.array([self._free.pop() for _ in range(len(tiles))], np.int64)
         self.nodes.free(old)
+        self._free.extend(old.tolist())
+        fresh = np.array([self._free.pop() for _ in range(len(tiles))], np.int64)
         self.nodes.put(fresh, tiles)
         for slot in fresh.tolist():
             self._enter(self.tile(slot), slot)
-        self._free.extend(old.tolist())
         return fresh
 
     def _faces_near(self, leaves: Leaves) -> NDArray[np.int64]:

@@ -6,7 +6,7 @@ from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu
 from app.solvers.base import EnergyBook, Solver, StepReport
 from app.solvers.shooting.adaptive import AdaptiveShooting
-from app.solvers.shooting.options import ShootingOptions
+from app.solvers.shooting.options import TREE, ShootingOptions
 from app.solvers.shooting.uniform import UniformShooting
 
 SOLVERS: dict[str, Callable[[Gpu, Lightmap, ShootingOptions], Solver[ShootingOptions]]] = {
@@ -15,4 +15,13 @@ SOLVERS: dict[str, Callable[[Gpu, Lightmap, ShootingOptions], Solver[ShootingOpt
 }
 DEFAULT_SOLVER = "shooting"
 
-__all__ = ["DEFAULT_SOLVER", "SOLVERS", "EnergyBook", "ShootingOptions", "Solver", "StepReport", "UniformShooting"]
+__all__ = [
+    "DEFAULT_SOLVER",
+    "SOLVERS",
+    "TREE",
+    "EnergyBook",
+    "ShootingOptions",
+    "Solver",
+    "StepReport",
+    "UniformShooting",
+]

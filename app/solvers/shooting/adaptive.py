@@ -14,6 +14,7 @@ The solution then does not depend on when the tree grew. New shots meanwhile rea
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -26,16 +27,15 @@ from app.atlas.regrow import QUAD_FORMAT, Regrowth, corners, quads
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, ReadBack, Texture
 from app.scene.model import Material
 from app.solvers.shooting.log import ShotLog
-from app.solvers.shooting.options import ShootingOptions
+from app.solvers.shooting.options import TREE, ShootingOptions
 from app.solvers.shooting.uniform import UniformShooting
 
 # A second difference of smooth light grows fourfold when texels double: leaves merge below a quarter of the threshold, and half
 # of that again, so that what was merged is not split at once.
 MERGE = 1 / 8
-TREE = ("depth", "criterion", "gradient", "shadow")  # options that only the tree obeys
 REDO_AFTER = 4  # times as many shots as at the last time, so that all redoing costs a third of all shots
 LOOK_AFTER = 32  # shots between two judgements of a tree that did not change at the last
-PER_STEP = 64  # leaves that split or families that merge in one step: bounded work for a frame
+PER_SHOT = 8  # leaves that split or families that merge, for each shot of a step: bounded work for a frame
 
 
 class AdaptiveShooting(UniformShooting):
@@ -103,9 +103,16 @@ class AdaptiveShooting(UniformShooting):
         elif not done:
             made = super().step(shots)
         if self._redone is None and (not self._calm or done or self._log.count >= self._look_at):
-            self._look()
+            self._look(PER_SHOT * shots)
             self._look_at = self._log.count + LOOK_AFTER
         return made or shots
+
+    def passes(self, shots: int) -> dict[str, Callable[[], None]]:
+        return super().passes(shots) | {
+            "judge": self._weigh_leaves,
+            "grow": self._grow_and_back,
+            "redo": self._redo_one,
+        }
 
     def release(self) -> None:
         self._end_redo()
@@ -120,26 +127,35 @@ class AdaptiveShooting(UniformShooting):
 
     # -- judging and growing -------------------------------------------------------------------------------------------
 
-    def _look(self) -> None:
-        """Judge all leaves; act on the last judgement that has arrived."""
+    def _look(self, most: int) -> None:
+        """Judge all leaves; act on the last judgement that has arrived, on so many of them at most."""
         if len(self._judged) > 1:
             version, readback = self._judged.popleft()
             data = np.frombuffer(readback.take(), np.float32).reshape(-1, 4)
             if version == self.lightmap.version:
-                self._calm = not self._grow(data[: self.lightmap.nodes.tiles].astype(np.float64))
+                self._calm = not self._grow(data[: self.lightmap.nodes.tiles].astype(np.float64), most)
+        self._weigh_leaves()
+        self._judged.append((self.lightmap.version, ReadBack(self.gpu, self._roughness_target)))
+
+    def _weigh_leaves(self) -> None:
         self._judge.draw(
             self._roughness_target, textures=self.lightmap.textures("t_position_area", "t_irradiance", "t_residual")
         )
-        self._judged.append((self.lightmap.version, ReadBack(self.gpu, self._roughness_target)))
 
-    def _grow(self, judged: NDArray[np.float64]) -> bool:
+    def _grow_and_back(self) -> None:
+        """Split the first leaf and merge it again."""
+        change = self.tree.split([min(self.tree.slots.values())])
+        self._regrowth.apply(self.lightmap, change)
+        self._regrowth.apply(self.lightmap, self.tree.merge([change.children.tolist()]))
+
+    def _grow(self, judged: NDArray[np.float64], most: int) -> bool:
         """Split and merge where the judgement (slots, 4), see judge.frag.glsl, says so. Whether anything changed."""
         nodes, options = self.lightmap.nodes, self.options
         level = nodes.leaves.level
         rough, smooth = self._opinion(judged)
         grows = np.flatnonzero(nodes.used & (level < options.depth) & rough)
-        grows = grows[np.argsort(-judged[grows, 0])][:PER_STEP]
-        splits = self.tree.splits(grows.tolist(), options.depth)[:PER_STEP]
+        grows = grows[np.argsort(-judged[grows, 0])][:most]
+        splits = self.tree.splits(grows.tolist(), options.depth)[:most]
         if splits:
             self._make_room(4 * len(splits))
             self.note = None
@@ -147,7 +163,7 @@ class AdaptiveShooting(UniformShooting):
         if splits:
             self._apply(self.tree.split(splits))
             return True
-        families = self.tree.merges(np.flatnonzero(nodes.used & ((level > options.depth) | smooth)))[:PER_STEP]
+        families = self.tree.merges(np.flatnonzero(nodes.used & ((level > options.depth) | smooth)))[:most]
         if families:
             self._apply(self.tree.merge(families))
             return True
@@ -197,8 +213,9 @@ class AdaptiveShooting(UniformShooting):
         self._end_redo()
         self._regrowth.apply(self.lightmap, change)
         gone, came = (change.parents, change.children) if change.split else (change.children, change.parents)
+        inherits = change.split or not self._fresh.isdisjoint(gone.tolist())
         self._fresh.difference_update(gone.tolist())
-        if change.split or not self._fresh.isdisjoint(gone.tolist()):
+        if inherits:
             self._fresh.update(came.tolist())
 
     # -- earlier shots into fresh leaves -------------------------------------------------------------------------------
@@ -206,13 +223,36 @@ class AdaptiveShooting(UniformShooting):
     def _begin_redo(self) -> int:
         slots = np.array(sorted(self._fresh), np.int64)
         self._redone = _Redo(self.gpu, self.lightmap, slots, self._log.count)
+        self._take_back(self._redone)
+        return self._redo()
+
+    def _redo_one(self) -> None:
+        """The shot that was chosen last once more."""
+        redo = _Redo(self.gpu, self.lightmap, np.flatnonzero(self.lightmap.nodes.used), 1)
+        self._take_back(redo)
+        self._receive(self._correction_target, 0, 1, blend="add", meshes=redo.receivers)
+        self._put_right(redo)
+        redo.release()
+
+    def _take_back(self, redo: _Redo) -> None:
+        """C = -H."""
         self._inherit.draw(
             self._correction_target,
             textures=self.lightmap.textures("t_irradiance"),
             uniforms={"u_size": self.lightmap.size},
-            mesh=self._redone.quads,
+            mesh=redo.quads,
         )
-        return self._redo()
+
+    def _put_right(self, redo: _Redo) -> None:
+        """H += C, r += ρ C."""
+        self._correct.draw(
+            self.lightmap.light_target,
+            textures=self.lightmap.textures("t_normal_ids", "t_materials", "t_albedo")
+            | {"t_correction": self._correction},
+            uniforms={"u_size": self.lightmap.size},
+            mesh=redo.quads,
+            blend="add",
+        )
 
     def _redo(self) -> int:
         """One batch of the log once more, for fresh leaves only; after the last, its sum takes its place. How many shots."""
@@ -225,14 +265,7 @@ class AdaptiveShooting(UniformShooting):
                 self._receive(self._correction_target, first, some, blend="add", meshes=redo.receivers)
             redo.next += shots
             return shots
-        self._correct.draw(
-            self.lightmap.light_target,
-            textures=self.lightmap.textures("t_normal_ids", "t_materials", "t_albedo")
-            | {"t_correction": self._correction},
-            uniforms={"u_size": self.lightmap.size},
-            mesh=redo.quads,
-            blend="add",
-        )
+        self._put_right(redo)
         self._fresh.difference_update(redo.slots.tolist())
         self._redone_at, self._asked = redo.end, False
         self._end_redo()

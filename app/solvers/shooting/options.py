@@ -12,6 +12,7 @@ from app.projections import PROJECTIONS
 MAX_LEVEL = 4  # a patch is a whole tile
 FORM_FACTORS = ("polygon", "disc")
 CRITERIA = ("gradient", "shadow")
+TREE = ("depth", "criterion", "gradient", "shadow", "budget")  # options of quadtrees only
 VISIBILITIES = ("item-id", "depth", "combined")  # in the order of VISIBILITY in shooting/visible.glsl
 
 

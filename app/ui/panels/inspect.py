@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from app.picking import Picked
     from app.session import Session
 
-HEMICUBE_ASPECT = 3.0  # five faces packed as 3R × R
 REFRESH_SECONDS = 0.25  # between two pictures of it
 
 
@@ -25,11 +24,16 @@ def draw(session: Session, state: State) -> None:
         _picked(session, state.picked)
     image = _hemicube(session, state)
     if image is not None and state.texture_id is not None:
-        widgets.section("Last shooter's hemicube")
+        widgets.section("What the last shooter saw")
         width = imgui.get_content_region_avail().x
         reference = imgui.ImTextureRef(state.texture_id(image))
-        imgui.image(reference, imgui.ImVec2(width, width / HEMICUBE_ASPECT), imgui.ImVec2(0, 1), imgui.ImVec2(1, 0))
-        widgets.tooltip("What the patch that shot last sees, one colour per surface: five faces of a cube, packed")
+        imgui.image(
+            reference,
+            imgui.ImVec2(width, width * image.size[1] / image.size[0]),
+            imgui.ImVec2(0, 1),
+            imgui.ImVec2(1, 0),
+        )
+        widgets.tooltip(f"What the patch that shot last sees, one colour per surface: {session.shooting.projection}")
 
 
 def _hemicube(session: Session, state: State) -> Any:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
+from app.options import specs
+from app.solvers import TREE
 from app.ui import theme, widgets
 from app.ui.state import State
 
@@ -20,14 +22,34 @@ def draw(session: Session, state: State) -> None:
     """The whole panel."""
     _buttons(session, state)
     _progress(state)
+    edited = session.shooting
+    if session.atlas.adaptive:
+        widgets.section("Quadtree")
+        _leaves(session, state)
+        edited = widgets.edit_options(edited, skip=(spec.name for spec in specs(type(edited)) if spec.name not in TREE))
     widgets.section("Pace")
     state.pace = widgets.edit_options(state.pace)
     widgets.section("Energy [W]")
     _energy(state)
     widgets.section("Shooting")
-    edited = widgets.edit_options(session.shooting)
+    edited = widgets.edit_options(edited, skip=TREE)
     if edited is not session.shooting:
         state.act(lambda: session.set_shooting(edited))
+
+
+def _leaves(session: Session, state: State) -> None:
+    """How many leaves there are, and what they spare."""
+    stats = state.stats
+    assert stats is not None
+    share = stats.texels / max(stats.uniform_texels, 1)
+    imgui.text_unformatted(f"{stats.tiles:,} leaves, {stats.texels:,} texels")
+    imgui.same_line()
+    right(widgets.percent(share), theme.DIM)
+    widgets.tooltip(f"Of the {stats.uniform_texels:,} texels that the finest level everywhere would take")
+    if not session.solver.settled:
+        widgets.dim("leaves are changing")
+    elif session.solver.note is not None:
+        widgets.wrapped(session.solver.note, theme.AMBER)
 
 
 def _buttons(session: Session, state: State) -> None:
