@@ -7,7 +7,7 @@ share a chart and an edge differ by one level at most, so that interpolation acr
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,6 +82,10 @@ class Quadtree:
             pending.extend(self._coarser_neighbours(slot))
         by_level = sorted(wanted, key=lambda s: self.tile(s)[0])
         return by_level[: self.room // 4]
+
+    def uneven(self) -> list[int]:
+        """Leaves that are too coarse for a neighbour."""
+        return [slot for tile, slot in self.slots.items() if self._meets_finer(tile, self._charts_in(slot))]
 
     def split(self, slots: list[int]) -> Change:
         """Replace leaves of the node set by their children."""
@@ -169,14 +173,27 @@ class Quadtree:
                 return False
             if self._is_split(tile):
                 return False
-        # no neighbour of the parent may be finer than the family
-        for dx, dy in SIDES:
-            near = (level, x + dx, y + dy)
-            if self._is_split(near):
-                for child in range(4):
-                    if self._is_split((level + 1, 2 * near[1] + (child & 1), 2 * near[2] + (child >> 1))):
-                        return False
-        return True
+        return not self._meets_finer(parent, frozenset().union(*(self._charts_in(slot) for slot in family)))
+
+    def _meets_finer(self, tile: Tile, charts: frozenset[int]) -> bool:
+        """Whether a neighbour that shows one of these charts is finer than this tile by two levels or more."""
+        level, x, y = tile
+        return any(
+            near[0] > level + 1 and bool(self._charts_in(self.slots[near]) & charts)
+            for dx, dy in SIDES
+            for near in self._along_side((level, x + dx, y + dy), (-dx, -dy))
+        )
+
+    def _along_side(self, tile: Tile, side: tuple[int, int]) -> Iterator[Tile]:
+        """The leaves in this tile that meet one of its SIDES."""
+        level, x, y = tile
+        if tile in self.slots:
+            yield tile
+        elif self._is_split(tile):
+            across = max(*side, 0)
+            for along in (0, 1):
+                corner = (across, along) if side[0] else (along, across)
+                yield from self._along_side((level + 1, 2 * x + corner[0], 2 * y + corner[1]), side)
 
     def _is_split(self, tile: Tile) -> bool:
         """Whether there are leaves below this tile."""
@@ -201,7 +218,13 @@ class Quadtree:
 def quadtree_nodes(scene: Scene, charts: Charts) -> NodeSet:
     """The node set to begin with: few leaves, and room for as many again."""
     leaves = first_leaves(scene, charts, MAX_DEPTH)
-    return NodeSet(scene, charts, leaves, depth=MAX_DEPTH, slots=max(FIRST_ROOM, 2 * len(leaves)))
+    nodes = NodeSet(scene, charts, leaves, depth=MAX_DEPTH, slots=max(FIRST_ROOM, 2 * len(leaves)))
+    tree = Quadtree(nodes)
+    while slots := tree.uneven():
+        if tree.room < 4 * len(slots):
+            tree.enlarge(nodes.tiles + 4 * len(slots))
+        tree.split(slots)
+    return nodes
 
 
 def first_leaves(scene: Scene, charts: Charts, depth: int) -> Leaves:

@@ -15,16 +15,15 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from app.atlas.lightmap import STORAGE, Lightmap
 from app.atlas.options import AtlasOptions
 from app.bench.copy import copy_bandwidth
+from app.bench.report import markdown
 from app.console import Console
 from app.gpu import Gpu, gpu_context
 from app.loading import load
 from app.options import from_flags
-from app.solvers import ShootingOptions, UniformShooting
+from app.solvers import ShootingOptions, Solver, UniformShooting
 from app.solvers.shooting.stages import BATCH
 
 SIZES = (
@@ -58,11 +57,11 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions) -> dict
     nodes = load(name, AtlasOptions(texels=texels)).nodes
     lightmap = Lightmap(gpu, nodes, storage=options.storage)
     solver = UniformShooting(gpu, lightmap, options)
-    _ms_per_shot(gpu, solver, 1, WARM_UP)
-    single_ms = _ms_per_shot(gpu, solver, 1, SECONDS)
-    _ms_per_shot(gpu, solver, BATCH, WARM_UP)
-    shot_ms = _ms_per_shot(gpu, solver, BATCH, SECONDS)
-    passes, received = _passes(gpu, solver)
+    ms_per_shot(gpu, solver, 1, WARM_UP)
+    single_ms = ms_per_shot(gpu, solver, 1, SECONDS)
+    ms_per_shot(gpu, solver, BATCH, WARM_UP)
+    shot_ms = ms_per_shot(gpu, solver, BATCH, SECONDS)
+    passes, received = passes_ms(gpu, solver, SECONDS)
     shaped = len(nodes.shaped_tiles) / max(nodes.tiles, 1)
     blend_bytes = BLENDED * int(STORAGE[options.storage][1:])
     moved = received * (blend_bytes + shaped * READ_BYTES) / (passes["receive"] * 1e-3)
@@ -81,7 +80,7 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions) -> dict
     return row
 
 
-def _ms_per_shot(gpu: Gpu, solver: UniformShooting, batch: int, seconds: float) -> float:
+def ms_per_shot(gpu: Gpu, solver: Solver[ShootingOptions], batch: int, seconds: float) -> float:
     """Mean wall time of a shot that was made [ms]; a batch leaves out those too weak beside its best."""
     before = solver.poll(wait=True).shots
     gpu.ctx.finish()
@@ -101,11 +100,12 @@ def _ms(gpu: Gpu, run: Callable[[], object]) -> float:
     return (time.perf_counter() - start) * 1e3
 
 
-def _passes(gpu: Gpu, solver: UniformShooting) -> tuple[dict[str, float], float]:
-    """Median milliseconds of each pass per shot of a batch, over the shooters of a solve, and how many texels are written."""
+def passes_ms(gpu: Gpu, solver: Solver[ShootingOptions], seconds: float) -> tuple[dict[str, float], float]:
+    """Median milliseconds of each pass per shot of a batch, over the shooters of a solve, and how many texels are written.
+    Leaves the light wrong."""
     times: dict[str, list[float]] = {label: [] for label in solver.passes(BATCH)}
     samples: list[int] = []
-    end = time.perf_counter() + SECONDS
+    end = time.perf_counter() + seconds
     while time.perf_counter() < end or len(samples) < 5:
         for label, run in solver.passes(BATCH).items():
             query = gpu.ctx.query(samples=True)
@@ -122,13 +122,11 @@ def _table(values: dict[str, Any]) -> str:
     """Markdown."""
     labels = list(values["sizes"][0]["pass_ms"])
     head = ["scene", "triangles", "texels", f"shot, of {BATCH}", "shot, alone", *labels, "GB/s", "copy GB/s", "share"]
-    lines = [head, ["---"] * len(head)]
+    lines = []
     for row in values["sizes"]:
         numbers = [row["shot_ms"], row["single_shot_ms"], *(row["pass_ms"][label] for label in labels)]
         rates = row["receive_gb_per_s"], row["copy_gb_per_s"]
         cells = [row["scene"], f"{row['triangles']:,}", f"{row['texels']:,}", *(f"{n:.2f}" for n in numbers)]
         lines.append([*cells, *(f"{rate:.1f}" for rate in rates), f"{rates[0] / rates[1]:.0%}"])
-    widths = np.max([[len(cell) for cell in line] for line in lines], axis=0)
-    table = "\n".join("| " + " | ".join(c.rjust(w) for c, w in zip(line, widths, strict=True)) + " |" for line in lines)
     note = f"ms per shot, and of each pass per shot of a batch of {BATCH}; GB/s: of the receiver pass"
-    return f"{values['renderer']}\n{note}\n\n{table}"
+    return f"{values['renderer']}\n{note}\n\n{markdown(head, lines)}"

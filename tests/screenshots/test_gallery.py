@@ -51,6 +51,7 @@ class Reel:
     shooting: ShootingOptions
     pictures: tuple[Picture, ...]
     size: tuple[int, int] = WIDE
+    adaptive: bool = False
 
 
 CORNELL_EV = 1.0  # one exposure for the whole series, so that it shows the light coming in
@@ -70,6 +71,17 @@ REELS = (
         ),
         SQUARE,
     ),
+    Reel(
+        "cornell-box",
+        2_000,
+        ShootingOptions(residual=1e-2),
+        (
+            Picture("quadtree", 300, exposure=CORNELL_EV, display={"grid": True}),
+            Picture("layer-leaves", 300, display={"layer": "leaves"}),
+        ),
+        SQUARE,
+        adaptive=True,
+    ),
     Reel("textured-room", 60_000, ShootingOptions(level=3, residual=3e-2), (Picture("textured-room"),)),
     Reel(
         "two-rooms",
@@ -85,10 +97,10 @@ REELS = (
 )
 
 
-@pytest.mark.parametrize("reel", REELS, ids=lambda reel: reel.scene)
+@pytest.mark.parametrize("reel", REELS, ids=lambda reel: reel.scene + "-quadtree" * reel.adaptive)
 def test_the_gallery_looks_as_it_did(gpu: Gpu, reel: Reel, request: pytest.FixtureRequest) -> None:
     regenerate = request.config.getoption("--regenerate-screenshots")
-    session = Session(gpu, shooting=reel.shooting, atlas=AtlasOptions(texels=reel.texels))
+    session = Session(gpu, shooting=reel.shooting, atlas=AtlasOptions(texels=reel.texels, adaptive=reel.adaptive))
     try:
         session.open_now(reel.scene)
         images = {taken.name: _taken(session, taken, reel.size) for taken in reel.pictures}
