@@ -111,6 +111,24 @@ def build_parser() -> Parser:
     add_flags(frames, AtlasOptions)
     add_flags(frames, ShootingOptions)
     frames.set_defaults(command=_bench_frames)
+    tables = benches.add_parser("tables", help="the papers' tables, ours beside theirs; minutes")
+    tables.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write")
+    tables.add_argument(
+        "--only",
+        type=_table_names,
+        metavar="A,B",
+        help="coombe1, wallner1, scaling, convergence, wallner2 (default all)",
+    )
+    tables.add_argument(
+        "--seconds",
+        type=_positive(float),
+        default=2.0,
+        metavar="S",
+        help="of each measurement, of a solve ten times as long; loading comes on top (default 2)",
+    )
+    tables.add_argument("--plots", action="store_true", help="draw PNGs too (needs matplotlib)")
+    _json_flag(tables)
+    tables.set_defaults(command=_bench_tables)
 
     doctor = commands.add_parser("doctor", help="what this machine has, and what is missing")
     _json_flag(doctor)
@@ -169,6 +187,12 @@ def _size(text: str) -> tuple[int, int]:
     return width, height
 
 
+def _table_names(text: str) -> tuple[str, ...]:
+    from app.bench.tables import table_names
+
+    return table_names(text)
+
+
 # Each command imports what it needs: --help and errors answer at once.
 
 
@@ -206,6 +230,12 @@ def _bench_frames(flags: argparse.Namespace) -> int:
     from app.bench.frames import bench_frames
 
     return bench_frames(flags)
+
+
+def _bench_tables(flags: argparse.Namespace) -> int:
+    from app.bench.tables import bench_tables
+
+    return bench_tables(flags)
 
 
 def _doctor(flags: argparse.Namespace) -> int:

@@ -35,6 +35,8 @@ from app.solvers import DEFAULT_SOLVER, EnergyBook, ShootingOptions, Solver
 from app.solving import not_finite, share_done, solve
 from app.stats import Stats, Stop, stats_of
 
+LONG_FRAME = 0.07  # seconds from one advance to the next: a frame of 100 ms would be felt as a halt
+MOST_BANDS = 16
 BOOKS_SECONDS = 0.5  # between two looks at the energy book while shooting, at least: it reads every texel
 BOOKS_SHARE = 0.05  # of the time may go into it
 SLOW_BOOKS, RARE_SECONDS = 0.03, 3.0  # a look that takes longer than this is felt, and waits at least so long
@@ -72,7 +74,7 @@ class Session:
         self.history = History()
         self.interrupted = False
         self.seconds = self._last_advance = 0.0
-        self._batch = 1
+        self._batch = self._bands = 1
         self._books: EnergyBook
         self._books_due = self._quiet_after = 0.0
         self._settled, self._busy, self._opened = True, False, False
@@ -214,6 +216,8 @@ class Session:
         if not self._opened or self._busy or not self.shooting_goes_on:
             return 0
         made, start = 0, time.perf_counter()
+        if shots == 1 and self._pieces(start) > 1:
+            return self._advance_some(start, budget_ms)
         while made < shots:
             made += self.shoot(min(shots - made, self._batch))
             if made < shots:
@@ -222,9 +226,34 @@ class Session:
                 self._batch = max(1, int((budget_ms - spent) / (spent / made)))
                 if spent >= budget_ms:
                     break
-        self.seconds += time.perf_counter() - self._last_advance if self._last_advance else 0.0
-        self._last_advance = time.perf_counter()
+        self._clock()
         return made
+
+    def _pieces(self, now: float) -> int:
+        """Into how many bands a shot must be cut for frames to stay short: more after a long frame, fewer after a short one."""
+        if self._last_advance:
+            frame = now - self._last_advance
+            if frame > LONG_FRAME:
+                self._bands = min(2 * self._bands, MOST_BANDS)
+            elif frame < 0.6 * LONG_FRAME:
+                self._bands = max(self._bands // 2, 1)
+        return self._bands
+
+    def _advance_some(self, start: float, budget_ms: float) -> int:
+        """Parts of one shot, as many as the budget allows."""
+        self._settled = False
+        whole = False
+        while not whole and (time.perf_counter() - start) * 1e3 < budget_ms:
+            whole = self.solver.step_part(self._bands)
+            self.gpu.ctx.finish()
+        self._clock()
+        return int(whole)
+
+    def _clock(self) -> None:
+        """Seconds of solving, from one advance to the next."""
+        now = time.perf_counter()
+        self.seconds += now - self._last_advance if self._last_advance else 0.0
+        self._last_advance = now
 
     def shoot_once(self) -> None:
         """One shot, also when paused."""
@@ -288,7 +317,7 @@ class Session:
     def _begin(self, books: EnergyBook) -> None:
         """books: with nothing shot."""
         self.seconds = self._last_advance = 0.0
-        self._batch, self._books = 1, books
+        self._batch, self._bands, self._books = 1, 1, books
         self.gpu.timers.reset()
         self._books_due, self._quiet_after = time.perf_counter() + BOOKS_SECONDS, 0.0
         self._settled = True

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from app.atlas.lightmap import Lightmap
+from app.atlas.node_set import NodeSet
 from app.atlas.parametrize import parametrize
+from app.atlas.quadtree import quadtree_nodes
 from app.gpu import Gpu
-from app.scene.model import F64, Material, Scene
+from app.scene.model import F32, F64, Material, Scene
 from app.solvers import SOLVERS, EnergyBook, ShootingOptions, UniformShooting
 from app.solvers.shooting.uniform import BATCH, Audit
 
@@ -69,18 +71,31 @@ def table_room() -> Scene:
 @dataclass
 class Solution:
     """A lightmap with its solver. position (n, 3) [m], normal (n, 3), area (n,) [m²] and object (n,) of the texels that cover a
-    surface; ``H`` and ``r`` (n, 3) [W/m²] are read from the GPU anew."""
+    surface, and ``H`` and ``r`` (n, 3) [W/m²], read from the GPU anew: of the leaves that there are now."""
 
     lightmap: Lightmap
     solver: UniformShooting
 
-    def __post_init__(self) -> None:
-        surfaces = self.lightmap.nodes.surfaces
-        self._covered = surfaces.area > 0
-        self.position, self.normal = surfaces.position[self._covered], surfaces.normal[self._covered]
-        self.area: F64 = surfaces.area[self._covered]
-        triangle = self.lightmap.charts.face_triangle[surfaces.face[self._covered]]
-        self.object = self.lightmap.scene.object_ids[triangle]
+    @property
+    def _covered(self) -> NDArray[np.bool_]:
+        return self.lightmap.nodes.surfaces.area > 0
+
+    @property
+    def position(self) -> F64:
+        return self.lightmap.nodes.surfaces.position[self._covered]
+
+    @property
+    def normal(self) -> F32:
+        return self.lightmap.nodes.surfaces.normal[self._covered]
+
+    @property
+    def area(self) -> F64:
+        return self.lightmap.nodes.surfaces.area[self._covered]
+
+    @property
+    def object(self) -> NDArray[np.int32]:
+        triangle = self.lightmap.charts.face_triangle[self.lightmap.nodes.surfaces.face[self._covered]]
+        return self.lightmap.scene.object_ids[triangle]
 
     @property
     def H(self) -> F64:
@@ -116,6 +131,15 @@ class Solution:
         self.solver.poll(wait=True)
         assert self.solver.shots < ENOUGH, "did not converge"
 
+    def settle(self, steps: int = ENOUGH) -> None:
+        """Until converged and, on quadtrees, until the tree has stopped growing and holds all shots."""
+        for _ in range(steps):
+            if self.solver.report.residual <= self.solver.options.residual and self.solver.settled:
+                return
+            self.solver.step(BATCH)
+            self.solver.poll()
+        raise AssertionError("did not settle")
+
     def light_up(self) -> None:
         """Give every texel the same residual, so that any patch can shoot."""
         width, height = self.lightmap.size
@@ -146,13 +170,15 @@ def begin(
     texels: int | None = None,
     density: float | None = None,
     solver: str = "shooting",
+    quadtree: bool = False,
     **options: object,
 ) -> Solution:
-    """The scene before the first shot. options: of ShootingOptions."""
+    """The scene before the first shot. quadtree: on leaves that come and go. options: of ShootingOptions."""
     charts = parametrize(scene, texels=texels, density=density)
     shooting = ShootingOptions().replace(**options)
-    lightmap = Lightmap.of(gpu, scene, charts, storage=shooting.storage)
-    return Solution(lightmap, SOLVERS[solver](gpu, lightmap, shooting))
+    nodes = quadtree_nodes(scene, charts) if quadtree else NodeSet(scene, charts)
+    lightmap = Lightmap(gpu, nodes, storage=shooting.storage)
+    return Solution(lightmap, SOLVERS["adaptive" if quadtree else solver](gpu, lightmap, shooting))
 
 
 def solve(gpu: Gpu, scene: Scene, **options: object) -> Solution:

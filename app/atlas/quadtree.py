@@ -125,7 +125,7 @@ class Quadtree:
     # -- inside --------------------------------------------------------------------------------------------------------
 
     def _replace(self, old: NDArray[np.int64], tiles: Tiles) -> NDArray[np.int64]:
-        """Slots of the new tiles, the old ones' among them: merging needs no room. See Regrowth, which reads their light first."""
+        """Slots of the new tiles, the old ones' among them: merging needs no room. Regrowth reads their light first."""
         for slot in old.tolist():
             self._leave(self.tile(slot))
         self.nodes.free(old)

@@ -65,6 +65,7 @@ class Pass:
         vertices: int = 3,
         instances: int = 1,
         viewport: tuple[int, int, int, int] | None = None,
+        scissor: tuple[int, int, int, int] | None = None,
         blend: str | None = None,
         depth: bool = False,
         strip: bool = False,
@@ -87,6 +88,8 @@ class Pass:
         ctx = self.gpu.ctx
         target.use()
         target.viewport = viewport or (0, 0, *target.size)
+        if scissor:
+            target.scissor = scissor
         flags = (moderngl.BLEND if blend else 0) | (moderngl.DEPTH_TEST if depth else 0)
         ctx.enable_only(flags)
         if blend:
@@ -104,6 +107,8 @@ class Pass:
                     array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=mesh.count)
                 else:
                     array.render(mode, instances=instances)
+        if scissor:  # or later clears would keep it
+            target.scissor = None  # type: ignore[assignment]  # None is no scissor; moderngl's stub is wrong
         for plane in range(clip_distances):
             ctx.disable_direct(GL_CLIP_DISTANCE0 + plane)
 

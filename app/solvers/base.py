@@ -102,6 +102,10 @@ class Solver(Protocol[OptionsT]):
     def step(self, shots: int) -> int:
         """Make up to ``shots`` shots, and no more than one batch of its own; how many were issued."""
 
+    def step_part(self, bands: int) -> bool:
+        """A part of a step of one shot, its longest pass cut into so many bands; whether the step is whole now. Everything else
+        that needs whole steps finishes it first."""
+
     def poll(self, *, wait: bool = False) -> StepReport:
         """The newest report that has arrived; with ``wait`` that of the last step."""
 

@@ -107,6 +107,11 @@ class AdaptiveShooting(UniformShooting):
             self._look_at = self._log.count + LOOK_AFTER
         return made or shots
 
+    def step_part(self, bands: int) -> bool:
+        """A whole step: leaves follow the light, and there are few."""
+        self.step(1)
+        return True
+
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
         return super().passes(shots) | {
             "judge": self._weigh_leaves,

@@ -16,7 +16,7 @@ Works badly where the middle of a patch sees something else than the rest of it 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,6 +39,7 @@ from app.solvers.shooting.stages import (
 # With ``coarsen``, a shot should carry this share of the emitted power: about 4096 shots for each time that all light is
 # reflected, whatever the scene's size. Measured on the Cornell box: a quarter of the shots, error 1.8 % -> 2.4 %.
 FAINT = 2.0**-12
+WHOLE = object()  # no part is left
 REPORT_LAG = 2  # read-backs in flight before the oldest is looked at
 
 
@@ -82,6 +83,7 @@ class UniformShooting:
         self.buffers = ShotBuffers(gpu, lightmap)
         self.stages = self._make_stages(options)
         self.last_shot: Shot | None = None
+        self._under_way: Iterator[None] | None = None
         self._reports: deque[tuple[ChoiceStages, ReadBack]] = deque()
         self.reset()
 
@@ -92,6 +94,7 @@ class UniformShooting:
 
     def reset(self) -> None:
         """Forget all light: H = 0, r = E."""
+        self._under_way = None
         self.lightmap.clear()
         self.buffers.ledger_target.clear()
         self._drop_reports()
@@ -102,6 +105,7 @@ class UniformShooting:
 
     def set_options(self, options: ShootingOptions) -> None:
         """Use other knobs from the next shot on. Another storage format starts again."""
+        self.finish()
         restart = options.storage != self.options.storage
         self._remake_stages(options)
         if restart:
@@ -117,6 +121,7 @@ class UniformShooting:
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light that is there stays, and the difference is shot, negative too [Chen90]. Begins
         again where nothing is left to emit, and where the storage holds no negative light."""
+        self.finish()
         if self.lightmap.storage == "fixed8" or not any(m.emits for m in materials) or self._emitted.sum() <= 0:
             self.lightmap.set_materials(materials)
             self.reset()
@@ -138,6 +143,7 @@ class UniformShooting:
 
     def unshot_share(self) -> float:
         """The residual now, Σ |r A| over patches, as a share of the emitted power. Waits for the GPU."""
+        self.finish()
         self._weigh(self._choice)
         rows = np.frombuffer(self.buffers.rows.read(), np.float32).reshape(-1, 4)[:, 3].astype(np.float64)
         emitted = self._emitted.sum()
@@ -146,13 +152,25 @@ class UniformShooting:
     def step(self, shots: int) -> int:
         """Make up to ``shots`` shots (at most BATCH), the strongest patches first. Returns how many were issued: of a batch,
         those too weak beside its best are left for later, and not counted once ``poll`` has heard of it."""
+        self.finish()
         shots = min(shots, BATCH)
-        self._choose(shots)
-        self._for_groups(self._shoot, shots)
-        self._book(shots)
-        self.shots += shots
-        self._tell()
+        for _ in self._parts(shots, 1):
+            pass
         return shots
+
+    def step_part(self, bands: int) -> bool:
+        """A part of one shot, its receivers in so many bands; whether the shot is whole now. What needs whole shots finishes it
+        first."""
+        if self._under_way is None:
+            self._under_way = self._parts(1, bands)
+        if next(self._under_way, WHOLE) is WHOLE:
+            self._under_way = None
+        return self._under_way is None
+
+    def finish(self) -> None:
+        """Make the shot whole that is under way, if any."""
+        while self._under_way is not None:
+            self.step_part(1)
 
     def poll(self, *, wait: bool = False) -> StepReport:
         """The newest report that has arrived: the state before the step that sent it; with ``wait`` that of the last step."""
@@ -165,6 +183,7 @@ class UniformShooting:
 
     def books(self) -> EnergyBook:
         """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
+        self.finish()
         absorbed, unshot, reflectance = self._tile_sums()
         ledger = np.frombuffer(self.buffers.ledger.read(), np.float32).reshape(2, BATCH, 4)
         escaped, blackened = ledger[..., :3].astype(np.float64).sum(1) * self._watt
@@ -180,6 +199,7 @@ class UniformShooting:
 
     def audit(self, patch: tuple[int, int]) -> Audit:
         """What becomes of a shot from this patch if it shot now. Changes no light. The patch must hold some residual."""
+        self.finish()
         rows = np.zeros((self.lightmap.rows, 4), np.float32)
         rows[0] = 1.0, *(corner << self.options.level for corner in patch), 0.0
         self.buffers.rows.write(rows.tobytes())
@@ -225,19 +245,32 @@ class UniformShooting:
 
     # -- one shot ------------------------------------------------------------------------------------------------------
 
+    def _parts(self, shots: int, bands: int) -> Iterator[None]:
+        """A step, from choosing to the report. [Coombe03, 3]"""
+        self._choose(shots)
+        yield
+        for first, some in self.stages.groups(shots):
+            self._see(first, some)
+            yield
+            for band in range(bands):
+                self._light(first, some, band / bands, (band + 1) / bands)
+                yield
+            self._look_out(first, some)
+        self._book(shots)
+        self.shots += shots
+        self._tell()
+
     def _for_groups(self, part: Callable[[int, int], None], shots: int) -> None:
         """Do this part of a step for all its shots, as many at once as there are maps for."""
         for first, some in self.stages.groups(shots):
             part(first, some)
 
-    def _shoot(self, first: int, shots: int) -> None:
-        """Some shots of the batch, from seeing to the light on every texel. [Coombe03, 3]"""
-        self._see(first, shots)
-        self._light(first, shots)
-        self._look_out(first, shots)
-
-    def _light(self, first: int, shots: int) -> None:
-        self._receive(self.lightmap.light_target, first, shots, blend="add")
+    def _light(self, first: int, shots: int, start: float = 0.0, end: float = 1.0) -> None:
+        """Receive into the lightmap, in the rows between two shares of its height."""
+        width, height = self.lightmap.size
+        lower, upper = round(start * height), round(end * height)
+        rows = None if upper - lower == height else (0, lower, width, upper - lower)
+        self._receive(self.lightmap.light_target, first, shots, blend="add", rows=rows)
 
     def _choose(self, shots: int) -> None:
         """Pick the strongest patches and zero them. [Coombe03, 3.4]"""
@@ -328,8 +361,9 @@ class UniformShooting:
         *,
         blend: str | None,
         meshes: Mapping[bool, Mesh] | None = None,
+        rows: tuple[int, int, int, int] | None = None,
     ) -> None:
-        """The light of these shots on every texel that sees them, or on these receivers only. [Coombe03, eq. 1]"""
+        """The light of these shots on every texel that sees them, or on some receivers or rows only. [Coombe03, eq. 1]"""
         lightmap = self.lightmap
         shaped = lightmap.textures("t_position_area", "t_normal_ids")
         meshes = lightmap.receivers if meshes is None else meshes
@@ -344,6 +378,7 @@ class UniformShooting:
                 blocks=self._shooter_blocks,
                 mesh=meshes[flat],
                 blend=blend,
+                scissor=rows,
             )
 
     @property

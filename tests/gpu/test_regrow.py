@@ -1,0 +1,289 @@
+"""Light that moves with the leaves: what splits and merges keep, that nothing leaks, and that no edge shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from solver_scenes import grey, quads_scene, room, table_room
+from test_session import forgotten, held
+
+from app.atlas.charts import TILE
+from app.atlas.lightmap import LIGHT, STORAGE, Lightmap
+from app.atlas.parametrize import parametrize
+from app.atlas.quadtree import Quadtree, quadtree_nodes
+from app.atlas.regrow import Regrowth
+from app.gpu import Gpu
+from app.render.options import DisplayOptions
+from app.render.resolve import BORDERED, DisplayTexels
+from app.scene.load import load_scene
+from app.scene.model import F64, Scene
+
+__all__ = ["forgotten"]
+
+DEPTH = 3
+# How far storage may be off for each texel, as a share of its light or in stored units: float sums; a half float has 11 bits and
+# llvmpipe cuts them off; 8 bits are steps of 1/255, rounded or cut
+RELATIVE = {"rgba32f": 1e-4, "rgba16f": 2.0**-9, "fixed8": 0.0}
+ABSOLUTE = {"rgba32f": 0.0, "rgba16f": 0.0, "fixed8": 2 / 255}
+SCENES: dict[str, Callable[[], Scene]] = {"table": table_room, "textured": lambda: load_scene("textured-room")}
+
+
+class Forest:
+    """A lightmap on quadtrees with some light in it, no solver."""
+
+    def __init__(self, gpu: Gpu, scene: Scene, *, texels: int = 3000, storage: str = "rgba32f") -> None:
+        self.lightmap = Lightmap(gpu, quadtree_nodes(scene, parametrize(scene, texels=texels)), storage=storage)
+        self.nodes, self.storage = self.lightmap.nodes, storage
+        self.tree, self.regrowth = Quadtree(self.nodes), Regrowth(gpu)
+
+    def write(self, light: dict[str, F64]) -> None:
+        """Tiles (slots, 16, 16, 3) [stored units] by name of the texture, nothing where nothing is covered."""
+        for name, tiles in light.items():
+            covered = np.where((self.nodes.surfaces.area > 0)[..., None], tiles, 0.0)
+            image = self.nodes.image_from_tiles(np.concatenate([covered, covered[..., :1] * 0], -1))
+            raw = image * 255 + 0.5 if self.storage == "fixed8" else image
+            dtype = {"rgba32f": np.float32, "rgba16f": np.float16, "fixed8": np.uint8}[self.storage]
+            self.lightmap.texture(name).write(np.ascontiguousarray(raw.astype(dtype)).tobytes())
+
+    def write_noise(self, rng: np.random.Generator, *, negative: bool = False) -> None:
+        noise = rng.uniform(0.2, 1.0, (2, self.nodes.tiles, TILE, TILE, 3))
+        if negative:
+            noise[1] = 2 * noise[1] - 1  # r: light that is to be taken back
+        self.write(dict(zip(LIGHT, noise, strict=True)))
+
+    def grow(self, share: float = 1.0, rng: np.random.Generator | None = None) -> None:
+        used = np.flatnonzero(self.nodes.used)
+        some = used if rng is None else used[rng.random(len(used)) < share]
+        if self.tree.room < 4 * len(used):
+            self.tree.enlarge(self.nodes.tiles + 4 * len(used))
+            self.lightmap.enlarge()
+        self.regrowth.apply(self.lightmap, self.tree.split(self.tree.splits(some.tolist(), DEPTH)))
+
+    def shrink(self) -> None:
+        families = self.tree.merges(np.flatnonzero(self.nodes.used))
+        self.regrowth.apply(self.lightmap, self.tree.merge(families))
+
+    @property
+    def light(self) -> dict[str, F64]:
+        """H and r by name (slots, 16, 16, 3) [stored units]."""
+        read = (self.lightmap.irradiance(), self.lightmap.residual())
+        return {n: t.astype(np.float64) / self.lightmap.unit for n, t in zip(LIGHT, read, strict=True)}
+
+    @property
+    def energy(self) -> F64:
+        """Σ H A and Σ r A, (2, 3)."""
+        area = self.nodes.surfaces.area[..., None]
+        return np.array([(tiles * area).sum((0, 1, 2)) for tiles in self.light.values()])
+
+    def by_tile(self) -> dict[tuple[int, int, int], F64]:
+        """What is in the covered texels of each leaf, H and r."""
+        H, r = self.light.values()
+        covered = (self.nodes.surfaces.area > 0)[..., None]
+        both = np.concatenate([H * covered, r * covered], -1)
+        return {tile: both[slot] for tile, slot in self.tree.slots.items()}
+
+
+@pytest.fixture
+def forest(gpu: Gpu) -> Iterator[Callable[..., Forest]]:
+    made: list[Forest] = []
+
+    def plant(scene: Scene, **options: object) -> Forest:
+        made.append(Forest(gpu, scene, **options))  # type: ignore[arg-type]
+        return made[-1]
+
+    yield plant
+    for one in made:
+        one.lightmap.release()
+
+
+# -- push and pull -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("storage", STORAGE)
+@pytest.mark.parametrize("name", SCENES)
+def test_splits_and_merges_keep_all_energy(
+    forest: Callable[..., Forest], rng: np.random.Generator, name: str, storage: str
+) -> None:
+    trees = forest(SCENES[name](), storage=storage)
+    trees.write_noise(rng, negative=storage != "fixed8")
+    area = trees.nodes.surfaces.area.sum()
+    weight = trees.nodes.surfaces.area[..., None]
+    lights = np.array([(np.abs(tiles) * weight).sum((0, 1, 2)) for tiles in trees.light.values()])
+    before = trees.energy
+    for change in (trees.grow, lambda: trees.grow(0.3, rng), trees.shrink, trees.shrink):
+        change()
+        change_of_energy = np.abs(trees.energy - before)
+        assert (change_of_energy <= RELATIVE[storage] * lights + ABSOLUTE[storage] * area).all()
+        before = trees.energy
+    assert np.abs(before).min() > 0
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_what_was_pushed_and_pulled_is_what_it_was(
+    forest: Callable[..., Forest], rng: np.random.Generator, name: str
+) -> None:
+    trees = forest(SCENES[name]())
+    trees.write_noise(rng, negative=True)
+    before = trees.by_tile()
+    trees.grow()
+    assert trees.by_tile().keys() != before.keys()
+    trees.shrink()
+    after = trees.by_tile()
+    assert after.keys() == before.keys()
+    for tile, values in before.items():
+        np.testing.assert_allclose(after[tile], values, rtol=1e-4, atol=1e-5)  # float sums
+
+
+def test_push_interpolates_and_pull_takes_means(forest: Callable[..., Forest]) -> None:
+    """Linear light stays linear two levels down, a texel away from where the leaf above ended; even light stays even."""
+    trees = forest(quads_scene([room((4.0, 4.0, 4.0))[0]], [grey(0.5, 1.0)]), texels=16 * 16)
+    assert len(trees.tree) == 1
+    slope = np.array([[0.01, 0.02], [0.02, 0.0], [0.0, 0.0]])
+    trees.write({name: 0.3 + places(trees) @ slope.T for name in LIGHT})
+    trees.grow()
+    expected = 0.3 + places(trees) @ slope.T
+    covered = trees.nodes.surfaces.area > 0
+    rect = trees.nodes.charts.chart_rects[0]
+    uv = places(trees)
+    inner = covered & ((uv > rect[:2] + 1.01) & (uv < rect[:2] + rect[2:] - 1.01)).all(-1)
+    assert inner.sum() > 500
+    for tiles in trees.light.values():
+        np.testing.assert_allclose(tiles[inner], expected[inner], atol=1e-5)
+        np.testing.assert_allclose(tiles[covered][:, 2], 0.3, atol=1e-5)
+
+
+def places(trees: Forest) -> F64:
+    """(slots, 16, 16, 2) middle of every texel in the atlas [texels of level 0]."""
+    inside = np.stack(np.meshgrid(np.arange(TILE), np.arange(TILE)), -1) + 0.5
+    leaves = trees.nodes.leaves
+    corner = np.stack([leaves.x, leaves.y], -1)[:, None, None] * TILE
+    return (corner + inside) * np.exp2(-leaves.level.astype(float))[:, None, None, None]
+
+
+def test_light_is_never_made_negative(forest: Callable[..., Forest], rng: np.random.Generator) -> None:
+    """Single bright texels among black ones: what is interpolated must not go below zero."""
+    trees = forest(table_room())
+    spots = (rng.random((trees.nodes.tiles, TILE, TILE, 1)) < 0.05) * np.ones(3)
+    trees.write({"t_irradiance": spots, "t_residual": spots})
+    trees.grow()
+    assert trees.light["t_irradiance"].min() >= 0
+    assert np.isfinite(trees.light["t_irradiance"]).all() and np.isfinite(trees.light["t_residual"]).all()
+
+
+def test_other_leaves_are_left_alone(forest: Callable[..., Forest], rng: np.random.Generator) -> None:
+    trees = forest(table_room())
+    trees.write_noise(rng)
+    before = trees.by_tile()
+    trees.grow(0.2, rng)
+    after = trees.by_tile()
+    kept = before.keys() & after.keys()
+    assert 0 < len(kept) < len(before)
+    for tile in kept:
+        np.testing.assert_array_equal(after[tile], before[tile])
+
+
+@pytest.mark.parametrize("storage", STORAGE)
+def test_enlarging_keeps_the_light(forest: Callable[..., Forest], rng: np.random.Generator, storage: str) -> None:
+    trees = forest(table_room(), storage=storage)
+    trees.write_noise(rng)
+    before, rows = trees.by_tile(), trees.lightmap.rows
+    trees.tree.enlarge(2 * trees.nodes.tiles)
+    trees.lightmap.enlarge()
+    assert trees.lightmap.rows > rows
+    after = trees.by_tile()
+    for tile, values in before.items():
+        np.testing.assert_array_equal(after[tile], values)
+    assert np.count_nonzero(trees.light["t_irradiance"][~trees.nodes.used]) == 0
+
+
+def test_the_textures_follow_the_node_set(forest: Callable[..., Forest], rng: np.random.Generator) -> None:
+    """What is written tile by tile is what a new lightmap would hold."""
+    trees = forest(load_scene("textured-room"))
+    trees.grow(0.4, rng)
+    trees.shrink()
+    area = trees.nodes.surfaces.area
+    held_ones = {"t_position_area", "t_albedo", "t_normal_ids"}
+    for name, array in trees.nodes.arrays.items():
+        texture = trees.lightmap.texture(name)
+        read = np.frombuffer(texture.read(), array.dtype).reshape(array.shape)
+        if name in held_ones:
+            mine = area > 0
+            read, array = trees.nodes.tiles_from_image(read)[mine], trees.nodes.tiles_from_image(array)[mine]
+        np.testing.assert_array_equal(read, array, err_msg=name)
+
+
+def test_splitting_and_merging_everything_leaves_no_objects(
+    gpu: Gpu, forest: Callable[..., Forest], forgotten: Callable[[], list[object]]
+) -> None:
+    trees = forest(table_room(), texels=1000)
+    trees.grow()  # makes room
+    trees.shrink()
+    counts, rooms = [], []
+    for _ in range(20):
+        trees.grow()
+        trees.shrink()
+        counts.append(held(gpu))
+        rooms.append(trees.tree.room)
+    assert len(set(counts)) == 1 and len(set(rooms)) == 1, counts
+    assert not forgotten()
+
+
+# -- edges between levels ----------------------------------------------------------------------------------------------
+
+
+def sampled(display: NDArray[np.float64], nodes: object, slot: int, uv: F64) -> F64:
+    """What the sampler gives at a place of the atlas [texels of level 0] in one leaf's display texels."""
+    leaves, columns = nodes.leaves, nodes.columns  # type: ignore[attr-defined]
+    inside = uv * 2.0 ** leaves.level[slot] - np.array([leaves.x[slot], leaves.y[slot]]) * TILE
+    at = np.array([slot % columns, slot // columns]) * BORDERED + 1 + inside - 0.5
+    base = np.floor(at).astype(int)
+    f = at - base
+    four = display[base[1] : base[1] + 2, base[0] : base[0] + 2]
+    rows = four[0] * (1 - f[1]) + four[1] * f[1]
+    return np.asarray(rows[0] * (1 - f[0]) + rows[1] * f[0])
+
+
+def edge_points(nodes: object) -> list[tuple[int, int, F64]]:
+    """Places where two leaves of different level meet, at four places along each cell of the page table."""
+    pages = nodes.slot_tables()["t_pages"][..., 0].astype(np.int64) - 1  # type: ignore[attr-defined]
+    level, cell = nodes.leaves.level, 1 / nodes.pages_per_texel  # type: ignore[attr-defined]
+    found = []
+    for step, along in (((0, 1), (0, 1)), ((1, 0), (1, 0))):
+        a, b = pages[: len(pages) - step[0], : pages.shape[1] - step[1]], pages[step[0] :, step[1] :]
+        met = (a >= 0) & (b >= 0) & (level[a] != level[b])
+        for y, x in np.argwhere(met):
+            for t in (0.125, 0.375, 0.625, 0.875):
+                uv = np.array([x + along[1] + t * (1 - along[1]), y + along[0] + t * (1 - along[0])]) * cell
+                found.append((int(a[y, x]), int(b[y, x]), uv))
+    return found
+
+
+def test_linear_light_has_no_step_where_levels_meet(
+    gpu: Gpu, forest: Callable[..., Forest], rng: np.random.Generator
+) -> None:
+    """Half a step of 8 bits on either side, and what sRGB bends between two texels of a sixteenth of the range."""
+    trees = forest(quads_scene([room((4.0, 4.0, 4.0))[0]], [grey(0.5, 1.0)]), texels=64 * 64)
+    for _ in range(2):
+        trees.grow(0.3, rng)
+    nodes = trees.nodes
+    slope, middle = np.array([0.05, 0.04]), nodes.charts.chart_rects[0][:2] + 32
+    light = 0.5 + (places(trees) - middle) @ slope
+    trees.write({"t_irradiance": np.repeat(light[..., None], 3, -1) * np.pi / trees.lightmap.unit})
+    display = DisplayTexels(gpu, trees.lightmap)
+    options = DisplayOptions(layer="irradiance", tone_map="clamp")
+    textures = display.resolve("irradiance", options, scale=None, ambient=(0, 0, 0), whole=True)
+    texture = textures["t_display"]
+    raw = np.frombuffer(texture.read(), np.uint8).reshape(texture.height, texture.width, 4)[..., 0] / 255
+    steps, tested = [], 0
+    for a, b, uv in edge_points(nodes):
+        exact = 0.5 + (uv - middle) @ slope
+        on_chart = (np.abs(uv - middle) < 31).all()
+        if on_chart and 0.25 < exact < 0.75:
+            steps.append(abs(sampled(raw, nodes, a, uv) - sampled(raw, nodes, b, uv)))
+            tested += 1
+    display.release()
+    assert tested > 100
+    assert max(steps) < 1.5 / 255, (np.array(steps).max() * 255, np.mean(steps) * 255)

@@ -1,0 +1,137 @@
+"""Radiosity on texture quadtrees: even light splits nothing; shadows do; and it does not matter when."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from solver_scenes import Solution, begin, grey, quads_scene, room, table_room
+
+from app.atlas.collapse import collapse
+from app.gpu import Gpu
+from app.scene.load import load_scene
+from app.scene.model import Scene
+
+DENSITY = 4.0  # of the roots [1/m]
+ROUGH = 0.1  # a threshold that splits about half of a room with shadows
+FEW_STEPS = 1500
+
+
+def grown(gpu: Gpu, scene: Scene, **options: object) -> Solution:
+    """Not shot yet."""
+    known: dict[str, object] = {
+        "density": DENSITY,
+        "level": 4,
+        "resolution": 64,
+        "depth": 2,
+        "gradient": ROUGH,
+        "residual": 0.02,
+    }
+    return begin(gpu, scene, quadtree=True, **(known | options))  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def planted(gpu: Gpu) -> Iterator[Callable[..., Solution]]:
+    made: list[Solution] = []
+
+    def plant(scene: Scene, **options: object) -> Solution:
+        made.append(grown(gpu, scene, **options))
+        return made[-1]
+
+    yield plant
+    for one in made:
+        one.release()
+
+
+def test_furnace(planted: Callable[..., Solution]) -> None:
+    """All walls alike: B = E/(1 - ρ) everywhere, so there is nothing to refine."""
+    scene = load_scene("furnace")
+    box = planted(scene, density=16.0, residual=2e-3, gradient=0.8)
+    leaves = set(box.solver.tree.slots)  # type: ignore[attr-defined]
+    box.settle(FEW_STEPS)
+    material = scene.materials[0]
+    glow = np.pi * np.array(material.emission) / (1 - np.array(material.albedo))
+    mean = (box.B * box.area[:, None]).sum(0) / box.area.sum()
+    np.testing.assert_allclose(mean, glow, rtol=0.01)
+    assert set(box.solver.tree.slots) == leaves  # type: ignore[attr-defined]
+
+
+def test_no_shadow_no_split(planted: Callable[..., Solution]) -> None:
+    """A closed empty box has none."""
+    walls = quads_scene(room(), [grey(0.5), grey(0.5, 3.0)], [0, 1, 0, 0, 0, 0])
+    box = planted(walls, density=16.0, criterion="shadow", depth=3, residual=0.1)
+    leaves = set(box.solver.tree.slots)  # type: ignore[attr-defined]
+    box.settle(FEW_STEPS)
+    assert set(box.solver.tree.slots) == leaves  # type: ignore[attr-defined]
+
+
+# -- the table's shadow ------------------------------------------------------------------------------------------------
+
+SHADOW: dict[str, object] = {"density": 5.0, "level": 3, "resolution": 128, "residual": 0.01, "gradient": 0.3}
+
+
+def finest_light(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """H on the finest level of the atlas, whatever the leaves, and where there is a surface."""
+    return collapse(solution.lightmap.nodes, solution.lightmap.irradiance())
+
+
+def test_it_does_not_matter_when_the_tree_grows(planted: Callable[..., Solution]) -> None:
+    """From the start, or after 800 shots onto the roots."""
+    early = planted(table_room(), **(SHADOW | {"depth": 2}))
+    early.settle()
+    late = planted(table_room(), **(SHADOW | {"depth": 0}))
+    while late.solver.shots < 800:
+        late.solver.step(8)
+    roots = late.lightmap.texel_count
+    late.solver.set_options(late.solver.options.replace(depth=2))
+    late.settle()
+    assert min(early.lightmap.texel_count, late.lightmap.texel_count) > 3 * roots, "nothing grew"
+    (a, here), (b, there) = finest_light(early), finest_light(late)
+    both = here & there
+    assert np.sqrt(((a - b)[both] ** 2).mean() / (a[both] ** 2).mean()) < 0.01
+    # both lose the same light at contacts of large patches, about 0.85 %
+    assert abs(early.book.imbalance_share - late.book.imbalance_share) < 3e-3
+    assert abs(early.book.imbalance_share) < 0.015
+
+
+def test_leaves_follow_threshold_depth_and_budget(planted: Callable[..., Solution]) -> None:
+    """All while the solution is running, which stays finite and keeps its energy."""
+    box = planted(table_room(), **(SHADOW | {"depth": 2, "residual": 0.2, "gradient": 5.0}))
+
+    def settled(**options: object) -> int:
+        box.solver.set_options(box.solver.options.replace(**options))
+        for _ in range(12):  # until the knob has been heard of
+            box.solver.step(8)
+            box.solver.poll()
+        box.settle()
+        assert np.isfinite(box.H).all() and abs(box.book.imbalance_share) < 0.02
+        return len(box.solver.tree)  # type: ignore[attr-defined]
+
+    few = settled()
+    many = settled(gradient=0.2)
+    assert many > 2 * few
+    assert few < settled(depth=1) < many
+    assert settled(depth=2, gradient=5.0) <= 2 * few  # merging waits for an eighth of the threshold
+    full = settled(gradient=1e-3, budget=65_536)
+    assert full <= 65_536 // 256 or box.solver.note is None
+
+
+def test_an_edit_of_a_grown_tree(planted: Callable[..., Solution]) -> None:
+    """The log of shots is scaled with the light: what is made again into later leaves fits what is there."""
+    options = SHADOW | {"depth": 1, "residual": 0.05}
+    box = planted(table_room(), **options)
+    box.settle()
+    H = finest_light(box)[0]
+    materials = list(box.lightmap.scene.materials)
+    materials[2] = grey(0.2, 5.0, double_sided=True)  # a quarter of the lamp's 20 W/m²
+    box.solver.set_materials(tuple(materials))
+    box.solver.set_options(box.solver.options.replace(depth=2))
+    for _ in range(12):
+        box.solver.step(8)
+        box.solver.poll()
+    box.settle()
+    finer, covered = finest_light(box)
+    coarse = H.repeat(2, 0).repeat(2, 1)[: finer.shape[0], : finer.shape[1]] if finer.shape != H.shape else H
+    assert finer[covered].mean() == pytest.approx(coarse[covered].mean() / 4, rel=0.02)
+    assert abs(box.book.imbalance_share) < 0.02

@@ -1,0 +1,49 @@
+"""A shot that is made in parts, over several frames, is the same shot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from solver_scenes import begin, table_room
+
+from app.gpu import Gpu
+
+SHOTS = 5
+
+
+@pytest.mark.parametrize("bands", [1, 3, 16])
+def test_parts_add_up_to_the_shot(gpu: Gpu, bands: int) -> None:
+    whole, cut = (begin(gpu, table_room(), texels=3000) for _ in range(2))
+    parts = 0
+    for _ in range(SHOTS):
+        whole.solver.step(1)
+        parts += 1
+        while not cut.solver.step_part(bands):
+            parts += 1
+    assert parts == SHOTS * (bands + 3)  # choose, see, the bands, the rest
+    assert cut.solver.shots == whole.solver.shots == SHOTS
+    # bands share no texel: each gets the same numbers, added in the same order
+    np.testing.assert_array_equal(cut.H, whole.H)
+    np.testing.assert_array_equal(cut.r, whole.r)
+    np.testing.assert_array_equal(cut.book.escaped, whole.book.escaped)
+    whole.release()
+    cut.release()
+
+
+def test_what_needs_whole_shots_finishes_them(gpu: Gpu) -> None:
+    """In the middle of a shot the shooter's residual is gone and not yet received: the book would be off by it."""
+    room = begin(gpu, table_room(), texels=3000)
+    for _ in range(3):
+        assert not room.solver.step_part(8)
+    off = abs(room.solver._tile_sums()[0].sum() + room.solver._tile_sums()[1].sum() - room.solver._emitted.sum())
+    assert off > 0.01 * room.solver._emitted.sum(), "nothing was under way"
+    book = room.book
+    assert abs(book.imbalance_share) < 5e-3  # form factors
+    assert room.solver.shots == 1
+    room.solver.step_part(8)
+    room.solver.reset()
+    assert room.solver.shots == 0 and room.H.max() == 0
+    while not room.solver.step_part(2):
+        pass
+    assert room.solver.shots == 1
+    room.release()

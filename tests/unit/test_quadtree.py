@@ -1,0 +1,398 @@
+"""Texture quadtrees: what may split and merge, what stays the same whatever the leaves, and their collapse to one texture."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from atlas_scenes import box_room, own_cache, scene_of
+from solver_scenes import grey, quads_scene, room, table_room
+
+from app.atlas.charts import TILE
+from app.atlas.collapse import collapse
+from app.atlas.node_set import NodeSet
+from app.atlas.parametrize import parametrize
+from app.atlas.quadtree import SMALLEST, WHOLE_CHART, Change, Quadtree, first_leaves, quadtree_nodes
+from app.scene import shapes
+from app.scene.model import F64, Material, Scene
+
+__all__ = ["own_cache"]
+
+UNEVEN = ("ball", "crumbs")  # charts that are no rectangles of whole texels: texels on a chart's border may be shared
+DEPTH = 3  # of the random trees
+AREA = 1e-9  # relative: texels are cut exactly, in double precision
+
+
+def ball_room() -> Scene:
+    return scene_of([box_room(), shapes.icosphere(1.0, 2).moved(2, 1.2, 2)])
+
+
+def small_lamp_room() -> Scene:
+    """Both far smaller than a tile."""
+    lamp = [[1.9, 2.9, 1.9], [2.1, 2.9, 1.9], [2.1, 2.9, 2.1], [1.9, 2.9, 2.1]]
+    panel = [[1.0, 1.0, 1.0], [1.0, 1.0, 1.1], [1.1, 1.0, 1.1], [1.1, 1.0, 1.0]]
+    return quads_scene([*room((4.0, 3.0, 4.0)), lamp, panel], [grey(0.5), grey(0.5, 5.0)], [0] * 6 + [1, 0])
+
+
+def crumbs_room() -> Scene:
+    """Charts of any outline, with tiny lamps between them: finer leaves in the middle of large charts from the start."""
+    lamps = [shapes.quad((1, 0.1 + 0.05 * k, 1), (0.07, 0, 0), (0, 0, 0.07)) for k in range(40)]
+    sails = [shapes.polygon([(0, 2 + 0.1 * k, 0), (2.3, 2 + 0.1 * k, 0.2), (0.4, 2 + 0.1 * k, 1.9)]) for k in range(8)]
+    return scene_of([box_room(), *sails, *lamps], [Material("grey")] * 9 + [Material("lamp", emission=(1, 1, 1))])
+
+
+SCENES = {
+    "walls": lambda: quads_scene(room((4.0, 3.0, 4.0)), [grey(0.5)]),
+    "table": table_room,
+    "ball": ball_room,
+    "small lamp": small_lamp_room,
+    "crumbs": crumbs_room,
+}
+
+
+def tree_of(name: str, density: float = 10.0) -> Quadtree:
+    scene = SCENES[name]()
+    return Quadtree(quadtree_nodes(scene, parametrize(scene, density=density)))
+
+
+def grow(tree: Quadtree, slots: list[int], depth: int = DEPTH) -> Change | None:
+    """Split these leaves and what must split with them, whatever room that takes."""
+    more = 4 * len(tree)
+    if tree.room < more:
+        tree.enlarge(tree.nodes.tiles + more)
+    splits = tree.splits(slots, depth)
+    return tree.split(splits) if splits else None
+
+
+def shuffle(tree: Quadtree, rng: np.random.Generator, rounds: int = 6) -> None:
+    """Random splits and merges, two rounds of splits for each of merges."""
+    for k in range(rounds):
+        used = np.flatnonzero(tree.nodes.used)
+        if k % 3 < 2:
+            grow(tree, used[rng.random(len(used)) < rng.uniform(0.1, 0.3)].tolist())
+        elif families := [family for family in tree.merges(used) if rng.random() < 0.5]:
+            tree.merge(families)
+
+
+def places(tree: Quadtree) -> set[tuple[int, int, int]]:
+    return {tree.tile(int(slot)) for slot in np.flatnonzero(tree.nodes.used)}
+
+
+def charts_in(nodes: NodeSet, slot: int) -> set[int]:
+    face = nodes.surfaces.face[slot]
+    return set(nodes.charts.face_chart[face[face >= 0]].tolist())
+
+
+def worst_step(nodes: NodeSet) -> int:
+    """Largest difference in level between two leaves that meet along an edge and share a chart."""
+    pages = nodes.slot_tables()["t_pages"][..., 0].astype(np.int64) - 1
+    pairs = set()
+    for a, b in ((pages[1:], pages[:-1]), (pages[:, 1:], pages[:, :-1])):
+        met = (a >= 0) & (b >= 0) & (a != b)
+        pairs |= set(zip(a[met].tolist(), b[met].tolist(), strict=True))
+    level = nodes.leaves.level
+    apart = [abs(int(level[a] - level[b])) for a, b in pairs if charts_in(nodes, a) & charts_in(nodes, b)]
+    return max(apart, default=0)
+
+
+# -- splits and merges -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("seed", range(2))
+def test_whatever_splits_and_merges_the_surface_is_covered_once(name: str, seed: int) -> None:
+    tree, rng = tree_of(name), np.random.default_rng(seed)
+    nodes = tree.nodes
+    _, areas = nodes.scene.normals_areas
+    surface = areas[nodes.charts.face_triangle].sum()
+    for _ in range(3):
+        shuffle(tree, rng, rounds=3)
+        assert len(set(nodes.leaves.level[nodes.used])) > 1, "nothing was split"
+        assert nodes.surfaces.area.sum() == pytest.approx(surface, rel=AREA)
+        assert ((nodes.surfaces.area > 0) == (nodes.surfaces.face >= 0)).all()
+        assert nodes.texel_count == (nodes.surfaces.face >= 0).sum()
+        by_object = np.bincount(object_of(nodes), nodes.surfaces.area[nodes.surfaces.face >= 0])
+        np.testing.assert_allclose(by_object, object_areas(nodes), rtol=AREA if name not in UNEVEN else 1e-2)
+
+
+def object_of(nodes: NodeSet) -> np.ndarray:
+    face = nodes.surfaces.face[nodes.surfaces.face >= 0]
+    return np.asarray(nodes.scene.object_ids[nodes.charts.face_triangle[face]])
+
+
+def object_areas(nodes: NodeSet) -> F64:
+    triangle = nodes.charts.face_triangle
+    return np.bincount(nodes.scene.object_ids[triangle], nodes.scene.normals_areas[1][triangle])
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_neighbours_in_a_chart_differ_by_one_level_at_most(name: str) -> None:
+    for seed in range(3):
+        tree, rng = tree_of(name), np.random.default_rng(seed)
+        assert worst_step(tree.nodes) <= 1, "at the start"
+        for _ in range(3):
+            shuffle(tree, rng, rounds=3)
+            assert worst_step(tree.nodes) <= 1
+            assert tree.nodes.leaves.level.max() > 1, "nothing is tested"
+
+
+def test_a_leaf_deep_in_a_corner_takes_its_neighbours_along() -> None:
+    """Three splits of the leaf at one place leave all levels from 0 to 3 around it."""
+    tree = tree_of("walls", density=24.0)
+    x, y, w, h = tree.nodes.charts.chart_rects[0]
+    assert min(w, h) >= 4 * TILE
+    for _ in range(3):
+        grow(tree, [tree.nodes.slot_at((x + w / 2 + 0.1, y + h / 2 + 0.1))])
+    assert set(tree.nodes.leaves.level[tree.nodes.used]) == {0, 1, 2, 3}
+    assert worst_step(tree.nodes) == 1
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_merging_ends_at_the_first_leaves(name: str) -> None:
+    tree, rng = tree_of(name), np.random.default_rng(7)
+    first = places(tree)
+    for _ in range(2):
+        grow(tree, np.flatnonzero(tree.nodes.used).tolist())
+    assert len(tree) > 2 * len(first)
+    assert not tree.merges(np.array([], np.int64))
+    while families := tree.merges(np.flatnonzero(tree.nodes.used & (rng.random(tree.nodes.tiles) < 0.9))):
+        tree.merge(families)
+    while families := tree.merges(np.flatnonzero(tree.nodes.used)):
+        tree.merge(families)
+    assert places(tree) == first
+
+
+def test_a_family_merges_whole_or_not_at_all() -> None:
+    tree = tree_of("walls")
+    change = grow(tree, [0])
+    assert change is not None
+    children = change.children[change.parents == 0]
+    assert len(children) > 1
+    assert not tree.merges(children[:-1])
+    assert [sorted(f) for f in tree.merges(children)] == [sorted(children.tolist())]
+
+
+def test_depth_ends_splitting() -> None:
+    tree = tree_of("table")
+    for _ in range(5):
+        grow(tree, np.flatnonzero(tree.nodes.used).tolist(), depth=2)
+    assert not tree.splits(np.flatnonzero(tree.nodes.used).tolist(), 2)
+    assert set(tree.nodes.leaves.level[tree.nodes.used]) <= set(range(max(3, int(tree.nodes.leaves.level.max()) + 1)))
+    fresh = tree_of("table")
+    assert set(tree.nodes.leaves.level[tree.nodes.used]) == {2} | {level for level, *_ in places(fresh) if level > 2}
+
+
+def test_a_change_says_who_took_whose_place() -> None:
+    tree = tree_of("table")
+    before = {slot: tree.tile(slot) for slot in range(4)}
+    split = grow(tree, list(before))
+    assert split is not None and split.split
+    for parent, child, corner in zip(split.parents.tolist(), split.children.tolist(), split.corner, strict=True):
+        level, x, y = before.get(parent, (-1, -1, -1))
+        if level >= 0:
+            assert tree.tile(child) == (level + 1, 2 * x + corner[0], 2 * y + corner[1])
+    after = {slot: tree.tile(slot) for slot in split.children.tolist()}
+    merged = tree.merge(tree.merges(split.children))
+    assert not merged.split
+    for parent, child, corner in zip(merged.parents.tolist(), merged.children.tolist(), merged.corner, strict=True):
+        level, x, y = tree.tile(parent)
+        assert after[child] == (level + 1, 2 * x + corner[0], 2 * y + corner[1])
+
+
+# -- room --------------------------------------------------------------------------------------------------------------
+
+
+def test_slots_are_used_again() -> None:
+    tree = tree_of("table")
+    rooms, first = [], places(tree)
+    for _ in range(20):
+        splits = tree.splits(np.flatnonzero(tree.nodes.used).tolist(), DEPTH)
+        tree.split(splits)
+        assert tree.room + len(tree) == tree.nodes.tiles
+        while families := tree.merges(np.flatnonzero(tree.nodes.used)):
+            tree.merge(families)
+        rooms.append(tree.room)
+        assert places(tree) == first
+    assert len(set(rooms)) == 1 and tree.room + len(tree) == tree.nodes.tiles
+    assert sorted(tree.slots.values()) == np.flatnonzero(tree.nodes.used).tolist()
+
+
+def test_no_more_split_than_there_is_room_for() -> None:
+    tree = tree_of("table")
+    tree._free = tree._free[:9]
+    splits = tree.splits(np.flatnonzero(tree.nodes.used).tolist(), DEPTH)
+    assert len(splits) == 2
+    tree.split(splits)
+    tree._free = []
+    assert tree.splits(np.flatnonzero(tree.nodes.used).tolist(), DEPTH) == []
+
+
+def test_merging_needs_no_room() -> None:
+    """A tree that has used its budget up must be able to shrink."""
+    tree = tree_of("table")
+    first = places(tree)
+    grow(tree, np.flatnonzero(tree.nodes.used).tolist())
+    tree._free = []
+    families = tree.merges(np.flatnonzero(tree.nodes.used))
+    before = len(tree)
+    tree.merge(families)
+    assert places(tree) == first
+    assert tree.room == before - len(tree) > 0
+
+
+def test_enlarging_keeps_everything() -> None:
+    tree = tree_of("table")
+    grow(tree, np.flatnonzero(tree.nodes.used)[::3].tolist())
+    nodes = tree.nodes
+    slots, tiles, columns, room = dict(tree.slots), nodes.tiles, nodes.columns, tree.room
+    arrays = nodes.tile_arrays(np.arange(tiles))
+    pages = nodes.slot_tables()["t_pages"]
+    receivers = [a.copy() for a in (nodes.flat_spans, nodes.shaped_tiles)]
+    tree.enlarge(tiles + 100)
+    assert (nodes.tiles, nodes.columns, tree.room, tree.slots) == (tiles + 100, columns, room + 100, slots)
+    assert nodes.size == (columns * TILE, -(-nodes.tiles // columns) * TILE)
+    for name, array in nodes.tile_arrays(np.arange(tiles)).items():
+        np.testing.assert_array_equal(array, arrays[name])
+    np.testing.assert_array_equal(nodes.slot_tables()["t_pages"], pages)
+    for now, before in zip((nodes.flat_spans, nodes.shaped_tiles), receivers, strict=True):
+        np.testing.assert_array_equal(now, before)
+    splits = tree.splits(np.flatnonzero(nodes.used).tolist(), DEPTH)
+    assert tree.split(splits).children.max() < nodes.tiles
+
+
+# -- places ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_page_table_finds_the_leaf_at_any_place(name: str, rng: np.random.Generator) -> None:
+    tree = tree_of(name)
+    shuffle(tree, rng, rounds=3)
+    nodes = tree.nodes
+    pages = nodes.slot_tables()["t_pages"][..., 0].astype(np.int64) - 1
+    found = 0
+    for uv in rng.uniform(0, nodes.charts.size, (400, 2)):
+        slot = int(pages[tuple((uv * nodes.pages_per_texel).astype(int)[::-1])])
+        assert slot == nodes.slot_at((float(uv[0]), float(uv[1])))
+        if slot < 0:
+            continue
+        found += 1
+        leaf = nodes.leaves.only(np.array([slot]))
+        low = np.array([leaf.x[0], leaf.y[0]]) * TILE / 2.0 ** leaf.level[0]
+        assert ((uv >= low) & (uv < low + TILE / 2.0 ** leaf.level[0])).all()
+    assert found > 100
+
+
+def test_all_covered_places_have_a_leaf(rng: np.random.Generator) -> None:
+    """Whatever was split: points inside of faces, not only tiles that happen to be there."""
+    tree = tree_of("ball")
+    shuffle(tree, rng, rounds=5)
+    uv = tree.nodes.charts.face_uv
+    weights = rng.dirichlet((1.0, 1.0, 1.0), len(uv))
+    for u, v in np.einsum("fk,fkc->fc", weights, uv):
+        assert tree.nodes.slot_at((float(u), float(v))) >= 0
+
+
+def test_lamps_and_small_charts_begin_with_enough_texels() -> None:
+    """A lamp has a whole tile's edge of texels, a small panel one patch; what is larger begins with its root."""
+    scene = small_lamp_room()
+    charts = parametrize(scene, density=10)
+    leaves = first_leaves(scene, charts, 6)
+    nodes = NodeSet(scene, charts, leaves, depth=6)
+    longer = charts.chart_rects[:, 2:].max(1)
+    assert longer.min() < SMALLEST
+    chart_of = {scene.object_ids[t]: c for t, c in zip(charts.face_triangle, charts.face_chart, strict=True)}
+    face = nodes.surfaces.face
+    for name, enough in ((6, WHOLE_CHART), (7, SMALLEST)):
+        chart = chart_of[name]
+        mine = (face >= 0) & (charts.face_chart[face] == chart)
+        coarsest = leaves.level[mine.any((1, 2))].min()
+        assert longer[chart] * 2**coarsest >= enough > longer[chart] * 2 ** (coarsest - 1)
+    assert set(leaves.level[:1]) == {0} or leaves.level.min() == 0
+    # no leaf is split for nothing
+    assert first_leaves(*unlit_walls(), 6).level.max() == 0
+
+
+def unlit_walls() -> tuple[Scene, object]:
+    scene = quads_scene(room((4.0, 3.0, 4.0)), [grey(0.5)])
+    return scene, parametrize(scene, density=10)
+
+
+# -- collapse ----------------------------------------------------------------------------------------------------------
+
+
+def texel_places(nodes: NodeSet) -> F64:
+    """(slots, 16, 16, 2) middle of every texel in the atlas [texels of level 0]."""
+    inside = np.stack(np.meshgrid(np.arange(TILE), np.arange(TILE)), -1) + 0.5
+    corner = np.stack([nodes.leaves.x, nodes.leaves.y], -1)[:, None, None] * TILE
+    return (corner + inside) * np.exp2(-nodes.leaves.level.astype(float))[:, None, None, None]
+
+
+def image_places(nodes: NodeSet, finest: int) -> F64:
+    width, height = (side << finest for side in nodes.charts.size)
+    return (np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1) + 0.5) / 2**finest
+
+
+def in_charts(nodes: NodeSet, uv: F64, margin: float) -> np.ndarray:
+    """Which places lie in a chart, so far from its border [texels of level 0]."""
+    inside = np.zeros(uv.shape[:-1], bool)
+    for x, y, w, h in nodes.charts.chart_rects:
+        low, high = np.array([x, y]) + margin, np.array([x + w, y + h]) - margin
+        inside |= ((uv > low) & (uv < high)).all(-1)
+    return inside
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_linear_light_collapses_to_linear_light(seed: int) -> None:
+    """Means of linear light and its interpolation are linear: no step where levels change. From 1.5 texels of the coarsest level
+    on from where a chart ends, where nothing is there to interpolate with."""
+    tree = tree_of("walls")
+    shuffle(tree, np.random.default_rng(seed), rounds=3)
+    nodes = tree.nodes
+    finest = int(nodes.leaves.level.max())
+    assert finest > 1 and len(set(nodes.leaves.level[nodes.used])) > 2
+    slope = np.array([[0.7, -0.2], [0.1, 0.4], [-0.3, 1.0]])
+    image, covered = collapse(nodes, (texel_places(nodes) @ slope.T).astype(np.float32))
+    uv = image_places(nodes, finest)
+    assert covered.shape == uv.shape[:2]
+    inner = in_charts(nodes, uv, 1.5)
+    assert covered[inner].all() and inner.mean() > 0.3
+    # single precision of values of some hundred
+    np.testing.assert_allclose(image[inner], (uv @ slope.T)[inner], rtol=1e-5, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_even_light_collapses_to_even_light_on_all_that_is_covered(name: str) -> None:
+    """Uncovered texels hold rubbish, and none of it may get in."""
+    tree = tree_of(name)
+    shuffle(tree, np.random.default_rng(5), rounds=3)
+    nodes = tree.nodes
+    values = np.where((nodes.surfaces.face >= 0)[..., None], 0.375, 1e6).astype(np.float32)
+    image, covered = collapse(nodes, values)
+    finest = int(nodes.leaves.level.max())
+    np.testing.assert_allclose(image[covered], 0.375, rtol=1e-6)
+    if name not in UNEVEN:  # rectangles of whole texels: what is covered is what the charts say
+        np.testing.assert_array_equal(covered, in_charts(nodes, image_places(nodes, finest), 0.0))
+
+
+def test_one_level_collapses_to_itself() -> None:
+    tree = tree_of("walls")
+    grow(tree, np.flatnonzero(tree.nodes.used).tolist(), depth=1)
+    nodes = tree.nodes
+    assert set(nodes.leaves.level[nodes.used]) == {1}
+    values = np.random.default_rng(1).random((nodes.tiles, TILE, TILE, 3), np.float32)
+    image, covered = collapse(nodes, values)
+    rows, columns = (side // TILE for side in image.shape[:2])
+    tiled = image.reshape(rows, TILE, columns, TILE, 3).swapaxes(1, 2)
+    mine = nodes.used
+    seen = nodes.surfaces.face[mine] >= 0
+    np.testing.assert_array_equal(tiled[nodes.leaves.y[mine], nodes.leaves.x[mine]][seen], values[mine][seen])
+    assert covered.sum() == seen.sum()
+
+
+def test_fields_of_a_change_are_as_long_as_each_other() -> None:
+    tree = tree_of("ball")
+    change = grow(tree, np.flatnonzero(tree.nodes.used).tolist())
+    assert change is not None
+    lengths = {len(getattr(change, f.name)) for f in dataclasses.fields(change) if f.name != "split"}
+    assert len(lengths) == 1 and change.corner.shape[1] == 2
