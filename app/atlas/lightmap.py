@@ -28,6 +28,7 @@ from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.scene.model import F32, F64, Material, Scene
 
 STORAGE = {"rgba32f": "f4", "rgba16f": "f2", "fixed8": "f1"}  # name: moderngl dtype
+HALF_HEADROOM = 64.0  # of 65504, the largest half float: H may be many times the largest exitance
 LIGHT = ("t_irradiance", "t_residual")
 _DTYPES = {"f4": np.float32, "f2": np.float16, "f1": np.uint8}
 _BYTES = {"f4": 4, "u4": 4, "f2": 2, "f1": 1}
@@ -127,9 +128,14 @@ class Lightmap:
         )
         self.gpu.release_all(before)
 
+    def exceeds_half(self, materials: tuple[Material, ...]) -> bool:
+        """Whether these emit so much more than what H and r are stored relative to that half floats would soon end."""
+        return np.pi * max((max(m.emission) for m in materials), default=0.0) > HALF_HEADROOM * self.unit
+
     def scale(self, factor: F64, target: Framebuffer | None = None) -> None:
         """Multiply H and r, or what ``target`` holds, by a factor (3,) for each channel."""
-        self._scale.draw(target or self.light_target, uniforms={"u_factor": tuple(factor)}, blend="multiply")
+        shares = 1.0 if target else float(factor.mean())  # light's alpha sums power, see receive.frag.glsl
+        self._scale.draw(target or self.light_target, uniforms={"u_factor": (*factor, shares)}, blend="multiply")
 
     def common_factor(self, materials: tuple[Material, ...]) -> F64:
         """(3,) a: of all factors for the light that is there, the one that leaves least to shoot for other emissions, min over a
@@ -178,9 +184,10 @@ class Lightmap:
     def enlarge(self) -> None:
         """Take over a node set that has got more rows. The light stays."""
         old = {name: self._textures[name] for name in LIGHT}
-        others = [name for name in self.nodes.arrays if name in self._textures]
-        self.gpu.release_all(*(self._textures.pop(name) for name in others))
-        self._textures |= {name: self._upload(array) for name, array in self.nodes.arrays.items()}
+        arrays = self.nodes.arrays
+        self.gpu.release_all(*(self._textures.pop(name) for name in arrays))
+        self._textures |= {name: self._upload(array) for name, array in arrays.items()}
+        self._textures["t_materials"].write(self.nodes.material_table(self.scene).tobytes())  # as edited
         self.gpu.release_all(*self._targets)
         self._make_light()
         for name, target in zip(LIGHT, (self.gpu.target(self._textures[n]) for n in LIGHT), strict=True):

@@ -70,8 +70,7 @@ class Quadtree:
         return len(self._free)
 
     def splits(self, slots: Iterable[int], depth: int) -> list[int]:
-        """Those of these leaves above ``depth``, and the coarser neighbours that must split with them: coarse ones first, as
-        many as there is room for."""
+        """Those of these leaves above ``depth``, and the coarser neighbours that must split with them: coarse ones first."""
         wanted: dict[int, None] = {}
         pending = list(slots)
         while pending:
@@ -81,7 +80,7 @@ class Quadtree:
             wanted[slot] = None
             pending.extend(self._coarser_neighbours(slot))
         by_level = sorted(wanted, key=lambda s: self.tile(s)[0])
-        return by_level[: self.room // 4]
+        return by_level
 
     def uneven(self) -> list[int]:
         """Leaves that are too coarse for a neighbour."""

@@ -21,8 +21,9 @@ LAYERS = [
     {"session"},
     {"ui"},
     {"headless_ui", "console"},
-    {"window", "info", "doctor", "bench"},
+    {"window", "info", "doctor"},
     {"headless"},
+    {"bench"},
     {"cli"},
     {"__main__"},
 ]

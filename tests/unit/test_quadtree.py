@@ -218,14 +218,12 @@ def test_slots_are_used_again() -> None:
     assert sorted(tree.slots.values()) == np.flatnonzero(tree.nodes.used).tolist()
 
 
-def test_no_more_split_than_there_is_room_for() -> None:
+def test_coarse_leaves_split_first() -> None:
+    """So that a list cut short leaves the tree balanced."""
     tree = tree_of("table")
-    tree._free = tree._free[:9]
-    splits = tree.splits(np.flatnonzero(tree.nodes.used).tolist(), DEPTH)
-    assert len(splits) == 2
-    tree.split(splits)
-    tree._free = []
-    assert tree.splits(np.flatnonzero(tree.nodes.used).tolist(), DEPTH) == []
+    tree.split(tree.splits([min(tree.slots.values())], DEPTH))
+    levels = [tree.tile(slot)[0] for slot in tree.splits(np.flatnonzero(tree.nodes.used).tolist(), DEPTH)]
+    assert levels == sorted(levels) and len(set(levels)) > 1
 
 
 def test_merging_needs_no_room() -> None:

@@ -1,7 +1,7 @@
 // Multiplies what is there, H and r: light is linear in what emits it. Blended.
-uniform vec3 u_factor;
+uniform vec4 u_factor;
 
 layout(location = 0) out vec4 out_irradiance;
 layout(location = 1) out vec4 out_residual;
 
-void main() { out_irradiance = out_residual = vec4(u_factor, 1.0); }
+void main() { out_irradiance = out_residual = u_factor; }

@@ -17,6 +17,7 @@ flat in vec3 v_normal;
 flat in float v_facet;
 flat in vec3 v_albedo;
 #else
+uniform int u_own;  // whether patches are still where they shot from
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
 uniform sampler2D t_materials;
@@ -56,7 +57,7 @@ void main() {
         vec2 FV = received(position, normal, facet, s, shot);
 #if !FLAT
         // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it
-        bool own = all(lessThan(uvec2(texel_px - s.patch_px), uvec2(s.size_px)));
+        bool own = u_own != 0 && all(lessThan(uvec2(texel_px - s.patch_px), uvec2(s.size_px)));
         FV = own || texel.area <= 0.0 ? vec2(0.0) : FV;
 #endif
         light += s.exitance * FV.x * FV.y;

@@ -22,18 +22,20 @@ from numpy.typing import NDArray
 
 from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap, receiver_meshes
-from app.atlas.quadtree import Change, Quadtree
+from app.atlas.quadtree import Change, Quadtree, Tile
 from app.atlas.regrow import QUAD_FORMAT, Regrowth, corners, quads
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, ReadBack, Texture
 from app.scene.model import Material
 from app.solvers.shooting.log import ShotLog
 from app.solvers.shooting.options import TREE, ShootingOptions
+from app.solvers.shooting.stages import BATCH
 from app.solvers.shooting.uniform import UniformShooting
 
 # A second difference of smooth light grows fourfold when texels double: leaves merge below a quarter of the threshold, and half
 # of that again, so that what was merged is not split at once.
 MERGE = 1 / 8
 REDO_AFTER = 4  # times as many shots as at the last time, so that all redoing costs a third of all shots
+MERGE_AFTER = 4  # times as many shots as when it was split, a leaf may merge
 LOOK_AFTER = 32  # shots between two judgements of a tree that did not change at the last
 PER_SHOT = 8  # leaves that split or families that merge, for each shot of a step: bounded work for a frame
 
@@ -58,6 +60,7 @@ class AdaptiveShooting(UniformShooting):
         self._redone: _Redo | None = None
         self._redone_at = 0  # shots in the log when they were last made again
         self._look_at = 0
+        self._split_at: dict[Tile, int] = {}  # shots in the log when a leaf was split
         self._asked = False  # the user turned a knob of the tree: do not wait
         self._calm = False  # the last look at the leaves found nothing to do
         super().__init__(gpu, lightmap, options)
@@ -71,12 +74,14 @@ class AdaptiveShooting(UniformShooting):
         self._drop_judged()
         self._fresh.clear()
         self._calm, self._redone_at, self._look_at = False, 0, 0
+        self._split_at.clear()
         super().reset()
 
     def set_options(self, options: ShootingOptions) -> None:
         self._calm = False
         if options.replace(**{name: getattr(self.options, name) for name in TREE}) == self.options:
             self.options, self._asked = options, True
+            self._split_at.clear()
         else:
             super().set_options(options)
 
@@ -103,7 +108,7 @@ class AdaptiveShooting(UniformShooting):
         elif not done:
             made = super().step(shots)
         if self._redone is None and (not self._calm or done or self._log.count >= self._look_at):
-            self._look(PER_SHOT * shots)
+            self._look(PER_SHOT * min(shots, BATCH))
             self._look_at = self._log.count + LOOK_AFTER
         return made or shots
 
@@ -160,30 +165,39 @@ class AdaptiveShooting(UniformShooting):
         rough, smooth = self._opinion(judged)
         grows = np.flatnonzero(nodes.used & (level < options.depth) & rough)
         grows = grows[np.argsort(-judged[grows, 0])][:most]
+        self.note = None
         splits = self.tree.splits(grows.tolist(), options.depth)[:most]
+        self._make_room(4 * len(splits))
+        splits = splits[: self.tree.room // 4]
         if splits:
-            self._make_room(4 * len(splits))
-            self.note = None
-            splits = splits[: self.tree.room // 4]
-        if splits:
+            self._split_at |= {self.tree.tile(slot): self._log.count for slot in splits}
             self._apply(self.tree.split(splits))
             return True
-        families = self.tree.merges(np.flatnonzero(nodes.used & ((level > options.depth) | smooth)))[:most]
+        families = self.tree.merges(np.flatnonzero(nodes.used & ((level > options.depth) | smooth)))
+        families = [family for family in families if self._may_merge(family)][:most]
         if families:
             self._apply(self.tree.merge(families))
             return True
         return False
+
+    def _may_merge(self, family: list[int]) -> bool:
+        """A jump between two leaves is in neither: what was split for it would merge and split for ever. So a family merges only
+        when many more shots have been made since."""
+        level, x, y = self.tree.tile(family[0])
+        since = self._split_at.get((level - 1, x >> 1, y >> 1))
+        return level > self.options.depth or since is None or self._log.count >= MERGE_AFTER * since
 
     def _make_room(self, slots: int) -> None:
         """Have so many free slots, if the budget allows; else say so."""
         nodes = self.lightmap.nodes
         if self.tree.room >= slots:
             return
-        most = self.options.budget // TILE**2
+        longest = self.gpu.limits.max_texture // (TILE + 2)  # slots in a column of display texels
+        most = min(self.options.budget // TILE**2, nodes.columns * longest)
         wanted = max(nodes.tiles * 3 // 2, nodes.tiles + slots)
         if min(wanted, most) > nodes.tiles:
             self._end_redo()
-            self._drop_reports()
+            self.poll(wait=True)
             self.tree.enlarge(min(wanted, most))
             self.lightmap.enlarge()
             self._make_targets()
@@ -220,7 +234,9 @@ class AdaptiveShooting(UniformShooting):
         gone, came = (change.parents, change.children) if change.split else (change.children, change.parents)
         inherits = change.split or not self._fresh.isdisjoint(gone.tolist())
         self._fresh.difference_update(gone.tolist())
-        if inherits:
+        if (
+            inherits and self.lightmap.storage != "fixed8"
+        ):  # that holds no negative correction: leaves keep what they inherit
             self._fresh.update(came.tolist())
 
     # -- earlier shots into fresh leaves -------------------------------------------------------------------------------
@@ -267,13 +283,14 @@ class AdaptiveShooting(UniformShooting):
             shots = min(self._log.recall(self.buffers, redo.next), redo.end - redo.next)
             for first, some in self.stages.groups(shots):
                 self._see(first, some)
-                self._receive(self._correction_target, first, some, blend="add", meshes=redo.receivers)
+                self._receive(self._correction_target, first, some, blend="add", meshes=redo.receivers, own=False)
             redo.next += shots
             return shots
         self._put_right(redo)
         self._fresh.difference_update(redo.slots.tolist())
         self._redone_at, self._asked = redo.end, False
         self._end_redo()
+        self.poll(wait=True)  # or an older report would follow
         self.report = replace(self.report, residual=self.unshot_share())
         return 0
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.scene.model import F64
-from app.solvers.shooting.stages import BATCH, BLOCK_ROWS, ShotBuffers, release_all
+from app.solvers.shooting.stages import BATCH, BLOCK_ROWS, ShotBuffers
 
-FIRST_ROOM = 1024  # shots; doubled when full
+PAGE = 2048  # shots in one texture; as many textures as it takes
 EXITANCE_ROW = 5  # of a shooter's record, see shooter.glsl
 
 
@@ -18,45 +16,47 @@ class ShotLog:
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
         self._copy, self._scale = Pass(gpu, "common/copy"), Pass(gpu, "lightmap/scale")
+        self._pages: list[tuple[Texture, Framebuffer]] = []
         self.count = 0
-        self._make(FIRST_ROOM)
-
-    def _make(self, room: int) -> None:
-        self._rows = self._gpu.texture((BLOCK_ROWS, room), 4, "f4")
-        self._target = self._gpu.target(self._rows)
-        self._target.clear()
 
     def add(self, buffers: ShotBuffers, shots: int) -> None:
         """Append the first shots of the batch in ``buffers``."""
-        if self.count + shots > self._rows.height:
-            target, rows = self._target, self._rows
-            self._make(2 * rows.height)
-            self._draw(self._target, rows, (0, 0), (0, 0, *rows.size))
-            self._gpu.release_all(target, rows)
-        self._draw(self._target, buffers.shooters, (0, -self.count), (0, self.count, BLOCK_ROWS, shots))
+        for page, row, first, some in _pieces(self.count, shots):
+            if page == len(self._pages):
+                rows = self._gpu.texture((BLOCK_ROWS, PAGE), 4, "f4")
+                self._pages.append((rows, self._gpu.target(rows)))
+            self._draw(self._pages[page][1], buffers.shooters, first - row, (0, row, BLOCK_ROWS, some))
         self.count += shots
 
     def recall(self, buffers: ShotBuffers, first: int) -> int:
         """Make the batch in ``buffers`` of the shots from ``first`` on; how many."""
         shots = min(BATCH, self.count - first)
-        self._draw(buffers.shooter_target, self._rows, (0, first), (0, 0, BLOCK_ROWS, shots))
+        for page, row, start, some in _pieces(first, shots):
+            self._draw(buffers.shooter_target, self._pages[page][0], row - start, (0, start, BLOCK_ROWS, some))
         buffers.shooter_target.read_into(buffers.shooter_blocks, components=4, dtype="f4")
         return shots
 
     def scale(self, factor: F64) -> None:
         """All shots were stronger by a factor (3,) for each channel."""
-        where = (EXITANCE_ROW, 0, 1, max(self.count, 1))
-        self._scale.draw(
-            self._target, uniforms={"u_factor": tuple(np.asarray(factor))}, blend="multiply", viewport=where
-        )
+        for _, target in self._pages:
+            self._scale.draw(
+                target, uniforms={"u_factor": (*factor, 1.0)}, blend="multiply", viewport=(EXITANCE_ROW, 0, 1, PAGE)
+            )
 
     def clear(self) -> None:
         self.count = 0
 
     def release(self) -> None:
-        release_all(self._gpu, self)
+        self._gpu.release_all(*(resource for page in self._pages for resource in page))
+        self._pages.clear()
 
-    def _draw(
-        self, target: Framebuffer, source: Texture, offset: tuple[int, int], viewport: tuple[int, int, int, int]
-    ) -> None:
-        self._copy.draw(target, textures={"t_source": source}, uniforms={"u_offset_px": offset}, viewport=viewport)
+    def _draw(self, target: Framebuffer, source: Texture, offset: int, viewport: tuple[int, int, int, int]) -> None:
+        uniforms = {"u_offset_px": (0, offset)}
+        self._copy.draw(target, textures={"t_source": source}, uniforms=uniforms, viewport=viewport)
+
+
+def _pieces(first: int, shots: int) -> list[tuple[int, int, int, int]]:
+    """(page, its row, which of the shots, how many) of shots that may lie on two pages."""
+    page, row = divmod(first, PAGE)
+    here = min(shots, PAGE - row)
+    return [(page, row, 0, here)] + ([(page + 1, 0, here, shots - here)] if shots > here else [])

@@ -122,11 +122,17 @@ class UniformShooting:
         """Other albedos and emissions: the light that is there stays, and the difference is shot, negative too [Chen90]. Begins
         again where nothing is left to emit, and where the storage holds no negative light."""
         self.finish()
-        if self.lightmap.storage == "fixed8" or not any(m.emits for m in materials) or self._emitted.sum() <= 0:
+        overflows = self.lightmap.storage == "rgba16f" and self.lightmap.exceeds_half(materials)
+        if (
+            overflows
+            or self.lightmap.storage == "fixed8"
+            or not any(m.emits for m in materials)
+            or self._emitted.sum() <= 0
+        ):
             self.lightmap.set_materials(materials)
             self.reset()
             return
-        self._drop_reports()
+        self.poll(wait=True)
         factor = self.lightmap.common_factor(materials)
         if (factor != 1).any():
             self.lightmap.scale(factor)
@@ -362,8 +368,11 @@ class UniformShooting:
         blend: str | None,
         meshes: Mapping[bool, Mesh] | None = None,
         rows: tuple[int, int, int, int] | None = None,
+        own: bool = True,
     ) -> None:
-        """The light of these shots on every texel that sees them, or on some receivers or rows only. [Coombe03, eq. 1]"""
+        """The light of these shots on every texel that sees them, or on some receivers or rows only. [Coombe03, eq. 1]
+
+        own: whether patches still are where they shot from, and do not light themselves."""
         lightmap = self.lightmap
         shaped = lightmap.textures("t_position_area", "t_normal_ids")
         meshes = lightmap.receivers if meshes is None else meshes
@@ -374,7 +383,8 @@ class UniformShooting:
             receive.draw(
                 target,
                 textures=textures if flat else textures | shaped,
-                uniforms={"u_size": lightmap.size, "u_first": first, "u_shots": shots},
+                uniforms={"u_size": lightmap.size, "u_first": first, "u_shots": shots}
+                | ({} if flat else {"u_own": int(own)}),
                 blocks=self._shooter_blocks,
                 mesh=meshes[flat],
                 blend=blend,
