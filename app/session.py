@@ -21,6 +21,7 @@ from app.gpu import Framebuffer, Gpu, Texture
 from app.history import History
 from app.loading import Loaded, Loading, load
 from app.opening import prepare
+from app.pacing import Pace
 from app.picking import Picked, picked_from_hit
 from app.projections import PROJECTIONS
 from app.render.camera import CameraView
@@ -35,8 +36,6 @@ from app.solvers import DEFAULT_SOLVER, EnergyBook, ShootingOptions, Solver
 from app.solving import not_finite, share_done, solve
 from app.stats import Stats, Stop, stats_of
 
-LONG_FRAME = 0.07  # seconds from one advance to the next: a frame of 100 ms would be felt as a halt
-MOST_BANDS = 16
 BOOKS_SECONDS = 0.5  # between two looks at the energy book while shooting, at least: it reads every texel
 BOOKS_SHARE = 0.05  # of the time may go into it
 SLOW_BOOKS, RARE_SECONDS = 0.03, 3.0  # a look that takes longer than this is felt, and waits at least so long
@@ -73,8 +72,7 @@ class Session:
         self.load_seconds: dict[str, float] = {}
         self.history = History()
         self.interrupted = False
-        self.seconds = self._last_advance = 0.0
-        self._batch = self._bands = 1
+        self.seconds, self._pace = 0.0, Pace(gpu)
         self._books: EnergyBook
         self._books_due = self._quiet_after = 0.0
         self._settled, self._busy, self._opened = True, False, False
@@ -215,45 +213,10 @@ class Session:
         has already done something long."""
         if not self._opened or self._busy or not self.shooting_goes_on:
             return 0
-        made, start = 0, time.perf_counter()
-        if shots == 1 and self._pieces(start) > 1:
-            return self._advance_some(start, budget_ms)
-        while made < shots:
-            made += self.shoot(min(shots - made, self._batch))
-            if made < shots:
-                self.gpu.ctx.finish()
-                spent = (time.perf_counter() - start) * 1e3
-                self._batch = max(1, int((budget_ms - spent) / (spent / made)))
-                if spent >= budget_ms:
-                    break
-        self._clock()
-        return made
-
-    def _pieces(self, now: float) -> int:
-        """Into how many bands a shot must be cut for frames to stay short: more after a long frame, fewer after a short one."""
-        if self._last_advance:
-            frame = now - self._last_advance
-            if frame > LONG_FRAME:
-                self._bands = min(2 * self._bands, MOST_BANDS)
-            elif frame < 0.6 * LONG_FRAME:
-                self._bands = max(self._bands // 2, 1)
-        return self._bands
-
-    def _advance_some(self, start: float, budget_ms: float) -> int:
-        """Parts of one shot, as many as the budget allows."""
         self._settled = False
-        whole = False
-        while not whole and (time.perf_counter() - start) * 1e3 < budget_ms:
-            whole = self.solver.step_part(self._bands)
-            self.gpu.ctx.finish()
-        self._clock()
-        return int(whole)
-
-    def _clock(self) -> None:
-        """Seconds of solving, from one advance to the next."""
-        now = time.perf_counter()
-        self.seconds += now - self._last_advance if self._last_advance else 0.0
-        self._last_advance = now
+        made = self._pace.advance(self.solver, budget_ms, shots)
+        self.seconds += self._pace.lap()
+        return made
 
     def shoot_once(self) -> None:
         """One shot, also when paused."""
@@ -316,26 +279,26 @@ class Session:
 
     def _begin(self, books: EnergyBook) -> None:
         """books: with nothing shot."""
-        self.seconds = self._last_advance = 0.0
-        self._batch, self._bands, self._books = 1, 1, books
+        self.seconds, self._books = 0.0, books
+        self._pace.begin()
         self.gpu.timers.reset()
         self._books_due, self._quiet_after = time.perf_counter() + BOOKS_SECONDS, 0.0
         self._settled = True
         self.history = History()
         self.history.add(0, 0.0, self.solver.report.residual, 0.0)
 
-    def hear(self, *, books: bool = True) -> None:
-        """Take in what the solver reports; the energy book now and then, and once when shooting has stopped. Raises
-        NotFiniteError and pauses."""
+    def hear(self, *, books: bool = True, wait: bool = False) -> None:
+        """Take in what the solver reports, with ``wait`` up to its last step; the energy book now and then, and once when
+        shooting has stopped. Raises NotFiniteError and pauses."""
         before = self.solver.report.shots
-        report = self.solver.poll()
+        report = self.solver.poll(wait=wait)
         if self.running and not np.isfinite(report.residual):
             self.running = False
             raise not_finite(self)
         now = time.perf_counter()
         books = books and now >= self._quiet_after
         if not self.shooting_goes_on:
-            self._last_advance = 0.0
+            self._pace.pause()
             if books and not self._settled:
                 self._busy = True
                 self.settle()

@@ -62,7 +62,8 @@ def _shoot(session: Session, stop: Stop, start: float, progress: Callable[[Stats
     while not session.converged:
         left = NO_LIMIT if stop.shots is None else stop.shots - solver.shots
         if left <= 0 and stop.shots is not None:
-            left = stop.shots - solver.poll(wait=True).shots  # some of the issued ones were too weak
+            session.hear(books=False, wait=True)  # some of the issued ones were too weak
+            left = stop.shots - solver.shots
         spent = time.perf_counter() - start
         if left <= 0 or (stop.seconds is not None and spent >= stop.seconds):
             break

@@ -32,6 +32,15 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "display: needs an X server or Xvfb")
 
 
+SESSION_GPU = pytest.StashKey["Gpu"]()
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Commands that tests run in this process make a context of their own: go back to the shared one, if there is one yet."""
+    if (gpu := item.config.stash.get(SESSION_GPU, None)) is not None:
+        gpu.ctx.__enter__()
+
+
 @pytest.fixture(scope="session")
 def _gpu(request: pytest.FixtureRequest) -> Iterator[Gpu]:
     from app.gpu import headless_gpu
@@ -39,6 +48,7 @@ def _gpu(request: pytest.FixtureRequest) -> Iterator[Gpu]:
     gpu = headless_gpu()
     if request.config.getoption("--gl41"):
         assert gpu.limits.gl == 410, f"--gl41 asked for 4.1, but this driver gives {gpu.limits.gl}"
+    request.config.stash[SESSION_GPU] = gpu
     yield gpu
     gpu.release()
 

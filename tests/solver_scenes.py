@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
 from app.atlas.node_set import NodeSet
 from app.atlas.parametrize import parametrize
@@ -15,7 +16,9 @@ from app.atlas.quadtree import quadtree_nodes
 from app.gpu import Gpu
 from app.scene.model import F32, F64, Material, Scene
 from app.solvers import SOLVERS, EnergyBook, ShootingOptions, UniformShooting
-from app.solvers.shooting.uniform import BATCH, Audit
+from app.solvers.shooting.options import MAX_LEVEL
+from app.solvers.shooting.shot import Audit
+from app.solvers.shooting.stages import BATCH, ROOT_LEVEL
 
 UNIT_SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])  # faces +z
 ENOUGH = 20_000  # shots: a solve that needs more does not converge
@@ -135,10 +138,12 @@ class Solution:
         """Until converged and, on quadtrees, until the tree has stopped growing and holds all shots."""
         for _ in range(steps):
             if self.solver.report.residual <= self.solver.options.residual and self.solver.settled:
-                return
+                break
             self.solver.step(BATCH)
             self.solver.poll()
-        raise AssertionError("did not settle")
+        else:
+            raise AssertionError("did not settle")
+        self.solver.poll(wait=True)
 
     def light_up(self) -> None:
         """Give every texel the same residual, so that any patch can shoot."""
@@ -146,12 +151,12 @@ class Solution:
         self.lightmap.texture("t_residual").write(np.ones((height, width, 4), np.float32).tobytes())
 
     def patches(self) -> NDArray[np.int64]:
-        """(p, 2) column and row of every patch of the shooting level that covers a surface."""
-        level = self.solver.options.level
-        area = self.lightmap.nodes.image_from_tiles(self.lightmap.nodes.surfaces.area[..., None])[..., 0]
-        height, width = (side >> level for side in area.shape)
-        covered = area.reshape(height, 1 << level, width, 1 << level).sum((1, 3)) > 0
-        return np.argwhere(covered)[:, ::-1]
+        """(p, 2) column and row of the lower texel of every patch of the shooting level that covers a surface."""
+        nodes, found = self.lightmap.nodes, []
+        for slot, edge in enumerate(self.solver.patch_edges().tolist()):
+            inside = nodes.surfaces.area[slot].reshape(TILE // edge, edge, TILE // edge, edge).sum((1, 3)) > 0
+            found.append(np.argwhere(inside)[:, ::-1] * edge + nodes.corner(slot))
+        return np.concatenate(found)
 
     def audits(self) -> list[Audit]:
         """What becomes of a shot from each patch. Spoils the residual."""
@@ -170,19 +175,21 @@ def begin(
     texels: int | None = None,
     density: float | None = None,
     solver: str = "shooting",
-    quadtree: bool = False,
     **options: object,
 ) -> Solution:
-    """The scene before the first shot. quadtree: on leaves that come and go. options: of ShootingOptions."""
+    """The scene before the first shot. options: of ShootingOptions. Where leaves come and go, texels and density are those of the
+    roots, which uniform texels are as fine as, and shooting levels count from there."""
     charts = parametrize(scene, texels=texels, density=density)
-    shooting = ShootingOptions().replace(**options)
-    nodes = quadtree_nodes(scene, charts) if quadtree else NodeSet(scene, charts)
+    shooting = ShootingOptions(depth=1).replace(**options)
+    nodes = quadtree_nodes(scene, charts) if SOLVERS[solver].adaptive else NodeSet(scene, charts)
+    if SOLVERS[solver].adaptive:
+        shooting = shooting.replace(level=min(shooting.level + ROOT_LEVEL, MAX_LEVEL))
     lightmap = Lightmap(gpu, nodes, storage=shooting.storage)
-    return Solution(lightmap, SOLVERS["adaptive" if quadtree else solver](gpu, lightmap, shooting))
+    return Solution(lightmap, SOLVERS[solver](gpu, lightmap, shooting))
 
 
 def solve(gpu: Gpu, scene: Scene, **options: object) -> Solution:
-    """``begin`` and shoot until converged."""
+    """``begin`` and shoot until converged and settled."""
     solution = begin(gpu, scene, **options)  # type: ignore[arg-type]
-    solution.shoot()
+    solution.settle()
     return solution

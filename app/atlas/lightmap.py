@@ -175,10 +175,12 @@ class Lightmap:
             texture = self._textures[name]
             for slot, tile in zip(slots.tolist(), tiles, strict=True):
                 texture.write(np.ascontiguousarray(tile).tobytes(), viewport=(*self.nodes.corner(slot), TILE, TILE))
-        for name, table in self.nodes.slot_tables().items():
+        for name, table in self.nodes.slot_tables.items():
             self._textures[name].write(table.tobytes())
         self.gpu.release_all(*self.receivers.values())
         self.receivers = receiver_meshes(self.gpu, self.nodes.flat_spans, self.nodes.shaped_tiles)
+        if self.nodes.emission_tiles is not None:  # finer texels emit other shares of an image
+            self.__dict__.pop("_emission_weights", None)
         self.version += 1
 
     def enlarge(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -97,6 +98,7 @@ class NodeSet:
         self._texels = _stretched(self._texels, more, 0)
         self.tiles, self.rows = slots, max(1, -(-slots // self.columns))
         self.size = (self.columns * TILE, self.rows * TILE)
+        self.__dict__.pop("slot_tables", None)
 
     # -- leaves that come and go ---------------------------------------------------------------------------------------
 
@@ -111,6 +113,7 @@ class NodeSet:
         self._texels[slots] = (tiles.surfaces.face >= 0).sum((1, 2))
         self._kinds[slots] = tile_kinds(self._tile_texels(tiles), self._facet_material)
         self.used[slots] = True
+        self.__dict__.pop("slot_tables", None)
         self.flat_spans, self.shaped_tiles = self.receivers_of(np.flatnonzero(self.used))
 
     def receivers_of(self, slots: NDArray[np.int64]) -> tuple[F32, F32]:
@@ -120,9 +123,15 @@ class NodeSet:
     def free(self, slots: NDArray[np.int64]) -> None:
         """Let these slots hold nothing. The receivers follow with the next ``put``."""
         self.used[slots] = False
+        self.__dict__.pop("slot_tables", None)
         self.leaves.level[slots] = self.leaves.x[slots] = self.leaves.y[slots] = -1
         self.surfaces.face[slots] = -1
         self.surfaces.area[slots] = 0.0
+
+    @property
+    def slots_in_use(self) -> int:
+        """Up to the last that holds a leaf."""
+        return int(np.flatnonzero(self.used)[-1]) + 1 if self.used.any() else 0
 
     @property
     def texel_count(self) -> int:
@@ -200,10 +209,11 @@ class NodeSet:
                 out[name] = np.concatenate([tiles[slots], np.ones_like(tiles[slots][..., :1])], -1).astype(np.float16)
         return out
 
+    @functools.cached_property
     def slot_tables(self) -> dict[str, Array]:
-        """Tables that follow the leaves. t_pages (H, W, 1) u32: the slot, from 1, of each cell of 16×16 texels of the finest
-        level; t_leaves (rows, columns, 4) f32: x, y [tiles of its level] and size of a texel [texels of level 0] of each
-        slot, 0 where it is free."""
+        """Tables that follow the leaves, made once for each change. t_pages (H, W, 1) u32: the slot, from 1, of each cell of
+        16×16 texels of the finest level; t_leaves (rows, columns, 4) f32: x, y [tiles of its level] and size of a texel [texels
+        of level 0] of each slot, 0 where it is free."""
         width, height = ((side << self.depth) // TILE for side in self.charts.size)
         pages = np.zeros((height, width, 1), np.uint32)
         for level in range(self.depth + 1):
@@ -217,7 +227,7 @@ class NodeSet:
         return {"t_pages": pages, "t_leaves": leaves.reshape(self.rows, self.columns, 4)}
 
     def _tables(self) -> dict[str, Array]:
-        return self.slot_tables() | {"t_facets": self._facet_table(), "t_materials": self.material_table(self.scene)}
+        return self.slot_tables | {"t_facets": self._facet_table(), "t_materials": self.material_table(self.scene)}
 
     def _facet_table(self) -> F32:
         """(rows, TABLE_WIDTH, 4): per facet, from 1, two entries: ∂p/∂u and ∂p/∂v per texel of level 0."""

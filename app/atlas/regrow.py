@@ -18,15 +18,16 @@ QUAD_FORMAT = {"in_rect": "4f", "in_from": "2f"}
 class Regrowth:
     """The passes; what a change needs besides goes with it."""
 
-    def __init__(self, gpu: Gpu) -> None:
-        self._gpu = gpu
-        self._lift = Pass(gpu, "lightmap/lift")
-        self._push = Pass(gpu, "lightmap/push")
-        self._pull = Pass(gpu, "lightmap/pull")
+    def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
+        self._gpu, self._lightmap = gpu, lightmap
+        defines = lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
+        self._lift, self._push, self._pull = (
+            Pass(gpu, f"lightmap/{name}", defines=defines, vertex="common/rects") for name in ("lift", "push", "pull")
+        )
 
-    def apply(self, lightmap: Lightmap, change: Change) -> None:
+    def apply(self, change: Change) -> None:
         """Bring the lightmap's textures up to date with its node set, where ``change`` has just been made."""
-        gpu, split = self._gpu, change.split
+        gpu, lightmap, split = self._gpu, self._lightmap, change.split
         old, new = (change.parents, change.children) if split else (change.children, change.parents)
         lifted, nth = np.unique(old, return_inverse=True)
         rows = -(-len(lifted) // LIFTED_COLUMNS)
@@ -35,11 +36,11 @@ class Regrowth:
         aside = np.stack([place % LIFTED_COLUMNS, place // LIFTED_COLUMNS], 1) * TILE
         textures = [gpu.texture(size, 4, "f4"), gpu.texture(size, 4, "f4"), gpu.texture(size, 1, "f4")]
         target = gpu.target(*textures)
-        surfaces = lightmap.textures("t_position_area", "t_irradiance", "t_residual")
-        self._draw(self._lift, target, quads(aside, TILE, corners(lightmap, lifted)), surfaces)
+        light = lightmap.textures("t_position_area", "t_irradiance", "t_residual")
+        self._draw(self._lift, target, quads(aside, TILE, corners(lightmap, lifted)), light)
         lightmap.write_tiles(np.unique(np.concatenate([old, new])))
 
-        lights = dict(zip(("t_lifted_irradiance", "t_lifted_residual", "t_lifted_area"), textures, strict=True))
+        lights = dict(zip(("t_lifted_irradiance", "t_lifted_shot", "t_lifted_area"), textures, strict=True))
         if split:
             pushed = quads(corners(lightmap, new), TILE, aside[nth] + change.corner * (TILE // 2))
             self._draw(self._push, lightmap.light_target, pushed, lights | lightmap.textures("t_position_area"))
@@ -50,7 +51,9 @@ class Regrowth:
 
     def _draw(self, how: Pass, target: Framebuffer, rects: F32, textures: dict[str, Texture]) -> None:
         mesh = Mesh(self._gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)
-        how.draw(target, textures=textures, uniforms={"u_size": target.size}, mesh=mesh)
+        materials = self._lightmap.textures("t_normal_ids", "t_materials", "t_albedo", "t_emission")
+        uniforms = {"u_size": target.size, "u_unit": self._lightmap.unit}
+        how.draw(target, textures=textures | materials, uniforms=uniforms, mesh=mesh)
         self._gpu.release_all(mesh)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import moderngl
 
 from app.gpu.context import Gpu
-from app.gpu.shader import ShaderError
+from app.gpu.shader import FULLSCREEN, ShaderError
 
 GL_CLIP_DISTANCE0 = 0x3000
 BLEND: dict[str, Any] = {
@@ -33,15 +33,17 @@ class Pass:
         *,
         defines: Mapping[str, object] | None = None,
         slots: Mapping[str, str] | None = None,
+        vertex: str = FULLSCREEN,
         label: str | None = None,
     ) -> None:
-        self.gpu, self.name, self.label = gpu, name, label or name
+        """vertex: the vertex shader, where the program has none of its own."""
+        self.gpu, self.name, self.label, self._vertex = gpu, name, label or name, vertex
         self._defines, self._slots = dict(defines or {}), dict(slots or {})
         self._generation = -1
         self._bind()
 
     def _bind(self) -> None:
-        self.program = self.gpu.shaders.program(self.name, self._defines, self._slots)
+        self.program = self.gpu.shaders.program(self.name, self._defines, self._slots, self._vertex)
         self._generation = self.gpu.shaders.generation
         members: dict[str, Any] = {n: self.program[n] for n in self.program}
         self._blocks = {n: m for n, m in members.items() if isinstance(m, moderngl.UniformBlock)}

@@ -26,6 +26,7 @@ MEMBERS: dict[type, str] = {
     moderngl.Uniform: "uniform",
     moderngl.Attribute: "attribute",
 }
+FULLSCREEN = "common/fullscreen"
 
 
 class ShaderError(Exception):
@@ -33,8 +34,9 @@ class ShaderError(Exception):
 
 
 class ShaderLibrary:
-    """Compiles programs by name: ``shooting/receive`` is ``receive.vert.glsl`` (or the full-screen triangle) and
-    ``receive.frag.glsl``. Keeps what it has compiled; ``reload`` compiles all again and keeps the last good program."""
+    """Compiles programs by name: ``shooting/receive`` is ``receive.vert.glsl`` (or a shared one, by default the full-screen
+    triangle) and ``receive.frag.glsl``. Keeps what it has compiled;
+    ``reload`` compiles all again and keeps the last good program."""
 
     def __init__(self, ctx: moderngl.Context, root: Path = SHADERS) -> None:
         self._ctx = ctx
@@ -44,12 +46,17 @@ class ShaderLibrary:
         self.generation = 0  # counts reloads: holders of vertex arrays rebuild when it moves
 
     def program(
-        self, name: str, defines: Mapping[str, object] | None = None, slots: Mapping[str, str] | None = None
+        self,
+        name: str,
+        defines: Mapping[str, object] | None = None,
+        slots: Mapping[str, str] | None = None,
+        vertex: str = FULLSCREEN,
     ) -> moderngl.Program:
-        """The program ``name`` with these defines and slots. Raises ShaderError."""
-        key = (name, tuple(sorted((defines or {}).items())), tuple(sorted((slots or {}).items())))
+        """The program ``name`` with these defines and slots; vertex: the shader to take if it has none of its own. Raises
+        ShaderError."""
+        key = (name, tuple(sorted((defines or {}).items())), tuple(sorted((slots or {}).items())), vertex)
         if key not in self._programs:
-            self._programs[key] = self._compile(name, defines or {}, slots or {})
+            self._programs[key] = self._compile(name, defines or {}, slots or {}, vertex)
         return self._programs[key]
 
     def attributeless(self, program: moderngl.Program) -> moderngl.VertexArray:
@@ -64,7 +71,7 @@ class ShaderLibrary:
         fresh: dict[tuple[object, ...], moderngl.Program] = {}
         try:
             for key, known in self._programs.items():
-                fresh[key] = self._compile(key[0], dict(key[1]), dict(key[2]))  # type: ignore[arg-type, call-overload]
+                fresh[key] = self._compile(key[0], dict(key[1]), dict(key[2]), key[3])  # type: ignore[arg-type, call-overload]
                 _check_same_names(str(key[0]), _names(known), _names(fresh[key]))
         except ShaderError:
             for program in fresh.values():
@@ -82,9 +89,11 @@ class ShaderLibrary:
         self._empty.clear()
         self._programs.clear()
 
-    def _compile(self, name: str, defines: Mapping[str, object], slots: Mapping[str, str]) -> moderngl.Program:
-        vertex_file = self._root / f"{name}.vert.glsl"
-        vertex = f"{name}.vert.glsl" if vertex_file.exists() else "common/fullscreen.vert.glsl"
+    def _compile(
+        self, name: str, defines: Mapping[str, object], slots: Mapping[str, str], shared: str
+    ) -> moderngl.Program:
+        own = self._root / f"{name}.vert.glsl"
+        vertex = f"{name if own.exists() else shared}.vert.glsl"
         unused = set(defines)
         stages = [Source(self._root, stage, defines, slots, unused) for stage in (vertex, f"{name}.frag.glsl")]
         if unused:

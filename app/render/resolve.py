@@ -13,6 +13,7 @@ import numpy as np
 from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
 from app.atlas.node_set import TABLE_WIDTH, NodeSet
+from app.atlas.quadtree import SIDES
 from app.gpu import Gpu, Mesh, Pass, Texture
 from app.render.develop import curve
 from app.render.false_colour import Scale
@@ -164,7 +165,7 @@ class DisplayTexels:
     def _place_table(self) -> Texture:
         """For each page of the atlas, the display texel of a place uv [texels of level 0]: z·uv + (x, y), RGBA32F."""
         nodes = self._lightmap.nodes
-        pages = nodes.slot_tables()["t_pages"][..., 0].astype(np.int64)
+        pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64)
         slot = np.maximum(pages - 1, 0)
         first = np.stack([slot % nodes.columns, slot // nodes.columns], -1) * BORDERED + 1
         tile = np.stack([nodes.leaves.x[slot], nodes.leaves.y[slot]], -1)
@@ -174,7 +175,6 @@ class DisplayTexels:
         return self._gpu.texture(pages.shape[::-1], 4, "f4", places.tobytes())
 
 
-SIDES = ((-1, 0), (1, 0), (0, -1), (0, 1))  # of a leaf, towards its neighbours
 EDGE_FORMAT = {"in_rect": "4f", "in_outward": "3f"}
 
 
@@ -184,7 +184,7 @@ def unequal_edges(nodes: NodeSet) -> F32:
         return np.zeros((0, 7), np.float32)
     slots = np.flatnonzero(nodes.used)
     level = nodes.leaves.level[slots]
-    pages = np.pad(nodes.slot_tables()["t_pages"][..., 0].astype(np.int64), 1)
+    pages = np.pad(nodes.slot_tables["t_pages"][..., 0].astype(np.int64), 1)
     side = 1 << (nodes.depth - level)  # pages along an edge of each leaf
     left, bottom = nodes.leaves.x[slots] * side + 1, nodes.leaves.y[slots] * side + 1
     corner = np.stack([slots % nodes.columns, slots // nodes.columns], 1) * BORDERED

@@ -17,7 +17,7 @@ from app.projections import PROJECTIONS
 from app.projections.occluders import halved
 from app.scene.load import load_scene
 from app.scene.model import F64
-from app.solvers.shooting.uniform import BATCH
+from app.solvers.shooting.stages import BATCH
 
 # One fragment per texel of the map: its weight and direction; how far each pair of functions is from inverting the other
 PROBE = """

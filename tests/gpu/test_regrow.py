@@ -37,7 +37,7 @@ class Forest:
     def __init__(self, gpu: Gpu, scene: Scene, *, texels: int = 3000, storage: str = "rgba32f") -> None:
         self.lightmap = Lightmap(gpu, quadtree_nodes(scene, parametrize(scene, texels=texels)), storage=storage)
         self.nodes, self.storage = self.lightmap.nodes, storage
-        self.tree, self.regrowth = Quadtree(self.nodes), Regrowth(gpu)
+        self.tree, self.regrowth = Quadtree(self.nodes), Regrowth(gpu, self.lightmap)
 
     def write(self, light: dict[str, F64]) -> None:
         """Tiles (slots, 16, 16, 3) [stored units] by name of the texture, nothing where nothing is covered."""
@@ -60,11 +60,11 @@ class Forest:
         if self.tree.room < 4 * len(used):
             self.tree.enlarge(self.nodes.tiles + 4 * len(used))
             self.lightmap.enlarge()
-        self.regrowth.apply(self.lightmap, self.tree.split(self.tree.splits(some.tolist(), DEPTH)))
+        self.regrowth.apply(self.tree.split(self.tree.splits(some.tolist(), DEPTH)))
 
     def shrink(self) -> None:
         families = self.tree.merges(np.flatnonzero(self.nodes.used))
-        self.regrowth.apply(self.lightmap, self.tree.merge(families))
+        self.regrowth.apply(self.tree.merge(families))
 
     @property
     def light(self) -> dict[str, F64]:
@@ -73,10 +73,17 @@ class Forest:
         return {n: t.astype(np.float64) / self.lightmap.unit for n, t in zip(LIGHT, read, strict=True)}
 
     @property
+    def shot(self) -> F64:
+        """R = E + ρH - r, what texels have shot (slots, 16, 16, 3) [stored units]."""
+        H, r = self.light.values()
+        E, rho = self.lightmap.emission().astype(np.float64), self.lightmap.albedo().astype(np.float64)
+        return np.asarray((E / self.lightmap.unit + rho * H - r) * (self.nodes.surfaces.area > 0)[..., None])
+
+    @property
     def energy(self) -> F64:
-        """Σ H A and Σ r A, (2, 3)."""
+        """Σ H A and Σ R A, (2, 3)."""
         area = self.nodes.surfaces.area[..., None]
-        return np.array([(tiles * area).sum((0, 1, 2)) for tiles in self.light.values()])
+        return np.array([(tiles * area).sum((0, 1, 2)) for tiles in (self.light["t_irradiance"], self.shot)])
 
     def by_tile(self) -> dict[tuple[int, int, int], F64]:
         """What is in the covered texels of each leaf, H and r."""
@@ -111,7 +118,8 @@ def test_splits_and_merges_keep_all_energy(
     trees.write_noise(rng, negative=storage != "fixed8")
     area = trees.nodes.surfaces.area.sum()
     weight = trees.nodes.surfaces.area[..., None]
-    lights = np.array([(np.abs(tiles) * weight).sum((0, 1, 2)) for tiles in trees.light.values()])
+    lights = np.array([(np.abs(tiles) * weight).sum((0, 1, 2)) for tiles in (*trees.light.values(), trees.shot)])
+    lights = lights.sum(0)  # R is the difference of the others
     before = trees.energy
     for change in (trees.grow, lambda: trees.grow(0.3, rng), trees.shrink, trees.shrink):
         change()
@@ -137,12 +145,12 @@ def test_what_was_pushed_and_pulled_is_what_it_was(
         np.testing.assert_allclose(after[tile], values, rtol=1e-4, atol=1e-5)  # float sums
 
 
-def test_push_interpolates_and_pull_takes_means(forest: Callable[..., Forest]) -> None:
+def test_push_interpolates(forest: Callable[..., Forest]) -> None:
     """Linear light stays linear two levels down, a texel away from where the leaf above ended; even light stays even."""
     trees = forest(quads_scene([room((4.0, 4.0, 4.0))[0]], [grey(0.5, 1.0)]), texels=16 * 16)
     assert len(trees.tree) == 1
     slope = np.array([[0.01, 0.02], [0.02, 0.0], [0.0, 0.0]])
-    trees.write({name: 0.3 + places(trees) @ slope.T for name in LIGHT})
+    trees.write({"t_irradiance": 0.3 + places(trees) @ slope.T})
     trees.grow()
     expected = 0.3 + places(trees) @ slope.T
     covered = trees.nodes.surfaces.area > 0
@@ -150,9 +158,27 @@ def test_push_interpolates_and_pull_takes_means(forest: Callable[..., Forest]) -
     uv = places(trees)
     inner = covered & ((uv > rect[:2] + 1.01) & (uv < rect[:2] + rect[2:] - 1.01)).all(-1)
     assert inner.sum() > 500
-    for tiles in trees.light.values():
-        np.testing.assert_allclose(tiles[inner], expected[inner], atol=1e-5)
-        np.testing.assert_allclose(tiles[covered][:, 2], 0.3, atol=1e-5)
+    H = trees.light["t_irradiance"]
+    np.testing.assert_allclose(H[inner], expected[inner], atol=1e-5)
+    np.testing.assert_allclose(H[covered][:, 2], 0.3, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_who_has_shot_is_not_forgotten(forest: Callable[..., Forest], rng: np.random.Generator, name: str) -> None:
+    """A texel's children have shot what it has shot, not what its neighbours have. Albedo is a half float on the GPU."""
+    trees = forest(SCENES[name]())
+    trees.write_noise(rng, negative=True)
+    before = {tile: trees.shot[slot] for tile, slot in trees.tree.slots.items()}
+    trees.grow()
+    shot, split = trees.shot, 0
+    for (level, x, y), slot in trees.tree.slots.items():
+        above = before.get((level - 1, x // 2, y // 2))
+        if above is not None:
+            half = above[y % 2 * 8 : y % 2 * 8 + 8, x % 2 * 8 : x % 2 * 8 + 8]
+            covered = trees.nodes.surfaces.area[slot] > 0
+            np.testing.assert_allclose(shot[slot][covered], half.repeat(2, 0).repeat(2, 1)[covered], atol=2**-11)
+            split += 1
+    assert split > 10
 
 
 def places(trees: Forest) -> F64:
@@ -248,7 +274,7 @@ def sampled(display: NDArray[np.float64], nodes: object, slot: int, uv: F64) -> 
 
 def edge_points(nodes: object) -> list[tuple[int, int, F64]]:
     """Places where two leaves of different level meet, at four places along each cell of the page table."""
-    pages = nodes.slot_tables()["t_pages"][..., 0].astype(np.int64) - 1  # type: ignore[attr-defined]
+    pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64) - 1  # type: ignore[attr-defined]
     level, cell = nodes.leaves.level, 1 / nodes.pages_per_texel  # type: ignore[attr-defined]
     found = []
     for step, along in (((0, 1), (0, 1)), ((1, 0), (1, 0))):

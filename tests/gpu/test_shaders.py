@@ -29,7 +29,7 @@ FLAG = (False, True)
 DEFINES: Mapping[str, tuple[object, ...]] = {
     "RESOLUTION": (OPTION["resolution"].minimum,),
     "LEVEL": tuple(range(MAX_LEVEL + 1)),
-    "ROW_PATCHES": tuple(TILE >> level for level in range(MAX_LEVEL + 1)),
+    "TILE_PATCHES": tuple(TILE >> level for level in range(MAX_LEVEL + 1)),
     "BLOCK": (OPEN_BLOCK,),
     "VIEWS": tuple({p.views for p in PROJECTIONS.values()}),
     "MATERIAL_BITS": (16,),
@@ -59,7 +59,9 @@ PROGRAMS = sorted(str(path.relative_to(SHADERS))[: -len(".frag.glsl")] for path 
 
 def stages(name: str) -> list[str]:
     vertex = f"{name}.vert.glsl"
-    return [vertex if (SHADERS / vertex).exists() else "common/fullscreen.vert.glsl", f"{name}.frag.glsl"]
+    fragment = f"{name}.frag.glsl"
+    shared = "rects" if "v_corner" in (SHADERS / fragment).read_text() else "fullscreen"
+    return [vertex if (SHADERS / vertex).exists() else f"common/{shared}.vert.glsl", fragment]
 
 
 def fillings(name: str) -> Iterator[dict[str, str]]:
@@ -84,7 +86,9 @@ def combinations(name: str, slots: Mapping[str, str]) -> Iterator[dict[str, obje
 def test_compiles_with_everything_that_can_be_asked_of_it(gpu: Gpu, name: str) -> None:
     library = ShaderLibrary(gpu.ctx)
     compiled = [
-        library.program(name, {k: int(v) if isinstance(v, float) else v for k, v in defines.items()}, slots)
+        library.program(
+            name, {k: int(v) if isinstance(v, float) else v for k, v in defines.items()}, slots, stages(name)[0][:-10]
+        )
         for slots in fillings(name)
         for defines in combinations(name, slots)
     ]

@@ -22,13 +22,13 @@ def grown(gpu: Gpu, scene: Scene, **options: object) -> Solution:
     """Not shot yet."""
     known: dict[str, object] = {
         "density": DENSITY,
-        "level": 4,
+        "level": 2,
         "resolution": 64,
         "depth": 2,
         "gradient": ROUGH,
         "residual": 0.02,
     }
-    return begin(gpu, scene, quadtree=True, **(known | options))  # type: ignore[arg-type]
+    return begin(gpu, scene, solver="adaptive", **(known | options))  # type: ignore[arg-type]
 
 
 @pytest.fixture
@@ -45,10 +45,16 @@ def planted(gpu: Gpu) -> Iterator[Callable[..., Solution]]:
 
 
 def test_furnace(planted: Callable[..., Solution]) -> None:
-    """All walls alike: B = E/(1 - ρ) everywhere, so there is nothing to refine."""
+    """All walls alike: B = E/(1 - ρ) everywhere, so once it is there, nothing is to be refined. (On the way there is: light that
+    has been shot by some walls only is uneven.)"""
     scene = load_scene("furnace")
-    box = planted(scene, density=16.0, residual=2e-3, gradient=0.8)
+    box = planted(scene, density=16.0, residual=2e-3, gradient=0.8, depth=0)
     leaves = set(box.solver.tree.slots)  # type: ignore[attr-defined]
+    box.settle(FEW_STEPS)
+    box.solver.set_options(box.solver.options.replace(depth=2))
+    for _ in range(12):  # until the leaves have been judged
+        box.solver.step(8)
+        box.solver.poll()
     box.settle(FEW_STEPS)
     material = scene.materials[0]
     glow = np.pi * np.array(material.emission) / (1 - np.array(material.albedo))
@@ -68,7 +74,7 @@ def test_no_shadow_no_split(planted: Callable[..., Solution]) -> None:
 
 # -- the table's shadow ------------------------------------------------------------------------------------------------
 
-SHADOW: dict[str, object] = {"density": 5.0, "level": 3, "resolution": 128, "residual": 0.01, "gradient": 0.3}
+SHADOW: dict[str, object] = {"density": 5.0, "level": 1, "resolution": 128, "residual": 0.01, "gradient": 0.3}
 
 
 def finest_light(solution: Solution) -> tuple[np.ndarray, np.ndarray]:

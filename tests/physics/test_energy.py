@@ -15,7 +15,7 @@ from app.scene.load import load_scene
 from app.scene.shapes import icosphere
 from app.solvers import SOLVERS
 from app.solvers.shooting.options import FORM_FACTORS, VISIBILITIES
-from app.solvers.shooting.uniform import BATCH
+from app.solvers.shooting.stages import BATCH
 
 EVERY_SOLVER = pytest.mark.parametrize("solver", SOLVERS)
 
@@ -118,7 +118,7 @@ def test_furnace(gpu: Gpu, rho: float, solver: str) -> None:
     0.5 % a bounce; without ``coarsen``, since larger patches that take over shoot the mean of unequal ones."""
     exitance = 2.0
     scene = quads_scene(room(), [grey(rho, exitance)])
-    furnace = solve(gpu, scene, texels=384, level=3, coarsen=False, resolution=128, solver=solver)
+    furnace = solve(gpu, scene, texels=384, level=3, coarsen=False, solver=solver)
     B = furnace.B[:, 1] * (1 - rho) / exitance
     assert np.average(B, weights=furnace.area) == pytest.approx(1, abs=0.01)
     assert np.abs(B - 1).max() < 0.01
@@ -214,8 +214,7 @@ def test_cornell_box_with_an_audit_per_shot(gpu: Gpu, solver: str) -> None:
         residual = box.lightmap.texture("t_residual")
         kept = residual.read()
         box.light_up()
-        level = box.solver.options.level
-        audits.append(box.solver.audit((shot.corner[0] >> level, shot.corner[1] >> level)).total)
+        audits.append(box.solver.audit(shot.corner).total)
         residual.write(kept)
     assert np.mean(audits) == pytest.approx(1, abs=0.01)
     box.release()

@@ -86,7 +86,7 @@ def charts_in(nodes: NodeSet, slot: int) -> set[int]:
 
 def worst_step(nodes: NodeSet) -> int:
     """Largest difference in level between two leaves that meet along an edge and share a chart."""
-    pages = nodes.slot_tables()["t_pages"][..., 0].astype(np.int64) - 1
+    pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64) - 1
     pairs = set()
     for a, b in ((pages[1:], pages[:-1]), (pages[:, 1:], pages[:, :-1])):
         met = (a >= 0) & (b >= 0) & (a != b)
@@ -245,14 +245,14 @@ def test_enlarging_keeps_everything() -> None:
     nodes = tree.nodes
     slots, tiles, columns, room = dict(tree.slots), nodes.tiles, nodes.columns, tree.room
     arrays = nodes.tile_arrays(np.arange(tiles))
-    pages = nodes.slot_tables()["t_pages"]
+    pages = nodes.slot_tables["t_pages"]
     receivers = [a.copy() for a in (nodes.flat_spans, nodes.shaped_tiles)]
     tree.enlarge(tiles + 100)
     assert (nodes.tiles, nodes.columns, tree.room, tree.slots) == (tiles + 100, columns, room + 100, slots)
     assert nodes.size == (columns * TILE, -(-nodes.tiles // columns) * TILE)
     for name, array in nodes.tile_arrays(np.arange(tiles)).items():
         np.testing.assert_array_equal(array, arrays[name])
-    np.testing.assert_array_equal(nodes.slot_tables()["t_pages"], pages)
+    np.testing.assert_array_equal(nodes.slot_tables["t_pages"], pages)
     for now, before in zip((nodes.flat_spans, nodes.shaped_tiles), receivers, strict=True):
         np.testing.assert_array_equal(now, before)
     splits = tree.splits(np.flatnonzero(nodes.used).tolist(), DEPTH)
@@ -267,7 +267,7 @@ def test_the_page_table_finds_the_leaf_at_any_place(name: str, rng: np.random.Ge
     tree = tree_of(name)
     shuffle(tree, rng, rounds=3)
     nodes = tree.nodes
-    pages = nodes.slot_tables()["t_pages"][..., 0].astype(np.int64) - 1
+    pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64) - 1
     found = 0
     for uv in rng.uniform(0, nodes.charts.size, (400, 2)):
         slot = int(pages[tuple((uv * nodes.pages_per_texel).astype(int)[::-1])])

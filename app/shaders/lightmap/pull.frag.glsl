@@ -1,6 +1,10 @@
-// The light of children onto the leaf that replaces them: means over area, which keep all energy.
+// The light of children onto the leaf that replaces them: means over area of H and of what they have shot, R, which keep all energy;
+// r = E + ρH - R.
+#include "common/atlas.glsl"
+#include "lightmap/radiosity.glsl"
+
 uniform sampler2D t_lifted_irradiance;
-uniform sampler2D t_lifted_residual;
+uniform sampler2D t_lifted_shot;
 uniform sampler2D t_lifted_area;
 
 flat in vec2 v_corner;
@@ -11,15 +15,17 @@ layout(location = 1) out vec4 out_residual;
 
 void main() {
     ivec2 first = ivec2(v_from + 2.0 * floor(gl_FragCoord.xy - v_corner));
-    out_irradiance = out_residual = vec4(0.0);
+    vec4 H = vec4(0.0);
+    vec3 R = vec3(0.0);
     float area = 0.0;
     for (int k = 0; k < 4; ++k) {
         ivec2 px = first + ivec2(k & 1, k >> 1);
         float own = texelFetch(t_lifted_area, px, 0).r;
-        out_irradiance += own * texelFetch(t_lifted_irradiance, px, 0);
-        out_residual += own * texelFetch(t_lifted_residual, px, 0);
+        H += own * texelFetch(t_lifted_irradiance, px, 0);
+        R += own * texelFetch(t_lifted_shot, px, 0).rgb;
         area += own;
     }
-    out_irradiance /= max(area, 1e-37);
-    out_residual /= max(area, 1e-37);
+    out_irradiance = H / max(area, 1e-37);
+    vec3 r = radiosity(ivec2(gl_FragCoord.xy), out_irradiance.rgb) - R / max(area, 1e-37);
+    out_residual = vec4(area > 0.0 ? r : vec3(0.0), 0.0);
 }

@@ -1,4 +1,4 @@
-// The shooters of a batch: row k describes the k-th strongest of the rows' strongest patches. [Coombe03, 3.4]
+// The shooters of a batch: row k describes the k-th strongest of the runs' strongest patches. [Coombe03, 3.4]
 //
 // The polygon is the patch's own parallelogram, so that neighbouring patches tile their surface exactly. Visibility is
 // sampled from the middle of the residual; where part of the patch holds none (something stands on it), or the patch is not
@@ -15,22 +15,22 @@ uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
 uniform sampler2D t_residual;
 uniform sampler2D t_facets;
-uniform sampler2D t_rows;
-uniform int u_rows;
+uniform sampler2D t_runs;
 
 layout(location = 0) out vec4 out_row;
 
-// The (power, x, y, Σ) of the rank-th strongest row; equal powers rank by index.
-vec4 ranked_row(int rank) {
+// The (power, x, y, Σ) of the rank-th strongest run; equal powers rank by index.
+vec4 ranked_run(int rank) {
+    int runs = textureSize(t_runs, 0).x;
     vec4 last = vec4(3e38);
     int last_index = -1;
     for (int k = 0; k <= rank; ++k) {
         vec4 best = vec4(0.0);
         int best_index = -1;
-        for (int i = 0; i < u_rows; ++i) {
-            vec4 row = texelFetch(t_rows, ivec2(i, 0), 0);
-            bool follows = row.x < last.x || (row.x == last.x && i > last_index);
-            if (follows && row.x > best.x) { best = row; best_index = i; }
+        for (int i = 0; i < runs; ++i) {
+            vec4 run = texelFetch(t_runs, ivec2(i, 0), 0);
+            bool follows = run.x < last.x || (run.x == last.x && i > last_index);
+            if (follows && run.x > best.x) { best = run; best_index = i; }
         }
         last = best;
         last_index = best_index;
@@ -143,10 +143,10 @@ Shooter shooter_from_patch(ivec2 corner_px) {
 
 void main() {
     int shot = int(gl_FragCoord.y);
-    vec4 row = ranked_row(shot);
+    vec4 run = ranked_run(shot);
     Shooter s;
     s.size_px = 0;
-    if (row.x > 0.0 && (shot == 0 || row.x >= WEAKEST * ranked_row(0).x))
-        s = shooter_from_patch(ivec2(row.yz));
+    if (run.x > 0.0 && (shot == 0 || run.x >= WEAKEST * ranked_run(0).x))
+        s = shooter_from_patch(ivec2(run.yz));
     out_row = s.size_px > 0 ? shooter_row(s, int(gl_FragCoord.x)) : vec4(0.0);
 }

@@ -25,10 +25,10 @@ from app.atlas.lightmap import Lightmap, receiver_meshes
 from app.atlas.quadtree import Change, Quadtree, Tile
 from app.atlas.regrow import QUAD_FORMAT, Regrowth, corners, quads
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, ReadBack, Texture
-from app.scene.model import Material
+from app.scene.model import F64, Material
 from app.solvers.shooting.log import ShotLog
-from app.solvers.shooting.options import TREE, ShootingOptions
-from app.solvers.shooting.stages import BATCH
+from app.solvers.shooting.options import MAX_LEVEL, TREE, ShootingOptions
+from app.solvers.shooting.stages import BATCH, ROOT_LEVEL
 from app.solvers.shooting.uniform import UniformShooting
 
 # A second difference of smooth light grows fourfold when texels double: leaves merge below a quarter of the threshold, and half
@@ -47,11 +47,16 @@ class AdaptiveShooting(UniformShooting):
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
         self.tree = Quadtree(lightmap.nodes)
-        self._regrowth = Regrowth(gpu)
+        self._regrowth = Regrowth(gpu, lightmap)
         self._log = ShotLog(gpu)
         self._judge = Pass(gpu, "shooting/judge")
-        self._inherit = Pass(gpu, "shooting/inherit")
-        self._correct = Pass(gpu, "shooting/correct", defines=lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"))
+        self._inherit = Pass(gpu, "shooting/inherit", vertex="common/rects")
+        self._correct = Pass(
+            gpu,
+            "shooting/correct",
+            defines=lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"),
+            vertex="common/rects",
+        )
         self.gpu, self.lightmap = gpu, lightmap
         self._sized: list[Framebuffer | Texture] = []
         self._make_targets()
@@ -86,10 +91,12 @@ class AdaptiveShooting(UniformShooting):
             super().set_options(options)
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
-        factor = self.lightmap.common_factor(materials)
         self._end_redo()
         self._calm = False
         super().set_materials(materials)
+
+    def _scale_light(self, factor: F64) -> None:
+        super()._scale_light(factor)
         self._log.scale(factor)
 
     @property
@@ -116,6 +123,11 @@ class AdaptiveShooting(UniformShooting):
         """A whole step: leaves follow the light, and there are few."""
         self.step(1)
         return True
+
+    def patch_edges(self) -> NDArray[np.int64]:
+        """Patches are about as large in the scene at every level, see patch_level.glsl."""
+        level = self._choice.level - ROOT_LEVEL + self.lightmap.nodes.leaves.level
+        return np.asarray(2 ** np.clip(level, 0, MAX_LEVEL), np.int64)
 
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
         return super().passes(shots) | {
@@ -155,8 +167,8 @@ class AdaptiveShooting(UniformShooting):
     def _grow_and_back(self) -> None:
         """Split the first leaf and merge it again."""
         change = self.tree.split([min(self.tree.slots.values())])
-        self._regrowth.apply(self.lightmap, change)
-        self._regrowth.apply(self.lightmap, self.tree.merge([change.children.tolist()]))
+        self._regrowth.apply(change)
+        self._regrowth.apply(self.tree.merge([change.children.tolist()]))
 
     def _grow(self, judged: NDArray[np.float64], most: int) -> bool:
         """Split and merge where the judgement (slots, 4), see judge.frag.glsl, says so. Whether anything changed."""
@@ -230,14 +242,13 @@ class AdaptiveShooting(UniformShooting):
 
     def _apply(self, change: Change) -> None:
         self._end_redo()
-        self._regrowth.apply(self.lightmap, change)
+        self._regrowth.apply(change)
+        self._emitted = self.lightmap.emitted
         gone, came = (change.parents, change.children) if change.split else (change.children, change.parents)
         inherits = change.split or not self._fresh.isdisjoint(gone.tolist())
         self._fresh.difference_update(gone.tolist())
-        if (
-            inherits and self.lightmap.storage != "fixed8"
-        ):  # that holds no negative correction: leaves keep what they inherit
-            self._fresh.update(came.tolist())
+        if inherits and self.lightmap.storage != "fixed8":
+            self._fresh.update(came.tolist())  # fixed8 holds no negative correction: leaves keep what they inherit
 
     # -- earlier shots into fresh leaves -------------------------------------------------------------------------------
 

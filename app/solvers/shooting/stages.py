@@ -9,6 +9,7 @@ from app.projections import PROJECTIONS, Occluders
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 
 BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
+RUNS = 64  # at least, of slots: a batch is chosen from the strongest patch of each
 OPEN = 0.0  # item of the open background, see common/item.glsl
 SHOOTER_ROWS = 7  # texels that describe one shooter, see shooter.glsl
 BLOCK_BYTES = 256  # no driver asks for a coarser uniform block alignment
@@ -25,14 +26,14 @@ class ShotBuffers:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
         self._gpu = gpu
-        self.rows = gpu.texture((lightmap.rows, 1), 4, "f4")
+        self.runs = gpu.texture((max(RUNS, lightmap.rows), 1), 4, "f4")
         self.shooters = gpu.texture((BLOCK_ROWS, BATCH), 4, "f4")
         self.shooter_blocks = gpu.buffer(BATCH * BLOCK_BYTES)  # the same, as uniforms
         self.ledger = gpu.texture((BATCH, 2), 4, "f4")
         self.occluders = Occluders(gpu, lightmap)
         self.report = gpu.texture((REPORT_TEXELS, 1), 4, "f4")
         self.books = [gpu.texture((lightmap.columns, lightmap.rows), 4, "f4") for _ in range(3)]
-        self.row_target = gpu.target(self.rows)
+        self.run_target = gpu.target(self.runs)
         self.shooter_target = gpu.target(self.shooters)
         self.ledger_target = gpu.target(self.ledger)
         self.report_target = gpu.target(self.report)
@@ -60,7 +61,7 @@ class ChoiceStages:
         self.patch_target = gpu.target(self.patches)
         kind = {"LEVEL": level - ROOT_LEVEL if adaptive else level, "ADAPTIVE": adaptive}
         self.add_patches = Pass(gpu, "shooting/patches", defines=kind)
-        self.add_rows = Pass(gpu, "shooting/rows", defines={"ROW_PATCHES": TILE >> grid})
+        self.add_runs = Pass(gpu, "shooting/runs", defines={"TILE_PATCHES": TILE >> grid})
         self.choose = Pass(gpu, "shooting/choose", defines=kind | lightmap.defines("MATERIAL_BITS"))
         self.leaves = ("t_leaves",) if adaptive else ()  # what patches and choose bind besides
 

@@ -6,9 +6,7 @@
         r_i  = 0
         for every texel j:  ΔH_j = r_i F_ji V_ji;  H_j += ΔH_j;  r_j += ρ_j ΔH_j
 
-The chosen shooters never leave the GPU: ``choose`` writes one row of t_shooters per shot of a batch, and every later pass
-reads it there. All chosen residuals are zeroed before the first of the batch shoots, or what one gives to another would be
-lost. The host only hears, a few steps late, how much is still unshot.
+The host only hears, a few steps late, how much is still unshot: see shot.py for what is done on the GPU.
 
 Works badly where the middle of a patch sees something else than the rest of it (contact shadows): shoot from a lower level.
 """
@@ -16,25 +14,18 @@ Works badly where the middle of a patch sees something else than the rest of it 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
-from app.gpu import Buffer, Framebuffer, Gpu, Mesh, ReadBack, Texture
+from app.gpu import Gpu, ReadBack, Texture
 from app.scene.model import F64, Material
 from app.solvers.base import EnergyBook, StepReport
 from app.solvers.shooting.options import ShootingOptions
-from app.solvers.shooting.stages import (
-    BATCH,
-    BLOCK_BYTES,
-    OPEN,
-    SHOOTER_ROWS,
-    ChoiceStages,
-    ShotBuffers,
-    ShotStages,
-)
+from app.solvers.shooting.shot import Audit, Shot, ShotPasses
+from app.solvers.shooting.stages import BATCH, ChoiceStages, ShotBuffers, ShotStages
 
 # With ``coarsen``, a shot should carry this share of the emitted power: about 4096 shots for each time that all light is
 # reflected, whatever the scene's size. Measured on the Cornell box: a quarter of the shots, error 1.8 % -> 2.4 %.
@@ -43,34 +34,7 @@ WHOLE = object()  # no part is left
 REPORT_LAG = 2  # read-backs in flight before the oldest is looked at
 
 
-@dataclass(frozen=True)
-class Shot:
-    """The shooter of one shot: centre [m], unit normal, area [m²], lower corner (x, y) and edge of its patch in the node set
-    [texels]."""
-
-    centre: F64
-    normal: F64
-    area: float
-    corner: tuple[int, int]
-    size: int
-
-
-@dataclass(frozen=True)
-class Audit:
-    """What becomes of a shot, as shares of its power: received by texels, Σ A_j F_ji V_ji / A_i, sent out of the scene, and
-    lost on black sides that have no texels. Their sum should be 1."""
-
-    received: float
-    open: float
-    black: float
-    shot: Shot
-
-    @property
-    def total(self) -> float:
-        return self.received + self.open + self.black
-
-
-class UniformShooting:
+class UniformShooting(ShotPasses):
     """Shoots ``lightmap`` to convergence. Whoever makes it releases it."""
 
     adaptive = False  # whether leaves come and go
@@ -135,12 +99,16 @@ class UniformShooting:
         self.poll(wait=True)
         factor = self.lightmap.common_factor(materials)
         if (factor != 1).any():
-            self.lightmap.scale(factor)
-            self.lightmap.scale(factor, self.buffers.ledger_target)
+            self._scale_light(factor)
         self.lightmap.edit_materials(materials, factor)
         self._emitted = self.lightmap.emitted
         self._choice = self.stages.choices[0]
         self.report = replace(self.report, residual=self.unshot_share())
+
+    def _scale_light(self, factor: F64) -> None:
+        """Multiply all light that was shot by a factor (3,)."""
+        self.lightmap.scale(factor)
+        self.lightmap.scale(factor, self.buffers.ledger_target)
 
     @property
     def settled(self) -> bool:
@@ -151,9 +119,9 @@ class UniformShooting:
         """The residual now, Σ |r A| over patches, as a share of the emitted power. Waits for the GPU."""
         self.finish()
         self._weigh(self._choice)
-        rows = np.frombuffer(self.buffers.rows.read(), np.float32).reshape(-1, 4)[:, 3].astype(np.float64)
+        runs = np.frombuffer(self.buffers.runs.read(), np.float32).reshape(-1, 4)[:, 3].astype(np.float64)
         emitted = self._emitted.sum()
-        return float(rows.sum()) * self._watt / emitted if emitted > 0 else 0.0
+        return float(runs.sum()) * self._watt / emitted if emitted > 0 else 0.0
 
     def step(self, shots: int) -> int:
         """Make up to ``shots`` shots (at most BATCH), the strongest patches first. Returns how many were issued: of a batch,
@@ -203,13 +171,14 @@ class UniformShooting:
             float(area),
         )
 
-    def audit(self, patch: tuple[int, int]) -> Audit:
-        """What becomes of a shot from this patch if it shot now. Changes no light. The patch must hold some residual."""
+    def audit(self, corner: tuple[int, int]) -> Audit:
+        """What becomes of a shot from the patch with this lower corner [texels of the node set] if it shot now. Changes no light.
+        The patch must hold some residual."""
         self.finish()
-        rows = np.zeros((self.lightmap.rows, 4), np.float32)
-        rows[0] = 1.0, *(corner << self.options.level for corner in patch), 0.0
-        self.buffers.rows.write(rows.tobytes())
-        self._describe(self.stages.choices[0], 1)
+        runs = np.zeros((self.buffers.runs.width, 4), np.float32)
+        runs[0] = 1.0, *corner, 0.0
+        self.buffers.runs.write(runs.tobytes())
+        self._describe(self._choice, 1)
         self._see(0, 1)
         scratch = [self.gpu.texture(self.lightmap.size, 4, "f4") for _ in range(2)]
         target = self.gpu.target(*scratch)
@@ -266,163 +235,13 @@ class UniformShooting:
         self.shots += shots
         self._tell()
 
-    def _for_groups(self, part: Callable[[int, int], None], shots: int) -> None:
-        """Do this part of a step for all its shots, as many at once as there are maps for."""
-        for first, some in self.stages.groups(shots):
-            part(first, some)
-
-    def _light(self, first: int, shots: int, start: float = 0.0, end: float = 1.0) -> None:
-        """Receive into the lightmap, in the rows between two shares of its height."""
-        width, height = self.lightmap.size
-        lower, upper = round(start * height), round(end * height)
-        rows = None if upper - lower == height else (0, lower, width, upper - lower)
-        self._receive(self.lightmap.light_target, first, shots, blend="add", rows=rows)
-
-    def _choose(self, shots: int) -> None:
-        """Pick the strongest patches and zero them. [Coombe03, 3.4]"""
-        lightmap, buffers = self.lightmap, self.buffers
-        self._weigh(self._choice)
-        self._describe(self._choice, shots)
-        self.stages.zero.draw(
-            lightmap.residual_target,
-            textures=lightmap.textures("t_position_area", "t_normal_ids") | {"t_shooters": buffers.shooters},
-            uniforms={"u_size": lightmap.size},
-            vertices=4,
-            instances=shots,
-            strip=True,
-        )
-
-    def _weigh(self, choice: ChoiceStages) -> None:
-        """Residual power of every patch of this level, and the strongest of each row of tiles."""
-        textures = self.lightmap.textures("t_position_area", "t_residual", *choice.leaves)
-        choice.add_patches.draw(choice.patch_target, textures=textures)
-        choice.add_rows.draw(
-            self.buffers.row_target, textures={"t_patches": choice.patches}, uniforms={"u_width": choice.patch_size[0]}
-        )
-
-    def _describe(self, choice: ChoiceStages, shots: int) -> None:
-        """Write the shooters of the batch from the strongest patches of the rows."""
-        choice.choose.draw(
-            self.buffers.shooter_target,
-            textures=self.lightmap.textures("t_position_area", "t_normal_ids", "t_residual", "t_facets", *choice.leaves)
-            | {"t_rows": self.buffers.rows},
-            uniforms={"u_rows": self.lightmap.rows},
-            viewport=(0, 0, SHOOTER_ROWS, shots),
-        )
-        self.buffers.shooter_target.read_into(self.buffers.shooter_blocks, components=4, dtype="f4")
-
-    def _see(self, first: int, shots: int) -> None:
-        """Item buffer and depth from so many shooters of the batch, all views in one draw. [Coombe03, 3.2; Cohen85]"""
-        maps = self.stages.maps
-        used = None if shots == maps.count else (0, 0, maps.items.width, shots * maps.map_size[1])
-        maps.target.clear(OPEN, depth=1.0, viewport=used)
-        projection, occluders = self.stages.projection, self.buffers.occluders
-        casters = projection.casters(occluders, self.options.resolution)
-        self.stages.see.draw(
-            maps.target,
-            textures=casters.textures,
-            uniforms={"u_maps": maps.count, "u_first": first},
-            blocks=self._shooter_blocks,
-            mesh=casters.mesh,
-            vertices=casters.vertices,
-            instances=projection.views * shots,
-            depth=True,
-            clip_distances=projection.clip_distances,
-        )
-        self.stages.see_small.draw(
-            maps.target,
-            textures={"t_triangles": occluders.texture},
-            uniforms={"u_maps": maps.count, "u_first": first},
-            blocks=self._shooter_blocks,
-            vertices=occluders.count,
-            instances=shots,
-            points=True,
-            depth=True,
-        )
-
-    def vanished(self) -> int:
-        """Triangles that the first shooter of the last step sees, but between the samples of its map: each was drawn as one
-        sample. Waits for the GPU."""
-        texture = self.gpu.texture((1, 1), 1, "f4")
-        target = self.gpu.target(texture)
-        target.clear()
-        self.stages.count_small.draw(
-            target,
-            textures={"t_triangles": self.buffers.occluders.texture},
-            uniforms={"u_maps": 1, "u_first": 0},
-            blocks=self._shooter_blocks,
-            vertices=self.buffers.occluders.count,
-            points=True,
-            blend="add",
-        )
-        count = int(np.frombuffer(texture.read(), np.float32)[0])
-        self.gpu.release_all(target, texture)
-        return count
-
-    def _receive(
-        self,
-        target: Framebuffer,
-        first: int,
-        shots: int,
-        *,
-        blend: str | None,
-        meshes: Mapping[bool, Mesh] | None = None,
-        rows: tuple[int, int, int, int] | None = None,
-        own: bool = True,
-    ) -> None:
-        """The light of these shots on every texel that sees them, or on some receivers or rows only. [Coombe03, eq. 1]
-
-        own: whether patches still are where they shot from, and do not light themselves."""
-        lightmap = self.lightmap
-        shaped = lightmap.textures("t_position_area", "t_normal_ids")
-        meshes = lightmap.receivers if meshes is None else meshes
-        for (flat, _), receive in self.stages.receive.items():
-            if flat not in meshes:
-                continue
-            textures = lightmap.textures("t_materials", "t_albedo") | self.stages.sight_textures
-            receive.draw(
-                target,
-                textures=textures if flat else textures | shaped,
-                uniforms={"u_size": lightmap.size, "u_first": first, "u_shots": shots}
-                | ({} if flat else {"u_own": int(own)}),
-                blocks=self._shooter_blocks,
-                mesh=meshes[flat],
-                blend=blend,
-                scissor=rows,
-            )
-
-    @property
-    def _shooter_blocks(self) -> dict[str, tuple[Buffer, int, int]]:
-        return {"ShooterBlock": (self.buffers.shooter_blocks, 0, BATCH * BLOCK_BYTES)}
-
-    def _look_out(self, first: int, shots: int) -> None:
-        """Add up how much of the shooters' sight leaves the scene."""
-        maps = self.stages.maps
-        width, height = maps.open_size
-        self.stages.add_open.draw(
-            maps.open_target,
-            textures={"t_items": maps.items, "t_weights": self.stages.weights},
-            uniforms={"u_row": first * height},
-            viewport=(0, first * height, width, shots * height),
-        )
-
-    def _book(self, shots: int) -> None:
-        """Enter in the ledger what the batch sent out of the scene."""
-        self.stages.enter.draw(
-            self.buffers.ledger_target,
-            textures={"t_open": self.stages.maps.open, "t_shooters": self.buffers.shooters},
-            uniforms={"u_blocks": self.stages.maps.open_size[1]},
-            blend="add",
-            viewport=(0, 0, shots, 2),
-        )
-
     # -- what the host hears -------------------------------------------------------------------------------------------
 
     def _tell(self) -> None:
         buffers = self.buffers
         self.stages.tell.draw(
             buffers.report_target,
-            textures={"t_rows": buffers.rows, "t_ledger": buffers.ledger, "t_shooters": buffers.shooters},
+            textures={"t_runs": buffers.runs, "t_ledger": buffers.ledger, "t_shooters": buffers.shooters},
         )
         self._reports.append((self._choice, ReadBack(self.gpu, buffers.report_target)))
 
@@ -436,16 +255,6 @@ class UniformShooting:
         self.report = StepReport(int(report[1, 3]), float(residual), report[1, :3] * self._watt)
         if report[2 + 5, 3] > 0:
             self.last_shot = self._shot_from_rows(report[2:])
-
-    def _shot_from_rows(self, rows: F64) -> Shot:
-        frame, corner = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3]))
-        area = float(rows[0, 3]) * frame.scale**2
-        return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, int(rows[5, 3]))
-
-    @property
-    def _watt(self) -> float:
-        """Watts in one stored unit of power: lightmap unit [W/m²] times solver area."""
-        return self.lightmap.unit * self.lightmap.frame.scale**2
 
     def _tile_sums(self) -> tuple[F64, F64, F64]:
         """Absorbed and unshot power [W] and Σ ρA, RGB and in the first Σ A, as books.frag.glsl adds them per tile."""
@@ -466,4 +275,4 @@ class UniformShooting:
             self._reports.popleft()[-1].take()
 
 
-__all__ = ["BATCH", "Audit", "Shot", "UniformShooting"]
+__all__ = ["UniformShooting"]

@@ -1,0 +1,225 @@
+"""One batch of shots, pass by pass [Coombe03, 3]: choose, see, receive, look out, book.
+
+    i = patch with the largest |Σ r A|;  see the scene from i;  H_j += r_i F_ji V_ji;  r_j += ρ_j r_i F_ji V_ji
+
+The chosen shooters never leave the GPU: ``choose`` writes one row of t_shooters per shot of a batch, and every later pass
+reads it there. All chosen residuals are zeroed before the first of the batch shoots, or what one gives to another would be
+lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.lightmap import Lightmap
+from app.gpu import Buffer, Framebuffer, Gpu, Mesh
+from app.scene.model import F64
+from app.solvers.shooting.options import ShootingOptions
+from app.solvers.shooting.stages import BATCH, BLOCK_BYTES, OPEN, SHOOTER_ROWS, ChoiceStages, ShotBuffers, ShotStages
+
+
+@dataclass(frozen=True)
+class Shot:
+    """The shooter of one shot: centre [m], unit normal, area [m²], lower corner (x, y) and edge of its patch in the node set
+    [texels]."""
+
+    centre: F64
+    normal: F64
+    area: float
+    corner: tuple[int, int]
+    size: int
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What becomes of a shot, as shares of its power: received by texels, Σ A_j F_ji V_ji / A_i, sent out of the scene, and
+    lost on black sides that have no texels. Their sum should be 1."""
+
+    received: float
+    open: float
+    black: float
+    shot: Shot
+
+    @property
+    def total(self) -> float:
+        return self.received + self.open + self.black
+
+
+class ShotPasses:
+    """What a shot is made of. Whoever shoots owns the lightmap's light, sets these and says when."""
+
+    gpu: Gpu
+    lightmap: Lightmap
+    options: ShootingOptions
+    buffers: ShotBuffers
+    stages: ShotStages
+    _choice: ChoiceStages  # among the patches of the level that shoots now
+
+    def _for_groups(self, part: Callable[[int, int], None], shots: int) -> None:
+        """Do this part of a step for all its shots, as many at once as there are maps for."""
+        for first, some in self.stages.groups(shots):
+            part(first, some)
+
+    def _choose(self, shots: int) -> None:
+        """Pick the strongest patches and zero them. [Coombe03, 3.4]"""
+        lightmap, buffers = self.lightmap, self.buffers
+        self._weigh(self._choice)
+        self._describe(self._choice, shots)
+        self.stages.zero.draw(
+            lightmap.residual_target,
+            textures=lightmap.textures("t_position_area", "t_normal_ids") | {"t_shooters": buffers.shooters},
+            uniforms={"u_size": lightmap.size},
+            vertices=4,
+            instances=shots,
+            strip=True,
+        )
+
+    def _weigh(self, choice: ChoiceStages) -> None:
+        """Residual power of every patch of this level, and the strongest of each run of slots."""
+        textures = self.lightmap.textures("t_position_area", "t_residual", *choice.leaves)
+        choice.add_patches.draw(choice.patch_target, textures=textures)
+        choice.add_runs.draw(
+            self.buffers.run_target,
+            textures={"t_patches": choice.patches},
+            uniforms={"u_runs": self.buffers.runs.width, "u_slots": self.lightmap.nodes.slots_in_use},
+        )
+
+    def _describe(self, choice: ChoiceStages, shots: int) -> None:
+        """Write the shooters of the batch from the strongest patches of the runs."""
+        choice.choose.draw(
+            self.buffers.shooter_target,
+            textures=self.lightmap.textures("t_position_area", "t_normal_ids", "t_residual", "t_facets", *choice.leaves)
+            | {"t_runs": self.buffers.runs},
+            viewport=(0, 0, SHOOTER_ROWS, shots),
+        )
+        self.buffers.shooter_target.read_into(self.buffers.shooter_blocks, components=4, dtype="f4")
+
+    def _see(self, first: int, shots: int) -> None:
+        """Item buffer and depth from so many shooters of the batch, all views in one draw. [Coombe03, 3.2; Cohen85]"""
+        maps = self.stages.maps
+        used = None if shots == maps.count else (0, 0, maps.items.width, shots * maps.map_size[1])
+        maps.target.clear(OPEN, depth=1.0, viewport=used)
+        projection, occluders = self.stages.projection, self.buffers.occluders
+        casters = projection.casters(occluders, self.options.resolution)
+        self.stages.see.draw(
+            maps.target,
+            textures=casters.textures,
+            uniforms={"u_maps": maps.count, "u_first": first},
+            blocks=self._shooter_blocks,
+            mesh=casters.mesh,
+            vertices=casters.vertices,
+            instances=projection.views * shots,
+            depth=True,
+            clip_distances=projection.clip_distances,
+        )
+        self.stages.see_small.draw(
+            maps.target,
+            textures={"t_triangles": occluders.texture},
+            uniforms={"u_maps": maps.count, "u_first": first},
+            blocks=self._shooter_blocks,
+            vertices=occluders.count,
+            instances=shots,
+            points=True,
+            depth=True,
+        )
+
+    def _light(self, first: int, shots: int, start: float = 0.0, end: float = 1.0) -> None:
+        """Receive into the lightmap, in the rows between two shares of its height."""
+        width, height = self.lightmap.size
+        lower, upper = round(start * height), round(end * height)
+        rows = None if upper - lower == height else (0, lower, width, upper - lower)
+        self._receive(self.lightmap.light_target, first, shots, blend="add", rows=rows)
+
+    def _receive(
+        self,
+        target: Framebuffer,
+        first: int,
+        shots: int,
+        *,
+        blend: str | None,
+        meshes: Mapping[bool, Mesh] | None = None,
+        rows: tuple[int, int, int, int] | None = None,
+        own: bool = True,
+    ) -> None:
+        """The light of these shots on every texel that sees them, or on some receivers or rows only. [Coombe03, eq. 1]
+
+        own: whether patches still are where they shot from, and do not light themselves."""
+        lightmap = self.lightmap
+        shaped = lightmap.textures("t_position_area", "t_normal_ids")
+        meshes = lightmap.receivers if meshes is None else meshes
+        for (flat, _), receive in self.stages.receive.items():
+            if flat not in meshes:
+                continue
+            textures = lightmap.textures("t_materials", "t_albedo") | self.stages.sight_textures
+            receive.draw(
+                target,
+                textures=textures if flat else textures | shaped,
+                uniforms={"u_size": lightmap.size, "u_first": first, "u_shots": shots}
+                | ({} if flat else {"u_own": int(own)}),
+                blocks=self._shooter_blocks,
+                mesh=meshes[flat],
+                blend=blend,
+                scissor=rows,
+            )
+
+    @property
+    def _shooter_blocks(self) -> dict[str, tuple[Buffer, int, int]]:
+        return {"ShooterBlock": (self.buffers.shooter_blocks, 0, BATCH * BLOCK_BYTES)}
+
+    def _look_out(self, first: int, shots: int) -> None:
+        """Add up how much of the shooters' sight leaves the scene."""
+        maps = self.stages.maps
+        width, height = maps.open_size
+        self.stages.add_open.draw(
+            maps.open_target,
+            textures={"t_items": maps.items, "t_weights": self.stages.weights},
+            uniforms={"u_row": first * height},
+            viewport=(0, first * height, width, shots * height),
+        )
+
+    def _book(self, shots: int) -> None:
+        """Enter in the ledger what the batch sent out of the scene."""
+        self.stages.enter.draw(
+            self.buffers.ledger_target,
+            textures={"t_open": self.stages.maps.open, "t_shooters": self.buffers.shooters},
+            uniforms={"u_blocks": self.stages.maps.open_size[1]},
+            blend="add",
+            viewport=(0, 0, shots, 2),
+        )
+
+    def _shot_from_rows(self, rows: F64) -> Shot:
+        frame, corner = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3]))
+        area = float(rows[0, 3]) * frame.scale**2
+        return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, int(rows[5, 3]))
+
+    @property
+    def _watt(self) -> float:
+        """Watts in one stored unit of power: lightmap unit [W/m²] times solver area."""
+        return self.lightmap.unit * self.lightmap.frame.scale**2
+
+    def patch_edges(self) -> NDArray[np.int64]:
+        """(tiles,) texels along the edge of the patches in each slot, at the level that shoots now."""
+        return np.full(self.lightmap.nodes.tiles, 1 << self._choice.level)
+
+    def vanished(self) -> int:
+        """Triangles that the first shooter of the last step sees, but between the samples of its map: each was drawn as one
+        sample. Waits for the GPU."""
+        texture = self.gpu.texture((1, 1), 1, "f4")
+        target = self.gpu.target(texture)
+        target.clear()
+        self.stages.count_small.draw(
+            target,
+            textures={"t_triangles": self.buffers.occluders.texture},
+            uniforms={"u_maps": 1, "u_first": 0},
+            blocks=self._shooter_blocks,
+            vertices=self.buffers.occluders.count,
+            points=True,
+            blend="add",
+        )
+        count = int(np.frombuffer(texture.read(), np.float32)[0])
+        self.gpu.release_all(target, texture)
+        return count
