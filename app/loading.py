@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.atlas.charts import Charts
-from app.atlas.node_set import NodeSet
+from app.atlas.node_set import Array, NodeSet
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
 from app.atlas.quadtree import quadtree_nodes
@@ -27,9 +27,11 @@ class CancelledError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A node set, how it was cut, the exposure to open it with [EV], and how long each stage took [s]."""
+    """A node set and what of it is uploaded, how it was cut, the exposure to open it with [EV], and how long each stage took
+    [s]."""
 
     nodes: NodeSet
+    arrays: dict[str, Array]
     atlas: AtlasOptions
     exposure: float
     seconds: dict[str, float]
@@ -63,9 +65,9 @@ def load(
     start = time.perf_counter()
     tell("cutting into texels", 0.6)
     nodes = quadtree_nodes(scene, charts) if atlas.adaptive else NodeSet(scene, charts)
-    exposure = first_exposure(nodes)
+    exposure, arrays, _ = first_exposure(nodes), nodes.arrays, nodes.emission_weights
     tell("done", 1.0)
-    return Loaded(nodes, atlas, exposure, seconds | {"texels": time.perf_counter() - start})
+    return Loaded(nodes, arrays, atlas, exposure, seconds | {"texels": time.perf_counter() - start})
 
 
 class Loading:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 
-from app.atlas.lightmap import Lightmap
-from app.atlas.node_set import NodeSet
-from app.gpu import Gpu
+from app.atlas.lightmap import Lightmap, upload
+from app.atlas.node_set import Array, NodeSet
+from app.gpu import Gpu, Texture
 from app.render.frame import FrameRenderer
 from app.solvers import DEFAULT_SOLVER, SOLVERS, ShootingOptions, Solver
 
@@ -15,15 +15,23 @@ from app.solvers import DEFAULT_SOLVER, SOLVERS, ShootingOptions, Solver
 def prepare(
     gpu: Gpu,
     nodes: NodeSet,
+    arrays: Mapping[str, Array],
     options: ShootingOptions,
     renderer: FrameRenderer,
     *,
     solver_name: str = DEFAULT_SOLVER,
 ) -> Generator[None, None, tuple[Lightmap, Solver[ShootingOptions]]]:
-    """Upload, and draw once with each program, since drivers compile it then; yields after each part. The light is as before
-    the first shot. Raises UserError; then, and when given up between two parts, nothing stays on the GPU."""
+    """Upload a node set's ``arrays``, and draw once with each program, since drivers compile it then; yields after each part. The
+    light is as before the first shot. Raises UserError; then, and when given up between two parts, nothing stays on the GPU."""
     with contextlib.ExitStack() as undo:
-        lightmap = Lightmap(gpu, nodes, storage=options.storage)
+        textures: dict[str, Texture] = {}
+        uploads = undo.enter_context(contextlib.ExitStack())
+        for name, array in arrays.items():
+            textures[name] = upload(gpu, array)
+            uploads.callback(gpu.release_all, textures[name])
+            yield
+        lightmap = Lightmap(gpu, nodes, storage=options.storage, textures=textures)
+        uploads.pop_all()
         undo.callback(lightmap.release)
         gpu.ctx.finish()
         yield

@@ -12,7 +12,7 @@ LONG_FRAME = 0.07  # seconds from one advance to the next: a frame of 100 ms wou
 MOST_BANDS = 16
 
 
-class Pace:
+class Pacer:
     """Steps a solver once per frame."""
 
     def __init__(self, gpu: Gpu) -> None:

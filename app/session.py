@@ -21,7 +21,7 @@ from app.gpu import Framebuffer, Gpu, Texture
 from app.history import History
 from app.loading import Loaded, Loading, load
 from app.opening import prepare
-from app.pacing import Pace
+from app.pacing import Pacer
 from app.picking import Picked, picked_from_hit
 from app.projections import PROJECTIONS
 from app.render.camera import CameraView
@@ -72,7 +72,9 @@ class Session:
         self.load_seconds: dict[str, float] = {}
         self.history = History()
         self.interrupted = False
-        self.seconds, self._pace = 0.0, Pace(gpu)
+        self.fresh_shots: int | None = None  # that it took from nothing until converged
+        self.edited_at: int | None = None  # shots made when the materials were last edited
+        self.seconds, self._pace = 0.0, Pacer(gpu)
         self._books: EnergyBook
         self._books_due = self._quiet_after = 0.0
         self._settled, self._busy, self._opened = True, False, False
@@ -132,6 +134,7 @@ class Session:
         lightmap, solver = yield from prepare(
             self.gpu,
             loaded.nodes,
+            loaded.arrays,
             self.shooting,
             self.renderer,
             solver_name="adaptive" if loaded.atlas.adaptive else DEFAULT_SOLVER,
@@ -256,7 +259,7 @@ class Session:
     def set_shooting(self, options: ShootingOptions) -> None:
         """Other knobs, from the next shot on; only another storage format begins again."""
         begins = options.storage != self.shooting.storage
-        self.shooting = options
+        self.shooting, self.edited_at = options, None
         if self._opened:
             self.solver.set_options(options)
             if begins:
@@ -266,9 +269,12 @@ class Session:
         """Another albedo or emission: charts, texels and light stay, and the difference is shot."""
         materials = list(self.scene.materials)
         materials[index] = material
+        rested = self.converged
         self.solver.set_materials(tuple(materials))
         if self.solver.shots == 0:
             self._begin_again()
+        elif rested or self.edited_at is None:
+            self.edited_at = self.solver.shots
         self.history.add(self.solver.shots, self.seconds, self.solver.report.residual, self._escaped_share)
         self._quiet_after = time.perf_counter() + EDIT_SECONDS
         self._books_due, self._settled = 0.0, False
@@ -280,6 +286,7 @@ class Session:
     def _begin(self, books: EnergyBook) -> None:
         """books: with nothing shot."""
         self.seconds, self._books = 0.0, books
+        self.fresh_shots = self.edited_at = None
         self._pace.begin()
         self.gpu.timers.reset()
         self._books_due, self._quiet_after = time.perf_counter() + BOOKS_SECONDS, 0.0
@@ -305,6 +312,8 @@ class Session:
         elif books and now >= self._books_due:
             self._busy = True
             self._make_books()
+        if self.edited_at is None and self.converged:
+            self.fresh_shots = self.solver.report.shots
         if report.shots != before and not self._settled:
             self.history.add(report.shots, self.seconds, report.residual, self._escaped_share)
 

@@ -31,6 +31,8 @@ class Stats:
     imbalance: float
     shots_per_second: float
     converged: bool
+    edit_shots: int | None  # since the materials were last edited
+    fresh_shots: int | None  # that it took from nothing until converged
     texels: int
     tiles: int
     uniform_texels: int  # if all leaves of a quadtree were of its finest level
@@ -53,6 +55,8 @@ def stats_of(session: Session) -> Stats:
         imbalance=book.imbalance_share,
         shots_per_second=session.history.shots_per_second,
         converged=session.converged,
+        edit_shots=None if session.edited_at is None else session.solver.report.shots - session.edited_at,
+        fresh_shots=session.fresh_shots,
         texels=lightmap.texel_count,
         tiles=lightmap.tiles,
         uniform_texels=lightmap.nodes.uniform_texels(session.shooting.depth),

@@ -16,13 +16,13 @@ are stored relative to the largest exitance, which keeps half floats in range an
 
 from __future__ import annotations
 
-import functools
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import TILE, Charts
-from app.atlas.node_set import OCCLUDER_FORMAT, VERTEX_FORMAT, Frame, NodeSet
+from app.atlas.node_set import OCCLUDER_FORMAT, VERTEX_FORMAT, Array, Frame, NodeSet
 from app.atlas.receivers import RECEIVER_FORMAT
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.scene.model import F32, F64, Material, Scene
@@ -41,10 +41,13 @@ class Lightmap:
     size: in texels; unit: W/m² per stored unit of H and r.
     """
 
-    def __init__(self, gpu: Gpu, nodes: NodeSet, *, storage: str = "rgba32f") -> None:
+    def __init__(
+        self, gpu: Gpu, nodes: NodeSet, *, storage: str = "rgba32f", textures: Mapping[str, Texture] | None = None
+    ) -> None:
+        """textures: of ``nodes.arrays``, where they were made before; they are the lightmap's from now on."""
         self.gpu, self.nodes, self.scene, self.charts = gpu, nodes, nodes.scene, nodes.charts
         self.frame: Frame = nodes.frame
-        self._textures = {name: self._upload(array) for name, array in nodes.arrays.items()}
+        self._textures = dict(textures or {name: upload(gpu, array) for name, array in nodes.arrays.items()})
         self._emit = Pass(gpu, "lightmap/emit", defines=self.defines("MATERIAL_BITS", "EMISSION_TEXTURE"))
         self._edit = Pass(
             gpu, "lightmap/edit", defines=self.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
@@ -117,7 +120,7 @@ class Lightmap:
         factor (3,): of the emissions until now, by which the light that is there was scaled."""
         table = self.nodes.material_table(self.scene)
         table[:, 1, :3] *= factor
-        before = self._upload(table)
+        before = upload(self.gpu, table)
         self.set_materials(materials)
         self._edit.draw(
             self.residual_target,
@@ -144,7 +147,7 @@ class Lightmap:
         factor = np.ones(3)
         for c in range(3):
             emits = before[:, c] > 0
-            ratio, weight = after[emits, c] / before[emits, c], (before * self._emission_weights)[emits, c]
+            ratio, weight = after[emits, c] / before[emits, c], (before * self.nodes.emission_weights)[emits, c]
             order = np.argsort(ratio)
             if weight.sum() > 0:
                 factor[c] = ratio[order][np.searchsorted(np.cumsum(weight[order]), weight.sum() / 2)]
@@ -153,21 +156,8 @@ class Lightmap:
     @property
     def emitted(self) -> F64:
         """Power that the scene's emitters send out, RGB [W]: Σ E A."""
-        weights = self._emission_weights
+        weights = self.nodes.emission_weights
         return np.asarray(np.pi * (np.array([m.emission for m in self.scene.materials]) * weights).sum(0))
-
-    @functools.cached_property
-    def _emission_weights(self) -> F64:
-        """(materials, 3) [m²]: the area of each material, weighted with its emission texture."""
-        surfaces = self.nodes.surfaces
-        covered = surfaces.face >= 0
-        material = self.scene.material_ids[self.charts.face_triangle[surfaces.face[covered]]]
-        area = surfaces.area[covered][:, None]
-        tint = np.ones(3) if self.nodes.emission_tiles is None else self.nodes.emission_tiles[covered]
-        weights = np.zeros((len(self.scene.materials), 3))
-        for channel, column in enumerate(np.broadcast_to(area * tint, (len(area), 3)).T):
-            weights[:, channel] = np.bincount(material, column, len(weights))
-        return weights
 
     def write_tiles(self, slots: NDArray[np.int64]) -> None:
         """Take over these slots of the node set, and the tables and receivers that follow. Their light stays as it is."""
@@ -179,8 +169,6 @@ class Lightmap:
             self._textures[name].write(table.tobytes())
         self.gpu.release_all(*self.receivers.values())
         self.receivers = receiver_meshes(self.gpu, self.nodes.flat_spans, self.nodes.shaped_tiles)
-        if self.nodes.emission_tiles is not None:  # finer texels emit other shares of an image
-            self.__dict__.pop("_emission_weights", None)
         self.version += 1
 
     def enlarge(self) -> None:
@@ -188,7 +176,7 @@ class Lightmap:
         old = {name: self._textures[name] for name in LIGHT}
         arrays = self.nodes.arrays
         self.gpu.release_all(*(self._textures.pop(name) for name in arrays))
-        self._textures |= {name: self._upload(array) for name, array in arrays.items()}
+        self._textures |= {name: upload(self.gpu, array) for name, array in arrays.items()}
         self._textures["t_materials"].write(self.nodes.material_table(self.scene).tobytes())  # as edited
         self.gpu.release_all(*self._targets)
         self._make_light()
@@ -275,12 +263,6 @@ class Lightmap:
         """Bytes on the GPU, by texture."""
         return {n: t.width * t.height * t.components * _BYTES[t.dtype] for n, t in self._textures.items()}
 
-    def _upload(self, array: NDArray[np.generic]) -> Texture:
-        """(height, width, components) as a texture of the same type."""
-        height, width, components = array.shape
-        dtype = {"float32": "f4", "float16": "f2", "uint32": "u4"}[array.dtype.name]
-        return self.gpu.texture((width, height), components, dtype, np.ascontiguousarray(array).tobytes())
-
     def _read(self, name: str) -> F32:
         texture = self._textures[name]
         raw = np.frombuffer(texture.read(), _DTYPES[texture.dtype]).reshape(*self.size[::-1], 4)
@@ -292,6 +274,13 @@ class Lightmap:
         material = self.scene.material_ids[self.charts.face_triangle[surfaces.face]]
         out = np.where((surfaces.face >= 0)[..., None], np.array(factors, np.float32)[material], np.float32(0))
         return out if colours is None else out * colours
+
+
+def upload(gpu: Gpu, array: Array) -> Texture:
+    """(height, width, components) as a texture of the same type."""
+    height, width, components = array.shape
+    dtype = {"float32": "f4", "float16": "f2", "uint32": "u4"}[array.dtype.name]
+    return gpu.texture((width, height), components, dtype, np.ascontiguousarray(array).tobytes())
 
 
 def receiver_meshes(gpu: Gpu, flat_spans: F32, shaped_tiles: F32) -> dict[bool, Mesh]:

@@ -114,6 +114,8 @@ class NodeSet:
         self._kinds[slots] = tile_kinds(self._tile_texels(tiles), self._facet_material)
         self.used[slots] = True
         self.__dict__.pop("slot_tables", None)
+        if self.emission_tiles is not None:  # finer texels hold other shares of an image
+            self.__dict__.pop("emission_weights", None)
         self.flat_spans, self.shaped_tiles = self.receivers_of(np.flatnonzero(self.used))
 
     def receivers_of(self, slots: NDArray[np.int64]) -> tuple[F32, F32]:
@@ -127,6 +129,18 @@ class NodeSet:
         self.leaves.level[slots] = self.leaves.x[slots] = self.leaves.y[slots] = -1
         self.surfaces.face[slots] = -1
         self.surfaces.area[slots] = 0.0
+
+    @functools.cached_property
+    def emission_weights(self) -> F64:
+        """(materials, 3) [m²]: the area of each material, weighted with its emission texture."""
+        covered = self.surfaces.face >= 0
+        material = self.scene.material_ids[self.charts.face_triangle[self.surfaces.face[covered]]]
+        area = self.surfaces.area[covered]
+        weights = np.zeros((len(self.scene.materials), 3))
+        for channel in range(3):
+            tint = 1.0 if self.emission_tiles is None else self.emission_tiles[covered][:, channel]
+            weights[:, channel] = np.bincount(material, area * tint, len(weights))
+        return weights
 
     @property
     def slots_in_use(self) -> int:
@@ -324,4 +338,4 @@ def _vertices(scene: Scene, charts: Charts, frame: Frame) -> Array:
     return data.reshape(-1)
 
 
-__all__ = ["OCCLUDER_FORMAT", "VERTEX_FORMAT", "Frame", "NodeSet", "ScalarT", "octahedral"]
+__all__ = ["OCCLUDER_FORMAT", "VERTEX_FORMAT", "Array", "Frame", "NodeSet", "ScalarT", "octahedral"]

@@ -156,6 +156,21 @@ def test_an_edit_keeps_the_light(session: Session, monkeypatch: pytest.MonkeyPat
     assert session.solver.shots >= shots
 
 
+def test_an_edit_tells_what_it_took(session: Session) -> None:
+    session.set_shooting(ShootingOptions(residual=0.1))
+    opened(session, "cornell-box")
+    assert session.stats.edit_shots is None
+    frames(session, lambda: session.at_rest)
+    fresh = session.stats.fresh_shots
+    assert fresh == session.stats.shots > 0
+    dim(session, 0.5)
+    frames(session, lambda: session.at_rest)
+    assert session.stats.edit_shots == session.stats.shots - fresh and session.stats.fresh_shots == fresh
+    assert session.stats.edit_shots < fresh
+    session.restart()
+    assert session.stats.edit_shots is None and session.stats.fresh_shots is None
+
+
 @pytest.mark.parametrize("running", [True, False])
 def test_a_slider_that_is_dragged_makes_no_book_until_it_rests(
     session: Session, monkeypatch: pytest.MonkeyPatch, running: bool

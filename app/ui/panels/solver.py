@@ -87,6 +87,10 @@ def _progress(state: State) -> None:
     rate = f", {widgets.number(stats.shots_per_second, 3)}/s" if state.measured and not stats.converged else ""
     imgui.same_line()
     right(f"{stats.shots:,} shots{rate}", theme.DIM)
+    if stats.edit_shots is not None:
+        fresh = "" if stats.fresh_shots is None else f", from nothing {stats.fresh_shots:,}"
+        widgets.dim(f"the edit: {stats.edit_shots:,} shots{fresh}")
+        widgets.tooltip("Only the difference that an edit makes is shot, negative where light goes")
 
 
 def _energy(state: State) -> None:
