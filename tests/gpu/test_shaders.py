@@ -37,7 +37,6 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "EMISSION_TEXTURE": FLAG,
     "OVERLAY": FLAG,
     "SAMPLES": (1, 4),
-    "ADAPTIVE": FLAG,
     "FLAT": FLAG,
     "NEAR_FIELD": FLAG,
     "DISC": FLAG,

@@ -82,18 +82,16 @@ Texel leading_texel(ivec2 corner_px, int size, out float lead_residual) {
 }
 
 Shooter shooter_from_patch(ivec2 corner_px) {
-    int size = 1 << patch_level(corner_px / TILE);
+    int size = 1 << patch_level(corner_px);
     float lead_residual;
     Texel lead = leading_texel(corner_px, size, lead_residual);
     Shooter s;
     s.size_px = 0;
     if (lead.area <= 0.0) return s;
     vec3 dpdu = facet_tangent(lead.facet, 0), dpdv = facet_tangent(lead.facet, 1);
-#if ADAPTIVE
     float texel_size = texelFetch(t_leaves, corner_px / TILE, 0).z;
     dpdu *= texel_size;
     dpdv *= texel_size;
-#endif
     float reach = patch_reach(dpdu, dpdv, size);
     // the facet's own normal: the texels' packed ones tilt by 2^-15, enough to see what lies in the same plane
     s.normal = normalize(cross(dpdu, dpdv));

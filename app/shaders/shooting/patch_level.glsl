@@ -1,18 +1,17 @@
-// Mip level of the patches that a leaf shoots from. In a quadtree, patches of all leaves are about as large in the scene: a leaf that
-// is split shoots from as many texels more.
+// Mip level of the patches that shoot. In a quadtree, patches of all leaves are about as large in the scene: a leaf that is split
+// shoots from as many texels more. Where a shot would make or lose light, patches are finer.
 #define LEVEL 2
-#define ADAPTIVE 0
 
-const int MAX_LEVEL = 4;  // a whole tile
-
-#if ADAPTIVE
 #include "common/leaves.glsl"
 
-// slot: of the leaf in the node set; -1: holds none
-int patch_level(ivec2 slot) {
-    float texel_size = texelFetch(t_leaves, slot, 0).z;
-    return texel_size > 0.0 ? clamp(LEVEL - int(round(log2(texel_size))), 0, MAX_LEVEL) : -1;
+const int MAX_LEVEL = 4;  // a whole tile
+const int BLOCK = 4;      // texels along the edge of a block
+
+uniform sampler2D t_finer;  // levels that patches in each block are finer than elsewhere
+
+// px: a texel of the node set; -1: its slot holds no leaf
+int patch_level(ivec2 px) {
+    float texel_size = texelFetch(t_leaves, px / TILE, 0).z;
+    int level = LEVEL - int(round(log2(texel_size))) - int(texelFetch(t_finer, px / BLOCK, 0).r);
+    return texel_size > 0.0 ? clamp(level, 0, MAX_LEVEL) : -1;
 }
-#else
-int patch_level(ivec2 slot) { return LEVEL; }
-#endif

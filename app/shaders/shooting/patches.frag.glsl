@@ -1,7 +1,6 @@
 // Residual power of patches, |Σ r·A| [stored units · solver area], summed over RGB. Less light than was shot is a negative residual,
 // and is shot like any other [Chen90].
-//
-// Uniform: one texel per patch of 2^LEVEL texels. Quadtrees: one texel per block of 4×4, with the strongest patch that begins in it.
+// One texel per block of 4×4, with the strongest patch that begins in it.
 #include "common/atlas.glsl"
 #include "shooting/patch_level.glsl"
 
@@ -20,12 +19,9 @@ float patch_power(ivec2 corner_px, int size) {
     return dot(abs(power), vec3(1.0));
 }
 
-#if ADAPTIVE
-const int BLOCK = 4;
-
 void main() {
     ivec2 block_px = ivec2(gl_FragCoord.xy) * BLOCK;
-    int level = patch_level(block_px / TILE), size = 1 << max(level, 0);
+    int level = patch_level(block_px), size = 1 << max(level, 0);
     out_patch = vec4(0.0);
     if (level < 0 || any(notEqual(block_px & (size - 1), ivec2(0)))) return;
     for (int j = 0; j < BLOCK; j += size)
@@ -36,10 +32,3 @@ void main() {
             if (power > out_patch.x) out_patch.xyz = vec3(power, corner_px);
         }
 }
-#else
-void main() {
-    ivec2 corner_px = ivec2(gl_FragCoord.xy) << LEVEL;
-    float power = patch_power(corner_px, 1 << LEVEL);
-    out_patch = vec4(power, corner_px, power);
-}
-#endif

@@ -244,6 +244,7 @@ class AdaptiveShooting(UniformShooting):
         self._end_redo()
         self._regrowth.apply(change)
         self._emitted = self.lightmap.emitted
+        self.buffers.shoot_alike(corners(self.lightmap, np.concatenate([change.parents, change.children])).tolist())
         gone, came = (change.parents, change.children) if change.split else (change.children, change.parents)
         inherits = change.split or not self._fresh.isdisjoint(gone.tolist())
         self._fresh.difference_update(gone.tolist())

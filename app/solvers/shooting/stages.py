@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+import numpy as np
+
 from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, Pass, Texture
@@ -15,7 +19,7 @@ SHOOTER_ROWS = 7  # texels that describe one shooter, see shooter.glsl
 BLOCK_BYTES = 256  # no driver asks for a coarser uniform block alignment
 BLOCK_ROWS = BLOCK_BYTES // 16  # texels in a row of t_shooters: one shooter, padded to a uniform block
 REPORT_TEXELS = 2 + SHOOTER_ROWS  # see report.frag.glsl
-BLOCK_LEVEL = 2  # quadtrees: blocks of 4×4 texels, see patches.frag.glsl
+BLOCK_LEVEL = 2  # blocks of 4×4 texels, see patches.frag.glsl
 ROOT_LEVEL = 2  # quadtrees: at this level a texel of the root shoots by itself
 OPEN_BLOCK = 8  # visibility texels along the edge of a block that open.frag.glsl sums
 MAPS_TEXELS = 2**21  # of visibility that are drawn at once: more gain little and cost memory
@@ -33,16 +37,44 @@ class ShotBuffers:
         self.occluders = Occluders(gpu, lightmap)
         self.report = gpu.texture((REPORT_TEXELS, 1), 4, "f4")
         self.books = [gpu.texture((lightmap.columns, lightmap.rows), 4, "f4") for _ in range(3)]
+        self.finer = gpu.texture((lightmap.size[0] >> BLOCK_LEVEL, lightmap.size[1] >> BLOCK_LEVEL), 1, "f4")
+        self.finer_levels = np.zeros(self.finer.size[::-1], np.float32)  # the same, see patch_level.glsl
+        self.all_alike()
         self.run_target = gpu.target(self.runs)
         self.shooter_target = gpu.target(self.shooters)
         self.ledger_target = gpu.target(self.ledger)
         self.report_target = gpu.target(self.report)
         self.books_target = gpu.target(*self.books)
 
+    def shoot_finer(self, patches: Iterable[tuple[int, int, int]]) -> None:
+        """Let what is in these patches, column and row of the lower texel and edge, shoot from patches a level finer."""
+        blocks = {
+            (row, column)
+            for x, y, edge in patches
+            for row in range(y >> BLOCK_LEVEL, (y + edge - 1 >> BLOCK_LEVEL) + 1)
+            for column in range(x >> BLOCK_LEVEL, (x + edge - 1 >> BLOCK_LEVEL) + 1)
+        }
+        self.finer_levels[tuple(np.array(sorted(blocks)).T)] += 1
+        self.finer.write(self.finer_levels.tobytes())
+
+    def shoot_alike(self, corners: Iterable[tuple[int, int]]) -> None:
+        """Let the tiles that begin at these texels shoot from patches like all others."""
+        edge = TILE >> BLOCK_LEVEL
+        for column, row in ((x >> BLOCK_LEVEL, y >> BLOCK_LEVEL) for x, y in corners):
+            self.finer_levels[row : row + edge, column : column + edge] = 0
+        self.finer.write(self.finer_levels.tobytes())
+
+    def all_alike(self) -> None:
+        """Let all shoot from patches of one level."""
+        self.finer_levels[:] = 0
+        self.finer.write(self.finer_levels.tobytes())
+
     def enlarged(self, lightmap: Lightmap) -> ShotBuffers:
         """For a lightmap that has got more rows: the ledger stays, these are released. Waits for the GPU."""
         larger = ShotBuffers(self._gpu, lightmap)
         larger.ledger.write(self.ledger.read())
+        larger.finer_levels[: len(self.finer_levels)] = self.finer_levels
+        larger.finer.write(larger.finer_levels.tobytes())
         self.release()
         return larger
 
@@ -55,15 +87,13 @@ class ChoiceStages:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, level: int, *, adaptive: bool) -> None:
         self._gpu, self.level = gpu, level
-        grid = BLOCK_LEVEL if adaptive else level
-        self.patch_size = (lightmap.size[0] >> grid, lightmap.size[1] >> grid)
+        self.patch_size = (lightmap.size[0] >> BLOCK_LEVEL, lightmap.size[1] >> BLOCK_LEVEL)
         self.patches = gpu.texture(self.patch_size, 4, "f4")
         self.patch_target = gpu.target(self.patches)
-        kind = {"LEVEL": level - ROOT_LEVEL if adaptive else level, "ADAPTIVE": adaptive}
+        kind = {"LEVEL": level - ROOT_LEVEL if adaptive else level}
         self.add_patches = Pass(gpu, "shooting/patches", defines=kind)
-        self.add_runs = Pass(gpu, "shooting/runs", defines={"TILE_PATCHES": TILE >> grid})
+        self.add_runs = Pass(gpu, "shooting/runs", defines={"TILE_PATCHES": TILE >> BLOCK_LEVEL})
         self.choose = Pass(gpu, "shooting/choose", defines=kind | lightmap.defines("MATERIAL_BITS"))
-        self.leaves = ("t_leaves",) if adaptive else ()  # what patches and choose bind besides
 
     def release(self) -> None:
         release_all(self._gpu, self)
@@ -117,6 +147,7 @@ class ShotStages:
             for near in (False, True)
         }
         self.add_open = Pass(gpu, "shooting/open", defines={"BLOCK": OPEN_BLOCK})
+        self.audit = Pass(gpu, "shooting/audit")
         self.enter = Pass(gpu, "shooting/ledger")
         self.tell = Pass(gpu, "shooting/report")
         weights_target = gpu.target(self.weights)

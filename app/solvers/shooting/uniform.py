@@ -62,7 +62,8 @@ class UniformShooting(ShotPasses):
         self.lightmap.clear()
         self.buffers.ledger_target.clear()
         self._drop_reports()
-        self._choice = self.stages.choices[0]
+        self.buffers.all_alike()
+        self._choice, self._audits = self.stages.choices[0], True
         self.shots, self.last_shot = 0, None
         self._emitted = self.lightmap.emitted
         self.report = StepReport(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
@@ -101,7 +102,7 @@ class UniformShooting(ShotPasses):
         if (factor != 1).any():
             self._scale_light(factor)
         self.lightmap.edit_materials(materials, factor)
-        self._emitted = self.lightmap.emitted
+        self._emitted, self._audits = self.lightmap.emitted, True
         self._choice = self.stages.choices[0]
         self.report = replace(self.report, residual=self.unshot_share())
 
@@ -179,30 +180,14 @@ class UniformShooting(ShotPasses):
         runs[0] = 1.0, *corner, 0.0
         self.buffers.runs.write(runs.tobytes())
         self._describe(self._choice, 1)
-        self._see(0, 1)
-        scratch = [self.gpu.texture(self.lightmap.size, 4, "f4") for _ in range(2)]
-        target = self.gpu.target(*scratch)
-        target.clear()
-        self._receive(target, 0, 1, blend=None)
-        weight = np.frombuffer(scratch[0].read(), np.float32).reshape(*scratch[0].size[::-1], 4)[..., 3]
-        area = np.frombuffer(self.lightmap.texture("t_position_area").read(), np.float32).reshape(*weight.shape, 4)[
-            ..., 3
-        ]
-        self.gpu.release_all(target, *scratch)
-        self._look_out(0, 1)
-        blocks = (
-            np.frombuffer(self.stages.maps.open.read(), np.float32).reshape(BATCH, -1, 2)[0].astype(np.float64).sum(0)
-        )
-        shooter = np.frombuffer(self.buffers.shooters.read(), np.float32).reshape(BATCH, -1, 4)[0]
-        power = shooter[0, 3] * np.abs(shooter[5, :3].astype(np.float64)).sum()
-        received = float((area.astype(np.float64) * weight).sum() / power)
-        return Audit(received, float(blocks[0]), float(blocks[1]), self._shot_from_rows(shooter))
+        return Audit(*self._hand_out(0), self._shot_from_rows(self._shooter_rows(1)[0]))
 
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
         """Each part of a step by itself, to be timed. They leave the light wrong: reset afterwards."""
         shots = min(shots, BATCH)
         return {
-            "choose": lambda: self._choose(shots),
+            "choose": lambda: self._pick(shots),
+            "zero": lambda: self._zero(shots),
             "see": lambda: self._for_groups(self._see, shots),
             "receive": lambda: self._for_groups(self._light, shots),
             "look out": lambda: self._for_groups(self._look_out, shots),
@@ -223,6 +208,7 @@ class UniformShooting(ShotPasses):
     def _parts(self, shots: int, bands: int) -> Iterator[None]:
         """A step, from choosing to the report. [Coombe03, 3]"""
         self._choose(shots)
+        self._zero(shots)
         yield
         for first, some in self.stages.groups(shots):
             self._see(first, some)
