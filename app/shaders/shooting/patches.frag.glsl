@@ -2,7 +2,7 @@
 // and is shot like any other [Chen90].
 //
 // Uniform: one texel per patch of 2^LEVEL texels. Quadtrees: one texel per block of 4×4, with the strongest patch that begins in it.
-#include "common/atlas.glsl"
+#include "common/tile.glsl"
 #include "shooting/patch_level.glsl"
 
 uniform sampler2D t_position_area;

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, Pass, Texture
 from app.projections import PROJECTIONS, Occluders
-from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
+from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions, highest_level
 
 BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
 RUNS = 64  # at least, of slots: a batch is chosen from the strongest patch of each
@@ -59,9 +58,11 @@ class ChoiceStages:
         self.patch_size = (lightmap.size[0] >> grid, lightmap.size[1] >> grid)
         self.patches = gpu.texture(self.patch_size, 4, "f4")
         self.patch_target = gpu.target(self.patches)
-        kind = {"LEVEL": level - ROOT_LEVEL if adaptive else level, "ADAPTIVE": adaptive}
+        tile = lightmap.nodes.tile
+        kind = lightmap.defines("TILE") | {"LEVEL": level - ROOT_LEVEL if adaptive else level, "ADAPTIVE": adaptive}
+        kind["HIGHEST"] = highest_level(tile)
         self.add_patches = Pass(gpu, "shooting/patches", defines=kind)
-        self.add_runs = Pass(gpu, "shooting/runs", defines={"TILE_PATCHES": TILE >> grid})
+        self.add_runs = Pass(gpu, "shooting/runs", defines={"TILE_PATCHES": tile >> grid})
         self.choose = Pass(gpu, "shooting/choose", defines=kind | lightmap.defines("MATERIAL_BITS"))
         self.leaves = ("t_leaves",) if adaptive else ()  # what patches and choose bind besides
 
@@ -92,7 +93,9 @@ class ShotStages:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, adaptive: bool = False) -> None:
         self._gpu, self.projection, self._visibility = gpu, PROJECTIONS[options.projection], options.visibility
-        levels = range(options.level, (MAX_LEVEL if options.coarsen else options.level) + 1)
+        top = MAX_LEVEL if adaptive else highest_level(lightmap.nodes.tile)
+        first = min(options.level, top)
+        levels = range(first, (top if options.coarsen else first) + 1)
         self.choices = [ChoiceStages(gpu, lightmap, level, adaptive=adaptive) for level in levels]
         width, height = self.map_size = self.projection.size(options.resolution)
         self.most_maps = max(1, min(BATCH, MAPS_TEXELS // (width * height)))
@@ -122,7 +125,9 @@ class ShotStages:
         weights_target = gpu.target(self.weights)
         Pass(gpu, "shooting/weights", defines=resolution, slots=reads).draw(weights_target)
         gpu.release_all(weights_target)
-        self.add_books = Pass(gpu, "shooting/books", defines=lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"))
+        self.add_books = Pass(
+            gpu, "shooting/books", defines=lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE")
+        )
 
     @property
     def sight_textures(self) -> dict[str, Texture]:
