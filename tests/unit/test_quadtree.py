@@ -128,10 +128,10 @@ def object_areas(nodes: NodeSet) -> F64:
     return np.bincount(nodes.scene.object_ids[triangle], nodes.scene.normals_areas[1][triangle])
 
 
-@pytest.mark.parametrize(("name", "tile"), WITH_TILES)
-def test_neighbours_in_a_chart_differ_by_one_level_at_most(name: str, tile: int) -> None:
+@pytest.mark.parametrize("name", SCENES)
+def test_neighbours_in_a_chart_differ_by_one_level_at_most(name: str) -> None:
     for seed in range(3):
-        tree, rng = tree_of(name, tile=tile), np.random.default_rng(seed)
+        tree, rng = tree_of(name), np.random.default_rng(seed)
         assert worst_step(tree.nodes) <= 1, "at the start"
         for _ in range(3):
             shuffle(tree, rng, rounds=3)
