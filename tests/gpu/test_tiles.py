@@ -105,14 +105,16 @@ def test_the_light_does_not_depend_on_the_tile(gpu: Gpu, solver: str) -> None:
     np.testing.assert_allclose(*means, rtol=options["residual"])
 
 
-def test_no_patch_is_larger_than_its_leaf(gpu: Gpu) -> None:
+@pytest.mark.parametrize(("solver", "density"), [("shooting", 8.0), ("adaptive", 4.0)])
+def test_no_patch_is_larger_than_its_leaf(gpu: Gpu, solver: str, density: float) -> None:
+    """On quadtrees, the lamp's leaves begin two levels below the roots: those of the others shoot from smaller patches."""
     assert [highest_level(tile) for tile in TILES] == [3, 4, 4]
     for tile in TILES:
-        room = begin(gpu, table_room(), density=8.0, tile=tile, level=MAX_LEVEL, resolution=64)
+        room = begin(gpu, table_room(), density=density, tile=tile, level=MAX_LEVEL, resolution=64, solver=solver)
         room.solver.step(1)
         room.solver.poll(wait=True)
         assert room.solver.last_shot is not None and room.solver.last_shot.size == min(tile, 16)
-        assert set(room.solver.patch_edges()) == {min(tile, 16)}
+        assert room.solver.patch_edges().max() == min(tile, 16)
         room.release()
 
 
