@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from app.atlas.charts import TILE
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, ShaderError, Texture
 from app.gpu.imgui import ImguiRenderer
 from app.render.false_colour import Scale, colour_map, false_colour_scale
-from app.render.resolve import BORDERED, TEXELS_PER_FRAME
+from app.render.resolve import TEXELS_PER_FRAME, display_size
 from app.ui import theme
 from app.ui.app import Ui
 from app.ui.state import Legend, Request
@@ -27,7 +26,6 @@ from app.ui.state import Legend, Request
 if TYPE_CHECKING:
     from app.session import Session
 
-FRAME_TEXELS = TEXELS_PER_FRAME / (BORDERED / TILE) ** 2  # of the lightmap, that a frame brings up to date
 LEGEND_COLOURS = 48
 SCALE_SHARE = 0.05  # of the time may go into finding the false-colour scale
 SCALE_SECONDS = 0.5  # between two searches, at least
@@ -99,8 +97,7 @@ class UiFrame:
         """How many frames it takes until a change is seen everywhere."""
         if self._whole or not session.opened:
             return WARM_UP
-        width, height = session.lightmap.size
-        return WARM_UP + math.ceil(width * height / FRAME_TEXELS)
+        return WARM_UP + math.ceil(math.prod(display_size(session.lightmap)) / TEXELS_PER_FRAME)
 
     def release(self) -> None:
         """Give back the GL objects. The interface is still usable by another renderer, or can be released."""

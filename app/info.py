@@ -6,7 +6,7 @@ import argparse
 import math
 from typing import Any
 
-from app.atlas.charts import TILE, Charts
+from app.atlas.charts import Charts
 from app.atlas.lightmap import STORAGE
 from app.atlas.node_set import TABLE_WIDTH
 from app.atlas.options import AtlasOptions
@@ -19,8 +19,7 @@ from app.scene.model import Scene
 SURFACE_BYTES = 24  # per texel: position and area, normal and ids
 TEXTURE_BYTES = 8  # per texel, for albedo and for emission
 FACET_ENTRY_BYTES = 16  # two of them per facet
-PAGE_BYTES = 4  # per cell of TILE×TILE texels of the atlas
-LEVELS = TILE.bit_length() - 1  # from tiles down to texels
+PAGE_BYTES = 4  # per cell of tile×tile texels of the atlas
 
 
 def info(flags: argparse.Namespace) -> int:
@@ -43,8 +42,9 @@ def info(flags: argparse.Namespace) -> int:
         "charts": charts.chart_count,
         "unfolded_by": charts.method,
         "texels_per_metre": charts.density,
-        "texels": len(uniform_leaves(charts, LEVELS)),
+        "texels": len(uniform_leaves(charts, int(math.log2(charts.tile)))),
         "tiles": tiles,
+        "tile_edge": charts.tile,
         "atlas": list(charts.size),
         "memory_mib": _memory(scene, charts, tiles, flags.storage) / 2**20,
         "warnings": [*scene.warnings, *charts.warnings],
@@ -59,9 +59,9 @@ def info(flags: argparse.Namespace) -> int:
 def _memory(scene: Scene, charts: Charts, tiles: int, storage: str) -> int:
     """Bytes that the lightmap will take on the GPU: its tiles, side by side in a square, and their tables."""
     columns = math.isqrt(max(tiles - 1, 0)) + 1
-    texels = columns * -(-tiles // columns) * TILE * TILE
+    texels = columns * -(-tiles // columns) * charts.tile**2
     light = 2 * 4 * int(STORAGE[storage][1:])  # H and r, four channels of f4, f2 or f1
-    pages = PAGE_BYTES * math.prod(charts.size) // TILE**2
+    pages = PAGE_BYTES * math.prod(charts.size) // charts.tile**2
     facets = _whole_rows(FACET_ENTRY_BYTES, 2 * (charts.facet_count + 1))
     return texels * (SURFACE_BYTES + light + TEXTURE_BYTES * _textured(scene)) + pages + facets
 

@@ -50,6 +50,7 @@ def read_and_unfold(
         scene,
         density=atlas.density,
         texels=atlas.texels,
+        tile=atlas.tile,
         roots=atlas.adaptive,
         progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share),
     )

@@ -34,7 +34,7 @@ class Spec:
     unit: str = ""
     minimum: float | None = None
     maximum: float | None = None
-    choices: tuple[str, ...] = ()
+    choices: tuple[str, ...] | tuple[int, ...] = ()
     logarithmic: bool = False
     multiple: int = 1
     optional: bool = False
@@ -49,7 +49,7 @@ class Spec:
         if self.multiple > 1:
             return f"{self.minimum:g} to {self.maximum:g} in steps of {self.multiple}"
         if self.choices:
-            return "one of " + ", ".join(self.choices)
+            return "one of " + ", ".join(map(str, self.choices))
         if self.minimum is not None and self.maximum is not None:
             return f"{self._text(self.minimum)} to {self._text(self.maximum)}"
         if self.minimum is not None:
@@ -89,7 +89,7 @@ def option(
     unit: str = "",
     minimum: float | None = None,
     maximum: float | None = None,
-    choices: typing.Iterable[str] = (),
+    choices: typing.Iterable[str] | typing.Iterable[int] = (),
     logarithmic: bool = False,
     multiple: int = 1,
 ) -> Any:
@@ -146,7 +146,7 @@ def add_flags(parser: argparse.ArgumentParser, options: type[Options]) -> None:
         if spec.type is bool:
             group.add_argument(spec.flag, action=argparse.BooleanOptionalAction, default=None, help=text)
         else:
-            meta = "{" + ",".join(spec.choices) + "}" if spec.choices else spec.type.__name__.upper()
+            meta = "{" + ",".join(map(str, spec.choices)) + "}" if spec.choices else spec.type.__name__.upper()
             group.add_argument(spec.flag, type=_reader(spec), default=None, metavar=meta, help=text)
 
 

@@ -32,7 +32,7 @@ from app.render.items import ItemImage
 from app.render.options import DisplayOptions
 from app.render.surfaces import Rect
 from app.scene.model import RGB, Camera, Material, Scene
-from app.solvers import DEFAULT_SOLVER, EnergyBook, ShootingOptions, Solver
+from app.solvers import DEFAULT_SOLVER, EnergyBook, ShootingOptions, Solver, highest_level
 from app.solving import not_finite, share_done, solve
 from app.stats import Stats, Stop, stats_of
 
@@ -353,7 +353,8 @@ class Session:
     def pick(self, x_px: int, y_px: int) -> Picked | None:
         """What surface is at that pixel of the last frame, and the light on it."""
         hit = self.renderer.pick(x_px, y_px)
-        return None if hit is None else picked_from_hit(self.lightmap, hit, self.shooting.level)
+        level = min(self.shooting.level, highest_level(self.charts.tile))
+        return None if hit is None else picked_from_hit(self.lightmap, hit, level)
 
     def look_through(self, camera: Camera) -> None:
         """Stand where a camera of the scene stands; orbit around the scene's middle from there."""

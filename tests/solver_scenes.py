@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from app.atlas.charts import TILE
+from app.atlas.charts import DEFAULT_TILE
 from app.atlas.lightmap import Lightmap
 from app.atlas.node_set import NodeSet
 from app.atlas.parametrize import parametrize
@@ -154,7 +154,9 @@ class Solution:
         """(p, 2) column and row of the lower texel of every patch of the shooting level that covers a surface."""
         nodes, found = self.lightmap.nodes, []
         for slot, edge in enumerate(self.solver.patch_edges().tolist()):
-            inside = nodes.surfaces.area[slot].reshape(TILE // edge, edge, TILE // edge, edge).sum((1, 3)) > 0
+            inside = (
+                nodes.surfaces.area[slot].reshape(nodes.tile // edge, edge, nodes.tile // edge, edge).sum((1, 3)) > 0
+            )
             found.append(np.argwhere(inside)[:, ::-1] * edge + nodes.corner(slot))
         return np.concatenate(found)
 
@@ -174,12 +176,13 @@ def begin(
     *,
     texels: int | None = None,
     density: float | None = None,
+    tile: int = DEFAULT_TILE,
     solver: str = "shooting",
     **options: object,
 ) -> Solution:
     """The scene before the first shot. options: of ShootingOptions. Where leaves come and go, texels and density are those of the
     roots, which uniform texels are as fine as, and shooting levels count from there."""
-    charts = parametrize(scene, texels=texels, density=density)
+    charts = parametrize(scene, texels=texels, density=density, tile=tile)
     shooting = ShootingOptions(depth=1).replace(**options)
     nodes = quadtree_nodes(scene, charts) if SOLVERS[solver].adaptive else NodeSet(scene, charts)
     if SOLVERS[solver].adaptive:

@@ -1,7 +1,7 @@
 """Where each lit side of each triangle lies in the virtual atlas.
 
-The *virtual atlas* is one rectangle of W×H texels at the root level, cut into tiles of 16×16. A *face* is one side of a
-triangle that light can reach (a double-sided triangle has two faces). Faces that unfold together are a *chart*: one
+The *virtual atlas* is one rectangle of W×H texels at the root level, cut into tiles of t×t, t = ``Charts.tile``. A *face* is one
+side of a triangle that light can reach (a double-sided triangle has two faces). Faces that unfold together are a *chart*: one
 axis-aligned chart for each flat rectangle, xatlas for the rest. Charts keep ``GAP`` empty texels between them, so that
 bilinear look-ups and filled gutters never bleed, and start at multiples of ``ALIGN`` texels, so that the 4×4 patches that
 shoot are whole. A *facet* is a connected flat piece of one chart: nothing in it can hide anything else in it.
@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-TILE = 16  # texels along the edge of a leaf tile [Coombe03, 4.1]
+TILES = (8, 16, 32)  # texels along the edge of a leaf tile
+DEFAULT_TILE = 16  # [Coombe03, 4.1]
 GAP = 2  # empty texels between charts: one gutter texel for each neighbour
 ALIGN = 4  # charts start at multiples of the default shooting patch (mip level 2)
 
@@ -24,7 +25,8 @@ ALIGN = 4  # charts start at multiples of the default shooting patch (mip level 
 class Charts:
     """The unfolding of a scene's lit sides into the virtual atlas.
 
-    size: (W, H) texels, multiples of TILE.
+    size: (W, H) texels, multiples of tile.
+    tile: texels along the edge of a leaf tile, one of TILES.
     density: texels per metre that was aimed at.
     face_triangle (f,) i32: the scene's triangle; face_back (f,) bool: whether it is its back side.
     face_uv (f, 3, 2) f64: atlas position [texels] of the triangle's corners, in the triangle's own corner order.
@@ -35,6 +37,7 @@ class Charts:
     """
 
     size: tuple[int, int]
+    tile: int
     density: float
     face_triangle: NDArray[np.int32]
     face_back: NDArray[np.bool_]

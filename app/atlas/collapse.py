@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import TILE
 from app.atlas.node_set import NodeSet
 from app.scene.model import F32
 
@@ -17,7 +16,7 @@ Mask = NDArray[np.bool_]
 
 
 def collapse(nodes: NodeSet, values: F32) -> tuple[F32, Mask]:
-    """Values (slots, 16, 16, c) as an image (H, W, c) of the atlas at the finest level in use, row 0 at v = 0, and which of its
+    """Values (slots, t, t, c) as an image (H, W, c) of the atlas at the finest level in use, row 0 at v = 0, and which of its
     texels (H, W) cover a surface."""
     finest = int(nodes.leaves.level.max(initial=0))
     levels = [_level_image(nodes, values, level) for level in range(finest + 1)]
@@ -38,15 +37,15 @@ def _level_image(nodes: NodeSet, values: F32, level: int) -> tuple[F32, Mask]:
     covered = np.zeros((height, width), bool)
     mine = np.flatnonzero(nodes.leaves.level == level)
     where = nodes.leaves.y[mine], nodes.leaves.x[mine]
-    _tiled(image)[where] = values[mine]
-    _tiled(covered)[where] = nodes.surfaces.face[mine] >= 0
+    _tiled(image, nodes.tile)[where] = values[mine]
+    _tiled(covered, nodes.tile)[where] = nodes.surfaces.face[mine] >= 0
     return image, covered
 
 
-def _tiled(image: NDArray[np.generic]) -> NDArray[np.generic]:
-    """A view (rows, columns, 16, 16, …) of an image's tiles."""
+def _tiled(image: NDArray[np.generic], tile: int) -> NDArray[np.generic]:
+    """A view (rows, columns, t, t, …) of an image's tiles."""
     height, width = image.shape[:2]
-    return image.reshape(height // TILE, TILE, width // TILE, TILE, *image.shape[2:]).swapaxes(1, 2)
+    return image.reshape(height // tile, tile, width // tile, tile, *image.shape[2:]).swapaxes(1, 2)
 
 
 def _take_means(coarse: tuple[F32, Mask], fine: tuple[F32, Mask]) -> None:

@@ -1,6 +1,6 @@
 """The light on every texel, on the GPU: what solvers write and everything else reads.
 
-Node-set textures hold the leaf tiles of 16×16 texels side by side [Coombe03, 4.2]:
+Node-set textures hold the leaf tiles of t×t texels side by side [Coombe03, 4.2]:
 
     t_position_area  RGBA32F  centroid p (solver frame), area A (solver frame; 0 = nothing here)
     t_normal_ids     RG32UI   unit normal (octahedral, 2×snorm16), facet << MATERIAL_BITS | material (facet from 1)
@@ -21,7 +21,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import TILE, Charts
+from app.atlas.charts import Charts
 from app.atlas.node_set import OCCLUDER_FORMAT, VERTEX_FORMAT, Array, Frame, NodeSet
 from app.atlas.receivers import RECEIVER_FORMAT
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
@@ -70,6 +70,7 @@ class Lightmap:
     def defines(self, *names: str) -> dict[str, object]:
         """Those shader defines that follow from the scene: look-ups exist only where a texture does."""
         values: dict[str, object] = {
+            "TILE": self.nodes.tile,
             "MATERIAL_BITS": self.nodes.material_bits,
             "ALBEDO_TEXTURE": "t_albedo" in self._textures,
             "EMISSION_TEXTURE": "t_emission" in self._textures,
@@ -161,10 +162,11 @@ class Lightmap:
 
     def write_tiles(self, slots: NDArray[np.int64]) -> None:
         """Take over these slots of the node set, and the tables and receivers that follow. Their light stays as it is."""
+        edge = self.nodes.tile
         for name, tiles in self.nodes.tile_arrays(slots).items():
             texture = self._textures[name]
             for slot, tile in zip(slots.tolist(), tiles, strict=True):
-                texture.write(np.ascontiguousarray(tile).tobytes(), viewport=(*self.nodes.corner(slot), TILE, TILE))
+                texture.write(np.ascontiguousarray(tile).tobytes(), viewport=(*self.nodes.corner(slot), edge, edge))
         for name, table in self.nodes.slot_tables.items():
             self._textures[name].write(table.tobytes())
         self.gpu.release_all(*self.receivers.values())
@@ -226,11 +228,11 @@ class Lightmap:
     # -- read-back -----------------------------------------------------------------------------------------------------
 
     def irradiance(self) -> F32:
-        """H of every tile (tiles, 16, 16, 3) f32 [W/m²]. Waits for the GPU."""
+        """H of every tile (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""
         return self._read("t_irradiance")
 
     def residual(self) -> F32:
-        """r of every tile (tiles, 16, 16, 3) f32 [W/m²]. Waits for the GPU."""
+        """r of every tile (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""
         return self._read("t_residual")
 
     def light_at(self, texel: tuple[int, int]) -> tuple[F64, F64]:
@@ -242,15 +244,15 @@ class Lightmap:
         return H, r
 
     def albedo(self) -> F32:
-        """ρ of every texel (tiles, 16, 16, 3) f32; 0 where nothing is covered."""
+        """ρ of every texel (tiles, t, t, 3) f32; 0 where nothing is covered."""
         return self._factor([m.albedo for m in self.scene.materials], self.nodes.albedo_tiles)
 
     def emission(self) -> F32:
-        """E = πL of every texel (tiles, 16, 16, 3) f32 [W/m²]."""
+        """E = πL of every texel (tiles, t, t, 3) f32 [W/m²]."""
         return self._factor([m.emission for m in self.scene.materials], self.nodes.emission_tiles) * np.float32(np.pi)
 
     def radiosity(self) -> F32:
-        """B = E + ρH of every texel (tiles, 16, 16, 3) f32 [W/m²]. Waits for the GPU."""
+        """B = E + ρH of every texel (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""
         return self.emission() + self.albedo() * self.irradiance()
 
     @property

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import TILE, Charts
+from app.atlas.charts import Charts
 from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents
 from app.scene.model import F32, F64, I32, Scene, Texture
 
@@ -22,7 +22,7 @@ BLOCK = 1 << 17  # texels in work at a time
 def texel_colours(
     scene: Scene, charts: Charts, leaves: Leaves, surfaces: TexelSurfaces
 ) -> tuple[F32 | None, F32 | None]:
-    """Albedo and emission textures on every texel, (n, 16, 16, 3) f32: 1 where the material has no such texture.
+    """Albedo and emission textures on every texel, (n, t, t, 3) f32: 1 where the material has no such texture.
 
     None where no material in use has one. The material's factors are not included.
     """
@@ -75,7 +75,7 @@ def _footprints(
     b1 = np.einsum("nk,nk->n", np.cross(p, e2), normal) / squared
     b2 = np.einsum("nk,nk->n", np.cross(e1, p), normal) / squared
     at = uv[:, 0] + b1[:, None] * t1 + b2[:, None] * t2
-    size = 0.5 ** leaves.level[texel // (TILE * TILE)][:, None]
+    size = 0.5 ** leaves.level[texel // charts.tile**2][:, None]
     return at, per_u * size, per_v * size
 
 

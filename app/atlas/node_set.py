@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import TILE, Charts
+from app.atlas.charts import Charts
 from app.atlas.receivers import KIND, TileTexels, receivers, tile_kinds
 from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents, uniform_leaves
 from app.atlas.tiles import Tiles
@@ -47,7 +47,8 @@ class Frame:
 class NodeSet:
     """Leaf tiles side by side in one rectangle of ``columns``×``rows`` slots, and the tables that go with them.
 
-    tiles: number of slots; used (tiles,) bool: those that hold a leaf; depth: finest level of leaves, in which pages are counted.
+    tile: edge of a leaf [texels], t below; tiles: number of slots; used (tiles,) bool: those that hold a leaf; depth: finest
+    level of leaves, in which pages are counted.
     leaves, surfaces, albedo_tiles, emission_tiles: of every slot, empty where it is not used.
     occluders: of the visibility map; vertices: the triangles' vertex buffer; flat_spans, shaped_tiles: the receivers.
     Raises UserError where facets and materials do not fit the 32 bits of a texel's ids.
@@ -57,7 +58,7 @@ class NodeSet:
         self, scene: Scene, charts: Charts, leaves: Leaves | None = None, *, depth: int = 0, slots: int = 0
     ) -> None:
         """leaves: by default all of level 0; slots: room for so many, at least."""
-        self.scene, self.charts, self.depth = scene, charts, depth
+        self.scene, self.charts, self.depth, self.tile = scene, charts, depth, charts.tile
         self.frame = Frame.of(scene)
         self.material_bits = max(1, (len(scene.materials) - 1).bit_length())
         if charts.facet_count > min(MAX_FACETS, (1 << (32 - self.material_bits)) - 2):
@@ -75,7 +76,7 @@ class NodeSet:
         self.columns = max(1, int(np.ceil(np.sqrt(slots))))
         none = np.full(0, -1, np.int32)
         self.leaves = Leaves(none, none, none)
-        shape = (0, TILE, TILE)
+        shape = (0, self.tile, self.tile)
         vectors, colours = np.zeros((*shape, 3)), np.zeros((*shape, 3), np.float32)
         self.surfaces = TexelSurfaces(vectors, np.zeros(shape), colours, np.zeros(shape, np.int32), vectors)
         self.albedo_tiles = None if cut.albedo is None else colours
@@ -97,7 +98,7 @@ class NodeSet:
         self._kinds, self.used = _stretched(self._kinds, more, 0), _stretched(self.used, more, False)
         self._texels = _stretched(self._texels, more, 0)
         self.tiles, self.rows = slots, max(1, -(-slots // self.columns))
-        self.size = (self.columns * TILE, self.rows * TILE)
+        self.size = (self.columns * self.tile, self.rows * self.tile)
         self.__dict__.pop("slot_tables", None)
 
     # -- leaves that come and go ---------------------------------------------------------------------------------------
@@ -120,7 +121,7 @@ class NodeSet:
 
     def receivers_of(self, slots: NDArray[np.int64]) -> tuple[F32, F32]:
         """Flat spans and shaped tiles of these slots, in ascending order, see receivers.py."""
-        return receivers(self._kinds, slots, self.leaves, self.columns)
+        return receivers(self._kinds, slots, self.leaves, self.columns, self.tile)
 
     def free(self, slots: NDArray[np.int64]) -> None:
         """Let these slots hold nothing. The receivers follow with the next ``put``."""
@@ -166,36 +167,36 @@ class NodeSet:
     @property
     def pages_per_texel(self) -> float:
         """Along an edge, of the page table, for each texel of level 0."""
-        return float(2**self.depth) / TILE
+        return float(2**self.depth) / self.tile
 
     def corner(self, slot: int) -> tuple[int, int]:
         """Column and row of a slot's first texel."""
-        return slot % self.columns * TILE, slot // self.columns * TILE
+        return slot % self.columns * self.tile, slot // self.columns * self.tile
 
     def tiles_from_image(self, image: Array) -> Array:
-        """A node-set image (height, width, c) as tiles (tiles, 16, 16, c)."""
-        cells = image.reshape(self.rows, TILE, self.columns, TILE, -1).swapaxes(1, 2)
-        return cells.reshape(-1, TILE, TILE, image.shape[-1])[: self.tiles]
+        """A node-set image (height, width, c) as tiles (tiles, t, t, c)."""
+        cells = image.reshape(self.rows, self.tile, self.columns, self.tile, -1).swapaxes(1, 2)
+        return cells.reshape(-1, self.tile, self.tile, image.shape[-1])[: self.tiles]
 
     def image_from_tiles(self, tiles: Array) -> Array:
-        """Tiles (tiles, 16, 16, c) as a node-set image (height, width, c)."""
+        """Tiles (tiles, t, t, c) as a node-set image (height, width, c)."""
         grid = np.zeros((self.rows * self.columns, *tiles.shape[1:]), tiles.dtype)
         grid[: self.tiles] = tiles
-        cells = grid.reshape(self.rows, self.columns, TILE, TILE, -1).swapaxes(1, 2)
-        return np.ascontiguousarray(cells).reshape(self.rows * TILE, self.columns * TILE, -1)
+        cells = grid.reshape(self.rows, self.columns, self.tile, self.tile, -1).swapaxes(1, 2)
+        return np.ascontiguousarray(cells).reshape(self.rows * self.tile, self.columns * self.tile, -1)
 
     def slot_at(self, uv: tuple[float, float]) -> int:
         """The slot of the leaf at a place of the virtual atlas [texels of level 0]; -1 where there is none."""
-        tile = np.floor(np.array(uv)[:, None] / TILE * 2.0**self.leaves.level).astype(np.int64)
+        tile = np.floor(np.array(uv)[:, None] / self.tile * 2.0**self.leaves.level).astype(np.int64)
         found = np.flatnonzero(self.used & (self.leaves.x == tile[0]) & (self.leaves.y == tile[1]))
         return int(found[0]) if len(found) else -1
 
     def atlas_rect(self, corner: tuple[int, int], size: int) -> tuple[float, float, float, float]:
         """The square of ``size`` texels at ``corner`` of the node set, as (u, v, u, v) in the virtual atlas."""
-        slot = min((corner[1] // TILE) * self.columns + corner[0] // TILE, self.tiles - 1)
+        slot = min((corner[1] // self.tile) * self.columns + corner[0] // self.tile, self.tiles - 1)
         texel = 0.5 ** max(int(self.leaves.level[slot]), 0)
-        u = float(self.leaves.x[slot] * TILE + corner[0] % TILE) * texel
-        v = float(self.leaves.y[slot] * TILE + corner[1] % TILE) * texel
+        u = float(self.leaves.x[slot] * self.tile + corner[0] % self.tile) * texel
+        v = float(self.leaves.y[slot] * self.tile + corner[1] % self.tile) * texel
         return u, v, u + size * texel, v + size * texel
 
     def material_table(self, scene: Scene) -> F32:
@@ -206,7 +207,7 @@ class NodeSet:
         return table
 
     def tile_arrays(self, slots: NDArray[np.int64]) -> dict[str, Array]:
-        """Texture name -> (n, 16, 16, components) of these slots, as the texture holds them."""
+        """Texture name -> (n, t, t, components) of these slots, as the texture holds them."""
         charts, face = self.charts, self.surfaces.face[slots]
         covered = face >= 0
         position = np.where(covered[..., None], self.frame.local_from_world(self.surfaces.position[slots]), 0.0)
@@ -226,9 +227,9 @@ class NodeSet:
     @functools.cached_property
     def slot_tables(self) -> dict[str, Array]:
         """Tables that follow the leaves, made once for each change. t_pages (H, W, 1) u32: the slot, from 1, of each cell of
-        16×16 texels of the finest level; t_leaves (rows, columns, 4) f32: x, y [tiles of its level] and size of a texel [texels
+        t×t texels of the finest level; t_leaves (rows, columns, 4) f32: x, y [tiles of its level] and size of a texel [texels
         of level 0] of each slot, 0 where it is free."""
-        width, height = ((side << self.depth) // TILE for side in self.charts.size)
+        width, height = ((side << self.depth) // self.tile for side in self.charts.size)
         pages = np.zeros((height, width, 1), np.uint32)
         for level in range(self.depth + 1):
             mine = np.flatnonzero(self.leaves.level == level)

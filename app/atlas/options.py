@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from app.atlas.charts import DEFAULT_TILE, TILES
 from app.options import Options, option
 
 MAX_TEXELS = 16_000_000
@@ -18,3 +19,8 @@ class AtlasOptions(Options):
         False, "texture quadtrees that follow the light; --texels and --density are then those of the roots"
     )
     texels: int | None = option(None, "texels in all; unset: chosen from the scene", minimum=1, maximum=MAX_TEXELS)
+    tile: int = option(
+        DEFAULT_TILE,
+        "texels along the edge of a leaf: small leaves follow the light more closely, large ones take less bookkeeping",
+        choices=TILES,
+    )

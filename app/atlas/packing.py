@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import ALIGN, GAP, TILE
+from app.atlas.charts import ALIGN, GAP
 from app.errors import UserError
 from app.scene.model import F64, I32
 
@@ -78,8 +78,8 @@ def outlines(uv: F64, chart: I64, count: int) -> Outlines:
     return Outlines(starts, np.maximum(solid, 1), bottom, top)
 
 
-def pack(shapes: Outlines) -> tuple[I32, tuple[int, int]]:
-    """Origins (c, 2) i32 of the charts [texels] and the atlas's size (W, H), multiples of TILE.
+def pack(shapes: Outlines, tile: int) -> tuple[I32, tuple[int, int]]:
+    """Origins (c, 2) i32 of the charts [texels] and the atlas's size (W, H), multiples of ``tile``.
 
     Several widths are tried, fewer the more charts there are; the smallest atlas wins.
     Raises UserError when a side would be longer than MAX_SIDE.
@@ -88,8 +88,8 @@ def pack(shapes: Outlines) -> tuple[I32, tuple[int, int]]:
     total = float((shapes.top - shapes.bottom).sum()) * ALIGN
     least = int(shapes.solid.max()) * ALIGN
     tries = int(np.clip(DROPS // len(columns), 1, len(ASPECTS)))
-    widths = {_round_up(max(np.sqrt(total / FILL) * aspect, least), TILE) for aspect in ASPECTS[:tries]}
-    packed = [(_pack_across(shapes, width), width) for width in sorted(widths)]
+    widths = {_round_up(max(np.sqrt(total / FILL) * aspect, least), tile) for aspect in ASPECTS[:tries]}
+    packed = [(_pack_across(shapes, width, tile), width) for width in sorted(widths)]
     (origins, down), across = min(packed, key=lambda p: p[0][1] * p[1])
     if max(across, down) > MAX_SIDE:
         raise UserError(
@@ -98,7 +98,7 @@ def pack(shapes: Outlines) -> tuple[I32, tuple[int, int]]:
     return origins.astype(np.int32), (across, down)
 
 
-def _pack_across(shapes: Outlines, across: int) -> tuple[I64, int]:
+def _pack_across(shapes: Outlines, across: int, tile: int) -> tuple[I64, int]:
     """Origins (c, 2) in an atlas of this width, and the height that takes."""
     starts, bottom, top = shapes.starts, shapes.bottom, shapes.top
     columns = np.diff(starts)
@@ -117,16 +117,16 @@ def _pack_across(shapes: Outlines, across: int) -> tuple[I64, int]:
     large = np.flatnonzero(~small)
     drop(large)
     blocks = np.stack([columns, -(-height // ALIGN)], axis=1)
-    left = _fill_holes(shapes, origins, large, np.flatnonzero(small), blocks, len(skyline))
+    left = _fill_holes(shapes, origins, large, np.flatnonzero(small), blocks, len(skyline), tile)
     filled = np.setdiff1d(np.flatnonzero(small), left)
     for k in range(SMALL):
         wide = filled[columns[filled] > k]
         np.maximum.at(skyline, origins[wide, 0] // ALIGN + k, (origins[wide, 1] + height[wide]))
     drop(left)
-    return origins, _round_up(int((origins[:, 1] + height).max()) - GAP, TILE)
+    return origins, _round_up(int((origins[:, 1] + height).max()) - GAP, tile)
 
 
-def _fill_holes(shapes: Outlines, origins: I64, large: I64, small: I64, blocks: I64, across: int) -> I64:
+def _fill_holes(shapes: Outlines, origins: I64, large: I64, small: I64, blocks: I64, across: int, tile: int) -> I64:
     """Put small charts, as boxes of blocks (c, 2), where large ones leave room; returns those that found none.
 
     across: columns of the atlas with the one for gaps. Boxes of one size go in lattice by lattice: those of one phase
@@ -140,7 +140,7 @@ def _fill_holes(shapes: Outlines, origins: I64, large: I64, small: I64, blocks: 
     column = base[:, 0] // ALIGN + slot - np.repeat(shapes.starts[large], count)
     first = (base[:, 1] + shapes.bottom[slot]) // ALIGN
     last = -(-(base[:, 1] + shapes.top[slot]) // ALIGN)
-    rows = _round_up((int(last.max()) - 1) * ALIGN, TILE) // ALIGN + 1  # the last one only takes gaps that stick out
+    rows = _round_up((int(last.max()) - 1) * ALIGN, tile) // ALIGN + 1  # the last one only takes gaps that stick out
     edges = np.zeros((rows + 1, across), np.int64)
     np.add.at(edges, (first, column), 1)
     np.add.at(edges, (last, column), -1)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import ALIGN, GAP, Charts
+from app.atlas.charts import ALIGN, DEFAULT_TILE, GAP, Charts
 from app.atlas.packing import MAX_SIDE, outlines, pack
 from app.atlas.rectangles import Rectangles, find_rectangles
 from app.atlas.sides import Sides, distinct_rows, facets, lit_sides, scene_size, totals, weld
@@ -54,6 +54,7 @@ def parametrize(
     *,
     density: float | None = None,
     texels: int | None = None,
+    tile: int = DEFAULT_TILE,
     roots: bool = False,
     progress: Progress | None = None,
     time_limit: float | None = None,
@@ -63,8 +64,8 @@ def parametrize(
     density [texels/m], or texels: how many to aim at; by default 8 for each lit side, within 32 000 and 2 million, and for
     ``roots`` of quadtrees a sixteenth of that.
     Rectangles are made of whole patches, so that a small number of texels is met only roughly, and below one
-    texel per chart not at all. time_limit [s] for xatlas. progress(stage, share) is called from time to time and may
-    raise to cancel.
+    texel per chart not at all. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage, share) is
+    called from time to time and may raise to cancel.
     Raises UserError for a density or number out of range, or when more than 16 777 216 texels are needed.
     """
     _check(density, texels)
@@ -85,11 +86,12 @@ def parametrize(
         raise UserError(
             f"--density {density:g} needs {need:,.0f} texels: the limit is {MAX_TEXELS:,} (density {best:.3g})"
         )
-    charts = _place(layout, lit, facet, density)
+    charts = _place(layout, lit, facet, density, tile)
     report("pack", 1.0)
     face_uv, face_chart, face_facet, rects, size = charts
     return Charts(
         size=size,
+        tile=tile,
         density=density,
         face_triangle=lit.triangle,
         face_back=lit.back,
@@ -232,7 +234,7 @@ def _density_for(layout: Layout, texels: int) -> float:
 
 
 def _place(
-    layout: Layout, lit: Sides, facet: I32, density: float
+    layout: Layout, lit: Sides, facet: I32, density: float, tile: int
 ) -> tuple[F64, I32, I32, NDArray[np.int32], tuple[int, int]]:
     """face_uv, face_chart, face_facet, chart_rects and the atlas's size."""
     box = _sizes(layout, density)
@@ -243,7 +245,7 @@ def _place(
     # the back of a chart is its front seen in a mirror
     uv[lit.back, :, 0] = box[piece[lit.back], 0][:, None] - uv[lit.back, :, 0]
     first, chart, _ = distinct_rows(lit.back, piece)
-    origins, size = pack(outlines(uv, chart, len(first)))
+    origins, size = pack(outlines(uv, chart, len(first)), tile)
     uv += origins[chart][:, None]
     rects = np.concatenate([origins, box[piece[first]].astype(np.int32)], axis=1)
     face_facet = distinct_rows(chart, facet[lit.triangle])[1]

@@ -1,4 +1,4 @@
-"""Texture quadtrees over the charts: one leaf of 16×16 texels for each square of the atlas that is smooth [Coombe03, 4.1].
+"""Texture quadtrees over the charts: one leaf of t×t texels for each square of the atlas that is smooth [Coombe03, 4.1].
 
 A tile (level, x, y) splits into the four of the next level that it covers; those that meet no surface do not exist. Leaves that
 share a chart and an edge differ by one level at most, so that interpolation across the edge meets two texels with one.
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import TILE, Charts
+from app.atlas.charts import Charts
 from app.atlas.node_set import NodeSet
 from app.atlas.texels import Leaves, uniform_leaves
 from app.atlas.tiles import Tiles
@@ -21,9 +21,9 @@ from app.scene.model import Scene
 
 Tile = tuple[int, int, int]  # level, x, y
 SIDES = ((-1, 0), (1, 0), (0, -1), (0, 1))
-WHOLE_CHART = TILE  # texels along the longer edge of a chart that emits: fewer make a lamp of too few shooters
+WHOLE_CHART = 16  # texels along the longer edge of a chart that emits: fewer make a lamp of too few shooters
 MAX_DEPTH = 6  # of leaves below the roots
-FIRST_ROOM = 512  # slots
+FIRST_ROOM = 1 << 17  # texels
 SMALLEST = 4  # texels along the longer edge of any chart: one patch that shoots
 
 
@@ -217,7 +217,7 @@ class Quadtree:
 def quadtree_nodes(scene: Scene, charts: Charts) -> NodeSet:
     """The node set to begin with: few leaves, and room for as many again."""
     leaves = first_leaves(scene, charts, MAX_DEPTH)
-    nodes = NodeSet(scene, charts, leaves, depth=MAX_DEPTH, slots=max(FIRST_ROOM, 2 * len(leaves)))
+    nodes = NodeSet(scene, charts, leaves, depth=MAX_DEPTH, slots=max(FIRST_ROOM // charts.tile**2, 2 * len(leaves)))
     tree = Quadtree(nodes)
     while slots := tree.uneven():
         if tree.room < 4 * len(slots):
@@ -251,8 +251,8 @@ def first_leaves(scene: Scene, charts: Charts, depth: int) -> Leaves:
 
 def faces_of_roots(charts: Charts) -> dict[tuple[int, int], NDArray[np.int64]]:
     """The faces whose bounds meet each root tile."""
-    low = np.floor(charts.face_uv.min(1) / TILE).astype(np.int64)
-    high = np.floor(charts.face_uv.max(1) / TILE).astype(np.int64)
+    low = np.floor(charts.face_uv.min(1) / charts.tile).astype(np.int64)
+    high = np.floor(charts.face_uv.max(1) / charts.tile).astype(np.int64)
     found: dict[tuple[int, int], list[int]] = {}
     for face, ((x0, y0), (x1, y1)) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
         for y in range(y0, y1 + 1):

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import TILE
 from app.atlas.texels import Leaves
 from app.scene.model import F32, F64
 
@@ -24,8 +23,8 @@ NEVER_CULLED = 4.0  # thicker than the scene, whose diameter is 2
 
 @dataclass(frozen=True, eq=False)
 class TileTexels:
-    """Texels of some tiles in the solver frame: position, normal (t, 16, 16, 3), area (t, 16, 16), facet (t, 16, 16) from 0 or
-    -1; size (t,): of a texel, in texels of level 0; dpdu, dpdv (facets, 3) per texel of level 0."""
+    """Texels of some tiles in the solver frame: position, normal (n, t, t, 3), area (n, t, t), facet (n, t, t) from 0 or
+    -1; size (n,): of a texel, in texels of level 0; dpdu, dpdv (facets, 3) per texel of level 0."""
 
     position: F64
     normal: NDArray[np.floating]
@@ -41,7 +40,7 @@ KIND = np.dtype([("flat", "?"), ("a", "f4", 4), ("b", "f4", 4), ("c", "f4", 4)])
 
 
 def tile_kinds(t: TileTexels, material: NDArray[np.int32]) -> NDArray[np.void]:
-    """(t,) KIND of each tile; material (facets,)."""
+    """(n,) KIND of each tile; material (facets,)."""
     facet, flat = _flat_tiles(t)
     out = np.zeros(len(facet), KIND)
     out["flat"] = flat
@@ -54,11 +53,13 @@ def tile_kinds(t: TileTexels, material: NDArray[np.int32]) -> NDArray[np.void]:
     return out
 
 
-def receivers(kinds: NDArray[np.void], used: NDArray[np.int64], leaves: Leaves, columns: int) -> tuple[F32, F32]:
+def receivers(
+    kinds: NDArray[np.void], used: NDArray[np.int64], leaves: Leaves, columns: int, tile: int
+) -> tuple[F32, F32]:
     """(spans, 16) f32 of flat tiles and (tiles, 16) f32 of the others, see RECEIVER_FORMAT, of the ``used`` slots (n,), in order.
 
-    kinds and leaves of all slots; columns of the node set. Neighbouring flat tiles of one facet, side by side in atlas and
-    node set, are one quad.
+    kinds and leaves of all slots; columns of the node set; tile: edge of a tile [texels]. Neighbouring flat tiles of one
+    facet, side by side in atlas and node set, are one quad.
     """
     flat = used[kinds["flat"][used]]
     shaped = used[~kinds["flat"][used]]
@@ -68,11 +69,12 @@ def receivers(kinds: NDArray[np.void], used: NDArray[np.int64], leaves: Leaves, 
     joins &= leaves.x[before] + 1 == leaves.x[flat]
     start = np.flatnonzero(~joins)
     length = np.diff(np.append(start, len(flat)))
-    return _quads(kinds, flat[start], length, columns), _quads(kinds, shaped, np.ones(len(shaped), int), columns)
+    single = np.ones(len(shaped), int)
+    return _quads(kinds, flat[start], length, columns, tile), _quads(kinds, shaped, single, columns, tile)
 
 
-def _quads(kinds: NDArray[np.void], slot: NDArray[np.int64], length: NDArray[np.int64], columns: int) -> F32:
-    rect = np.stack([slot % columns * TILE, slot // columns * TILE, length * TILE, np.full(len(slot), TILE)], 1)
+def _quads(kinds: NDArray[np.void], slot: NDArray[np.int64], length: NDArray[np.int64], columns: int, tile: int) -> F32:
+    rect = np.stack([slot % columns, slot // columns, length, np.ones_like(slot)], 1) * tile
     kind = kinds[slot]
     return np.concatenate([rect, kind["a"], kind["b"], kind["c"]], 1).astype(np.float32)
 
@@ -92,8 +94,8 @@ def _flat_tiles(t: TileTexels) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
     )
     flat &= np.abs((du * dv).sum(-1)) < FLAT_ERROR * whole
     corner = _corners(t, facet)
-    steps = np.arange(TILE) + 0.5
-    for row in range(TILE):  # one row of all tiles at a time: bounded memory
+    steps = np.arange(t.facet.shape[2]) + 0.5
+    for row in range(t.facet.shape[1]):  # one row of all tiles at a time: bounded memory
         grid = corner[:, None] + steps[None, :, None] * du[:, None] + steps[row] * dv[:, None]
         error = np.linalg.norm(t.position[:, row] - grid, axis=-1)
         flat &= (error < FLAT_ERROR * np.sqrt(whole)[:, None]).all(1, where=covered[:, row])
@@ -103,7 +105,7 @@ def _flat_tiles(t: TileTexels) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
 def _corners(t: TileTexels, facet: NDArray[np.int32]) -> F64:
     """Where each tile's lower corner lies, extrapolated from its first covered texel."""
     first = (t.facet >= 0).reshape(len(facet), -1).argmax(1)
-    row, column = first // TILE, first % TILE
+    row, column = np.divmod(first, t.facet.shape[2])
     at = t.position[np.arange(len(facet)), row, column]
     du, dv = t.dpdu[facet] * t.size[:, None], t.dpdv[facet] * t.size[:, None]
     return np.asarray(at - (column + 0.5)[:, None] * du - (row + 0.5)[:, None] * dv)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
 from app.atlas.quadtree import Change
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
@@ -20,32 +19,34 @@ class Regrowth:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
         self._gpu, self._lightmap = gpu, lightmap
-        defines = lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
+        names = ("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
         self._lift, self._push, self._pull = (
-            Pass(gpu, f"lightmap/{name}", defines=defines, vertex="common/rects") for name in ("lift", "push", "pull")
+            Pass(gpu, f"lightmap/{name}", defines=lightmap.defines(*names, *more), vertex="common/rects")
+            for name, *more in (("lift",), ("push", "TILE"), ("pull",))
         )
 
     def apply(self, change: Change) -> None:
         """Bring the lightmap's textures up to date with its node set, where ``change`` has just been made."""
         gpu, lightmap, split = self._gpu, self._lightmap, change.split
+        tile, half = lightmap.nodes.tile, lightmap.nodes.tile // 2
         old, new = (change.parents, change.children) if split else (change.children, change.parents)
         lifted, nth = np.unique(old, return_inverse=True)
         rows = -(-len(lifted) // LIFTED_COLUMNS)
-        size = (LIFTED_COLUMNS * TILE, rows * TILE)
+        size = (LIFTED_COLUMNS * tile, rows * tile)
         place = np.arange(len(lifted))
-        aside = np.stack([place % LIFTED_COLUMNS, place // LIFTED_COLUMNS], 1) * TILE
+        aside = np.stack([place % LIFTED_COLUMNS, place // LIFTED_COLUMNS], 1) * tile
         textures = [gpu.texture(size, 4, "f4"), gpu.texture(size, 4, "f4"), gpu.texture(size, 1, "f4")]
         target = gpu.target(*textures)
         light = lightmap.textures("t_position_area", "t_irradiance", "t_residual")
-        self._draw(self._lift, target, quads(aside, TILE, corners(lightmap, lifted)), light)
+        self._draw(self._lift, target, quads(aside, tile, corners(lightmap, lifted)), light)
         lightmap.write_tiles(np.unique(np.concatenate([old, new])))
 
         lights = dict(zip(("t_lifted_irradiance", "t_lifted_shot", "t_lifted_area"), textures, strict=True))
         if split:
-            pushed = quads(corners(lightmap, new), TILE, aside[nth] + change.corner * (TILE // 2))
+            pushed = quads(corners(lightmap, new), tile, aside[nth] + change.corner * half)
             self._draw(self._push, lightmap.light_target, pushed, lights | lightmap.textures("t_position_area"))
         else:
-            pulled = quads(corners(lightmap, new) + change.corner * (TILE // 2), TILE // 2, aside[nth])
+            pulled = quads(corners(lightmap, new) + change.corner * half, half, aside[nth])
             self._draw(self._pull, lightmap.light_target, pulled, lights)
         gpu.release_all(target, *textures)
 
@@ -64,4 +65,4 @@ def quads(corner: NDArray[np.int64], edge: int, source: NDArray[np.int64]) -> F3
 
 def corners(lightmap: Lightmap, slots: NDArray[np.int64]) -> NDArray[np.int64]:
     """(n, 2) column and row of each slot's first texel."""
-    return np.stack([slots % lightmap.columns, slots // lightmap.columns], 1) * TILE
+    return np.stack([slots % lightmap.columns, slots // lightmap.columns], 1) * lightmap.nodes.tile

@@ -10,13 +10,14 @@ Area and centroid go to the world by the triangle's affine map; the fragments of
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import TILE, Charts
+from app.atlas.charts import Charts
 from app.scene.model import F32, F64, I32, Scene
 
 BLOCK = 1 << 16  # candidate texels in work at a time
@@ -28,7 +29,7 @@ I64 = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Leaves:
-    """(n,) i32 each: tile (level, x, y) has TILE×TILE texels and covers [x, x + 1)·TILE/2^level of the atlas, so y."""
+    """(n,) i32 each: tile (level, x, y) has t×t texels, t = ``Charts.tile``, and covers [x, x + 1)·t/2^level texels, so y."""
 
     level: I32
     x: I32
@@ -46,10 +47,10 @@ class Leaves:
 class TexelSurfaces:
     """Per texel [tile, row (v), column (u)] of n tiles.
 
-    position (n, 16, 16, 3) f64: centroid of the covered surface [m], where curved a mean that may lie off it;
-    area (n, 16, 16) f64 [m²], 0 where nothing is covered; normal (n, 16, 16, 3) f32: unit area-weighted mean,
-    towards the lit side; face (n, 16, 16) i32: the face with the largest share, -1 where nothing is covered;
-    leading (n, 16, 16, 3) f64: centroid of that share alone [m].
+    position (n, t, t, 3) f64: centroid of the covered surface [m], where curved a mean that may lie off it;
+    area (n, t, t) f64 [m²], 0 where nothing is covered; normal (n, t, t, 3) f32: unit area-weighted mean,
+    towards the lit side; face (n, t, t) i32: the face with the largest share, -1 where nothing is covered;
+    leading (n, t, t, 3) f64: centroid of that share alone [m].
     """
 
     position: F64
@@ -72,8 +73,8 @@ def faces_tangents(scene: Scene, charts: Charts) -> tuple[F64, F64]:
 
 def uniform_leaves(charts: Charts, level: int = 0) -> Leaves:
     """The tiles of one level that some face covers, row by row."""
-    columns = charts.size[0] * 2**level // TILE
-    keys = [part.y * columns + part.x for part in _fragments(charts.face_uv * (2.0**level / TILE))]
+    columns = charts.size[0] * 2**level // charts.tile
+    keys = [part.y * columns + part.x for part in _fragments(charts.face_uv * (2.0**level / charts.tile))]
     key = np.unique(np.concatenate(keys)) if keys else np.empty(0, np.int64)
     x, y = (key % columns).astype(np.int32), (key // columns).astype(np.int32)
     return Leaves(np.full(len(key), level, np.int32), x, y)
@@ -81,7 +82,8 @@ def uniform_leaves(charts: Charts, level: int = 0) -> Leaves:
 
 def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurfaces:
     """Where each texel of the leaves lies in the world, how much surface it covers, and which way that faces."""
-    texels = len(leaves) * TILE * TILE
+    shape = (len(leaves), charts.tile, charts.tile)
+    texels = math.prod(shape)
     area, best = np.zeros(texels), np.zeros(texels)
     face = np.full(texels, -1, np.int32)
     moment, normal, lead = np.zeros((3, texels)), np.zeros((3, texels)), np.zeros((3, texels))
@@ -94,7 +96,7 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
     for level in np.unique(leaves.level):
         size = 0.5**level  # of a texel, in texels of level 0
         uv = charts.face_uv / size
-        windows = _windows(uv, leaves, int(level))
+        windows = _windows(uv, leaves, int(level), charts.tile)
         for part in _fragments(uv, windows):
             f, slot = windows.face[part.pair], windows.slot(part)
             covered = part.share * per_texel[f] * size**2
@@ -108,7 +110,6 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
                 np.add.at(normal[k], slot, covered * towards[f, k])
                 lead[k, slot[leading]] = centre[leading]
             np.add.at(area, slot, covered)
-    shape = (len(leaves), TILE, TILE)
     with np.errstate(invalid="ignore", divide="ignore"):
         position = np.where(area > 0, moment / area, 0.0)
         length = np.linalg.norm(normal, axis=0)
@@ -138,28 +139,30 @@ class _Fragments:
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    """Pairs of a face and a leaf that it meets: (p,) face, leaf, whether it fills it, and the leaf's first texel."""
+    """Pairs of a face and a leaf that it meets: (p,) face, leaf, whether it fills it, and the leaf's first texel; tile: the
+    edge of a leaf [texels]."""
 
     face: I64
     leaf: I64
     full: NDArray[np.bool_]
     left: I64
     bottom: I64
+    tile: int
 
     def slot(self, part: _Fragments) -> I64:
         """Where the fragments' texels are stored."""
         row, column = part.y - self.bottom[part.pair], part.x - self.left[part.pair]
-        return np.asarray((self.leaf[part.pair] * TILE + row) * TILE + column)
+        return np.asarray((self.leaf[part.pair] * self.tile + row) * self.tile + column)
 
 
-def _windows(uv: F64, leaves: Leaves, level: int) -> _Windows:
+def _windows(uv: F64, leaves: Leaves, level: int, tile: int) -> _Windows:
     """Which leaves of a level each face meets. uv: in texels of that level."""
     mine = np.flatnonzero(leaves.level == level)
     keys = (leaves.y[mine].astype(np.int64) << 32) | leaves.x[mine]
     order = np.argsort(keys)
     keys, mine = keys[order], mine[order]
     faces, places, fulls = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty(0, bool)]
-    for part in _fragments(uv / TILE):
+    for part in _fragments(uv / tile):
         wanted = (part.y << 32) | part.x
         place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
         hit = keys[place] == wanted
@@ -167,8 +170,8 @@ def _windows(uv: F64, leaves: Leaves, level: int) -> _Windows:
         places.append(mine[place[hit]])
         fulls.append(part.share[hit] == 1.0)
     leaf = np.concatenate(places)
-    left, bottom = (corner[leaf].astype(np.int64) * TILE for corner in (leaves.x, leaves.y))
-    return _Windows(np.concatenate(faces), leaf, np.concatenate(fulls), left, bottom)
+    left, bottom = (corner[leaf].astype(np.int64) * tile for corner in (leaves.x, leaves.y))
+    return _Windows(np.concatenate(faces), leaf, np.concatenate(fulls), left, bottom, tile)
 
 
 def _fragments(uv: F64, windows: _Windows | None = None) -> Iterator[_Fragments]:
@@ -179,7 +182,7 @@ def _fragments(uv: F64, windows: _Windows | None = None) -> Iterator[_Fragments]
     single = (high - low == 1).all(axis=1)
     if windows is not None:
         corner = np.stack([windows.left, windows.bottom], axis=1)
-        low, high = np.maximum(low, corner), np.minimum(high, corner + TILE)
+        low, high = np.maximum(low, corner), np.minimum(high, corner + windows.tile)
     across, up = np.maximum(high - low, 0).T
     planes = np.ascontiguousarray(uv.transpose(2, 1, 0))
     full = np.zeros(len(face), bool) if windows is None else windows.full

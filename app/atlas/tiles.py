@@ -18,7 +18,7 @@ FOLD = 1e-4  # of a texel's width: further off the plane of its leading face, a 
 
 @dataclass(frozen=True, eq=False)
 class Tiles:
-    """n leaves, the surfaces of their texels, and their albedo and emission textures (n, 16, 16, 3), None where no material
+    """n leaves, the surfaces of their texels, and their albedo and emission textures (n, t, t, 3), None where no material
     has one."""
 
     leaves: Leaves

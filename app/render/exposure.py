@@ -39,7 +39,7 @@ def exposure_of(lightmap: Lightmap, mean_residual: F64) -> float:
 
 
 def _exposure(nodes: NodeSet, scene: Scene, irradiance: NDArray[np.floating], mean_residual: F64) -> float:
-    """irradiance: H of the sampled tiles (tiles, 16, 16, 3), or of all alike (3,) [W/m²]."""
+    """irradiance: H of the sampled tiles (tiles, t, t, 3), or of all alike (3,) [W/m²]."""
     sample = sampled_tiles(nodes)
     area = nodes.surfaces.area[sample]
     albedo = sampled_colours(nodes, [m.albedo for m in scene.materials], nodes.albedo_tiles, sample)

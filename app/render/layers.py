@@ -26,7 +26,7 @@ LAYER_SHADERS = {
     "residual": Layer("light", "t_residual"),
     "albedo": Layer("albedo", defines=("MATERIAL_BITS", "ALBEDO_TEXTURE")),
     "charts": Layer("charts", smooth=False, checker=0.12, defines=("MATERIAL_BITS",)),
-    "leaves": Layer("leaves", smooth=False, checker=0.12),
+    "leaves": Layer("leaves", smooth=False, checker=0.12, defines=("TILE",)),
     "texels": Layer("texels", smooth=False, checker=0.25, defines=("MATERIAL_BITS",)),
 }
 assert tuple(LAYER_SHADERS) == LAYERS

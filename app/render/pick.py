@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, Pass
 from app.render.surfaces import uniform_matrix
@@ -78,8 +77,8 @@ def _with_texel(hit: PickHit, facet: int, uv: tuple[float, float], lightmap: Lig
     tile = lightmap.nodes.slot_at(uv)
     if tile < 0:
         return hit
-    leaves = lightmap.nodes.leaves
+    leaves, edge = lightmap.nodes.leaves, lightmap.nodes.tile
     finer = 2 ** int(leaves.level[tile])
-    inside = (int(uv[0] * finer) - int(leaves.x[tile]) * TILE, int(uv[1] * finer) - int(leaves.y[tile]) * TILE)
-    texel = (tile % lightmap.columns * TILE + inside[0], tile // lightmap.columns * TILE + inside[1])
+    inside = (int(uv[0] * finer) - int(leaves.x[tile]) * edge, int(uv[1] * finer) - int(leaves.y[tile]) * edge)
+    texel = (tile % lightmap.columns * edge + inside[0], tile // lightmap.columns * edge + inside[1])
     return PickHit(hit.triangle, hit.back, hit.material, hit.position, facet, uv, texel, tile, inside)

@@ -1,4 +1,4 @@
-"""Display texels: a layer on every texel, developed for the screen, in tiles of 18×18 that the sampler interpolates.
+"""Display texels: a layer on every texel, developed for the screen, in tiles with a border that the sampler interpolates.
 
 Doing exposure, tone curve and sRGB here leaves one look-up per pixel: that is what holds 30 frames/s on a software
 rasteriser. A texel that covers nothing copies a neighbour, so that no gutter or tile border darkens the picture.
@@ -10,7 +10,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
 from app.atlas.node_set import TABLE_WIDTH, NodeSet
 from app.atlas.quadtree import SIDES
@@ -22,7 +21,6 @@ from app.render.options import DisplayOptions
 from app.render.targets import release_targets
 from app.scene.model import F32, RGB
 
-BORDERED = TILE + 2
 TEXELS_PER_FRAME = 1 << 17  # that are brought up to date in one frame, where not all must be
 T = TypeVar("T")
 
@@ -32,7 +30,7 @@ class DisplayTexels:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
         self._gpu, self._lightmap = gpu, lightmap
-        self.size = (lightmap.columns * BORDERED, lightmap.rows * BORDERED)
+        self.size = display_size(lightmap)
         self._colour = gpu.texture(self.size, 4, "f1")
         self._target = gpu.target(self._colour)
         self._target.clear()
@@ -48,7 +46,7 @@ class DisplayTexels:
         self._version = lightmap.version
         self._edges: Mesh | None = None
         self._find_edges()
-        self._find_sources = Pass(gpu, "render/source")
+        self._find_sources = Pass(gpu, "render/source", defines=lightmap.defines("TILE"))
         self._source_target = gpu.target(self._tables["t_source"])
         self._sourced_rows = 0
         self._passes: dict[tuple[str, Layer, str], Pass] = {}
@@ -57,7 +55,7 @@ class DisplayTexels:
     @property
     def fits(self) -> bool:
         """Whether the lightmap is still as large as it was."""
-        return self.size == (self._lightmap.columns * BORDERED, self._lightmap.rows * BORDERED)
+        return self.size == display_size(self._lightmap)
 
     def resolve(
         self, layer_name: str, display: DisplayOptions, *, scale: Scale | None, ambient: RGB, whole: bool
@@ -149,7 +147,8 @@ class DisplayTexels:
     def _pass(self, name: str, layer: Layer, shader: str) -> Pass:
         key = name, layer, shader
         if key not in self._passes:
-            defines = self._lightmap.defines(*layer.defines)
+            own = () if name == "unlit" else ("TILE",)
+            defines = self._lightmap.defines(*layer.defines, *own)
             slots = {"layer": f"render/layers/{layer.shader}.glsl", "curve": f"render/{shader}.glsl"}
             self._passes[key] = Pass(self._gpu, f"render/{name}", defines=defines, slots=slots, label=name)
         return self._passes[key]
@@ -167,12 +166,22 @@ class DisplayTexels:
         nodes = self._lightmap.nodes
         pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64)
         slot = np.maximum(pages - 1, 0)
-        first = np.stack([slot % nodes.columns, slot // nodes.columns], -1) * BORDERED + 1
+        first = np.stack([slot % nodes.columns, slot // nodes.columns], -1) * bordered(nodes) + 1
         tile = np.stack([nodes.leaves.x[slot], nodes.leaves.y[slot]], -1)
         places = np.zeros((*pages.shape, 4), np.float32)
-        places[..., :2] = first - tile * TILE
+        places[..., :2] = first - tile * nodes.tile
         places[..., 2] = 2.0 ** nodes.leaves.level[slot]
         return self._gpu.texture(pages.shape[::-1], 4, "f4", places.tobytes())
+
+
+def bordered(nodes: NodeSet) -> int:
+    """Display texels along the edge of a leaf: one more on each side."""
+    return nodes.tile + 2
+
+
+def display_size(lightmap: Lightmap) -> tuple[int, int]:
+    """Display texels of the whole node set."""
+    return lightmap.columns * bordered(lightmap.nodes), lightmap.rows * bordered(lightmap.nodes)
 
 
 EDGE_FORMAT = {"in_rect": "4f", "in_outward": "3f"}
@@ -187,7 +196,8 @@ def unequal_edges(nodes: NodeSet) -> F32:
     pages = np.pad(nodes.slot_tables["t_pages"][..., 0].astype(np.int64), 1)
     side = 1 << (nodes.depth - level)  # pages along an edge of each leaf
     left, bottom = nodes.leaves.x[slots] * side + 1, nodes.leaves.y[slots] * side + 1
-    corner = np.stack([slots % nodes.columns, slots // nodes.columns], 1) * BORDERED
+    corner = np.stack([slots % nodes.columns, slots // nodes.columns], 1) * bordered(nodes)
+    last, length = bordered(nodes) - 1, nodes.tile // 2
     found = []
     for dx, dy in SIDES:
         for half in (0, 1):
@@ -197,9 +207,9 @@ def unequal_edges(nodes: NodeSet) -> F32:
             near = pages[y, x] - 1
             finer = np.where(near >= 0, nodes.leaves.level[near] - level, 0)
             which = np.flatnonzero(finer != 0)
-            start = 1 + half * (TILE // 2)
-            place = ((BORDERED - 1) * (dx > 0), start) if dx else (start, (BORDERED - 1) * (dy > 0))
-            extent = (1, TILE // 2) if dx else (TILE // 2, 1)
+            start = 1 + half * length
+            place = (last * (dx > 0), start) if dx else (start, last * (dy > 0))
+            extent = (1, length) if dx else (length, 1)
             count = len(which)
             found.append(
                 np.column_stack([corner[which] + place, np.tile([*extent, dx, dy], (count, 1)), np.sign(finer[which])])

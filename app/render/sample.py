@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.atlas.charts import TILE
 from app.atlas.lightmap import STORAGE, Lightmap
 from app.atlas.node_set import NodeSet
 from app.scene.model import F32, RGB
 
-TILES = 1024  # that means are taken over, evenly spread
+SAMPLED = 1 << 18  # texels that means are taken over, evenly spread
 
 
 def sampled_tiles(nodes: NodeSet) -> slice:
     """Tiles that means are taken over, evenly spread. A small lamp lies in few of them: r̄ is that of all."""
-    return slice(None, None, max(1, nodes.tiles // TILES))
+    return slice(None, None, max(1, nodes.tiles * nodes.tile**2 // SAMPLED))
 
 
 def sampled_colours(nodes: NodeSet, factors: list[RGB], colours: F32 | None, sample: slice) -> F32:
-    """A material's factor on each texel of the sampled tiles (tiles, 16, 16, 3), times its texture; 0 where nothing is."""
+    """A material's factor on each texel of the sampled tiles (tiles, t, t, 3), times its texture; 0 where nothing is."""
     face = nodes.surfaces.face[sample]
     material = nodes.scene.material_ids[nodes.charts.face_triangle[face]]
     out = np.where((face >= 0)[..., None], np.array(factors, np.float32)[material], np.float32(0))
@@ -26,10 +25,10 @@ def sampled_colours(nodes: NodeSet, factors: list[RGB], colours: F32 | None, sam
 
 
 def sampled_irradiance(lightmap: Lightmap) -> F32:
-    """H of the sampled tiles (tiles, 16, 16, 3) [W/m²]."""
+    """H of the sampled tiles (tiles, t, t, 3) [W/m²]."""
     nodes, texture = lightmap.nodes, lightmap.texture("t_irradiance")
     dtype = {"f4": np.float32, "f2": np.float16, "f1": np.uint8}[STORAGE[lightmap.storage]]
-    cells = np.frombuffer(texture.read(), dtype).reshape(nodes.rows, TILE, nodes.columns, TILE, 4)
+    cells = np.frombuffer(texture.read(), dtype).reshape(nodes.rows, nodes.tile, nodes.columns, nodes.tile, 4)
     tile = np.arange(nodes.tiles)[sampled_tiles(nodes)]
     stored = cells[tile // nodes.columns, :, tile % nodes.columns, :, :3].astype(np.float32)
     return stored * np.float32(lightmap.unit / (255 if dtype is np.uint8 else 1))

@@ -60,7 +60,8 @@ class Surfaces:
         overlay = display.grid or checker > 0 or marked is not None
         if overlay:
             uniforms |= {"u_grid": float(display.grid), "u_checker": checker, "u_shooter": marked or NOWHERE}
-            uniforms["u_leaves"] = float(self.lightmap.nodes.depth > 0)
+            nodes = self.lightmap.nodes
+            uniforms |= {"u_leaves": float(nodes.depth > 0), "u_tile": float(nodes.tile)}
         self._passes[overlay].draw(target, textures=textures, uniforms=uniforms, mesh=self.lightmap.mesh, depth=True)
 
     def release(self) -> None:

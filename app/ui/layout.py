@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 SIDE_EM = 20.5  # width of the side docks, in font heights: the widest fact fits
 BOTTOM_SHARE = 0.27  # height of the lower dock, of the window
-SCENE_EM, DISPLAY_EM = 27.0, 18.5  # heights that the upper panels need; what is below them gets the rest
+SCENE_EM, DISPLAY_EM = 28.7, 18.5  # heights that the upper panels need; what is below them gets the rest
 HIGHEST_UPPER = 0.54  # of a low window for them
 WIDEST_SIDES = 0.3  # of a narrow window for each side dock
 

@@ -56,7 +56,7 @@ def edit_option(spec: Spec, value: Any, start: Any = None) -> Any:
         value = _optional(spec, value, start)
     edited = value if value is None else _editor(spec, value)
     if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
-        double = imgui.is_mouse_double_clicked(0) and spec.type in (int, float)
+        double = imgui.is_mouse_double_clicked(0) and spec.type in (int, float) and not spec.choices
         if imgui.is_mouse_clicked(1) or double:
             edited = spec.default
             imgui.internal.clear_active_id()
@@ -95,7 +95,7 @@ def _editor(spec: Spec, value: Any) -> Any:
         return imgui.checkbox("##value", value)[1]
     if spec.choices:
         index = spec.choices.index(value)
-        return spec.choices[imgui.combo("##value", index, list(spec.choices))[1]]
+        return spec.choices[imgui.combo("##value", index, [str(choice) for choice in spec.choices])[1]]
     if spec.type in (int, float):
         return _number(spec, value)
     return imgui.input_text("##value", value)[1]

@@ -58,7 +58,7 @@ class FakeSession:
         cameras = (SimpleNamespace(name="front", world_from_camera=np.eye(4), yfov=0.7),)
         self.scene = SimpleNamespace(materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras)
         self.unedited = self.scene
-        self.charts = SimpleNamespace(density=40.0, warnings=())
+        self.charts = SimpleNamespace(density=40.0, tile=16, warnings=())
         self.lightmap = SimpleNamespace(frame=FakeFrame())
         self.shooting, self.atlas, self.display = ShootingOptions(), AtlasOptions(), DisplayOptions()
         self.view = CameraView(np.eye(4), 0.7, 2.0)

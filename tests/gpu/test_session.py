@@ -15,7 +15,6 @@ import numpy as np
 import psutil
 import pytest
 
-from app.atlas.charts import TILE
 from app.atlas.lightmap import STORAGE
 from app.atlas.options import AtlasOptions
 from app.errors import SceneError, UserError
@@ -358,7 +357,8 @@ def test_picking_reads_the_light_and_changes_none(session: Session, storage: str
     picked = session.pick(10, 24)  # the left wall
     assert picked is not None and max(picked.H) > 0
     (column, row), columns = picked.texel, session.lightmap.columns
-    at = row // TILE * columns + column // TILE, row % TILE, column % TILE
+    tile = session.charts.tile
+    at = row // tile * columns + column // tile, row % tile, column % tile
     np.testing.assert_allclose(picked.H, before[at], rtol=1e-6)
     np.testing.assert_allclose(picked.r, session.lightmap.residual()[at], rtol=1e-6)
     np.testing.assert_allclose(picked.B, np.add(picked.E, np.multiply(picked.albedo, picked.H)), rtol=1e-6)

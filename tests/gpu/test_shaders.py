@@ -13,7 +13,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from app.atlas.charts import TILE
+from app.atlas.charts import TILES
 from app.gpu import Gpu, Mesh, Pass, ShaderError, ShaderLibrary
 from app.gpu.shader import SHADERS, Source
 from app.options import specs
@@ -29,7 +29,9 @@ FLAG = (False, True)
 DEFINES: Mapping[str, tuple[object, ...]] = {
     "RESOLUTION": (OPTION["resolution"].minimum,),
     "LEVEL": tuple(range(MAX_LEVEL + 1)),
-    "TILE_PATCHES": tuple(TILE >> level for level in range(MAX_LEVEL + 1)),
+    "HIGHEST": (MAX_LEVEL,),
+    "TILE": (TILES[-1],),
+    "TILE_PATCHES": (TILES[-1],),
     "BLOCK": (OPEN_BLOCK,),
     "VIEWS": tuple({p.views for p in PROJECTIONS.values()}),
     "MATERIAL_BITS": (16,),
@@ -44,7 +46,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "COUNT": FLAG,
     "VISIBILITY": tuple(range(len(VISIBILITIES))),
 }
-CONSTANTS = {"TILE", "BORDERED", "BATCH"}
+CONSTANTS = {"BATCH"}
 SLOTS = {
     "projection": tuple(p.glsl for p in PROJECTIONS.values()),
     "vertex": tuple(p.drawing["vertex"] for p in PROJECTIONS.values()),

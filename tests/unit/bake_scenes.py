@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from app.atlas.charts import Charts
+from app.atlas.charts import DEFAULT_TILE, Charts
 from app.scene.model import Camera, Material, Scene, Texture
 
 CELL = 8  # texels: every face gets a cell of its own, its triangle one texel away from the border
@@ -64,6 +64,7 @@ def sides_charts(scene: Scene) -> Charts:
     rows = -(-count // CELLS)
     return Charts(
         size=(CELL * CELLS, CELL * (rows + rows % 2)),
+        tile=DEFAULT_TILE,
         density=6.0,
         face_triangle=np.array([t for t, _ in faces], np.int32),
         face_back=np.array([b for _, b in faces], bool),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.atlas import packing
-from app.atlas.charts import ALIGN, GAP, TILE
+from app.atlas.charts import ALIGN, DEFAULT_TILE, GAP, TILES
 from app.atlas.packing import outlines, pack
 from app.errors import UserError
 from app.scene.model import F64
@@ -50,11 +50,13 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_gaps_hold(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "tile"), [*((name, DEFAULT_TILE) for name in CASES), *(("triangles", t) for t in TILES)]
+)
+def test_gaps_hold(name: str, tile: int) -> None:
     uv, chart = CASES[name]
-    origins, size = pack(outlines(uv, chart, chart.max() + 1))
-    assert size[0] % TILE == size[1] % TILE == 0
+    origins, size = pack(outlines(uv, chart, chart.max() + 1), tile)
+    assert size[0] % tile == size[1] % tile == 0
     assert (origins % ALIGN == 0).all()
     placed = uv + origins[chart][:, None]
     assert placed.min() >= 0 and (placed <= size).all()
@@ -73,7 +75,7 @@ def test_little_is_wasted(name: str, least: float) -> None:
     # least: what a skyline reaches on few charts; triangles hollow each other's boxes out
     uv, chart = CASES[name]
     shapes = outlines(uv, chart, chart.max() + 1)
-    _, size = pack(shapes)
+    _, size = pack(shapes, DEFAULT_TILE)
     assert ((shapes.top - shapes.bottom).sum() * ALIGN) / (size[0] * size[1]) > least
     assert 0.4 <= size[0] / size[1] <= 2.5
 
@@ -83,7 +85,7 @@ def test_many_charts_pack_in_time_and_fill_holes() -> None:
     uv, chart = _rectangles(sizes)
     start = time.process_time()
     shapes = outlines(uv, chart, len(sizes))
-    _, size = pack(shapes)
+    _, size = pack(shapes, DEFAULT_TILE)
     assert time.process_time() - start < 2.0  # 0.3 s measured on an idle core
     assert ((shapes.top - shapes.bottom).sum() * ALIGN) / (size[0] * size[1]) > 0.9
 
@@ -91,4 +93,4 @@ def test_many_charts_pack_in_time_and_fill_holes() -> None:
 def test_too_long_a_chart_is_refused() -> None:
     uv, chart = _rectangles(np.array([[packing.MAX_SIDE + 4.0, 4.0]]))
     with pytest.raises(UserError, match=r"16400 x 16 texels: the limit is 16384"):
-        pack(outlines(uv, chart, 1))
+        pack(outlines(uv, chart, 1), DEFAULT_TILE)

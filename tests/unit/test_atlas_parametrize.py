@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from atlas_scenes import TURN, box_room, face_areas, moved, own_cache, scene_of, split_grid
 
-from app.atlas.charts import ALIGN, TILE, Charts
+from app.atlas.charts import ALIGN, Charts
 from app.atlas.parametrize import MAX_TEXELS, parametrize
 from app.atlas.texels import faces_tangents, texel_surfaces, uniform_leaves
 from app.errors import UserError
@@ -98,7 +98,7 @@ def test_a_strip_longer_than_the_atlas() -> None:
 def test_charts_keep_apart_and_are_whole(name: str) -> None:
     scene = SCENES[name]
     charts = parametrize(scene, texels=20_000)
-    assert charts.size[0] % TILE == charts.size[1] % TILE == 0
+    assert charts.size[0] % charts.tile == charts.size[1] % charts.tile == 0
     assert (charts.chart_rects[:, :2] % ALIGN == 0).all()
     assert sorted(np.unique(charts.face_chart)) == list(range(charts.chart_count))
     assert sorted(np.unique(charts.face_facet)) == list(range(charts.facet_count))
@@ -110,7 +110,7 @@ def test_charts_keep_apart_and_are_whole(name: str) -> None:
     surfaces = texel_surfaces(scene, charts, leaves)
     owner = np.full((charts.size[1] + 4, charts.size[0] + 4), -1)
     tile, row, column = np.nonzero(surfaces.face >= 0)
-    y, x = leaves.y[tile] * TILE + row + 2, leaves.x[tile] * TILE + column + 2
+    y, x = leaves.y[tile] * charts.tile + row + 2, leaves.x[tile] * charts.tile + column + 2
     owner[y, x] = charts.face_chart[surfaces.face[tile, row, column]]
     for dx in range(-2, 3):
         for dy in range(-2, 3):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from atlas_scenes import TURN, box_room, face_areas, moved, own_cache, scene_of, split_grid
 
-from app.atlas.charts import TILE, Charts
+from app.atlas.charts import DEFAULT_TILE, Charts
 from app.atlas.parametrize import parametrize
 from app.atlas.texels import Leaves, faces_tangents, texel_surfaces, uniform_leaves
 from app.scene import shapes
@@ -82,9 +82,9 @@ def test_tangents_lead_from_texel_to_texel(name: str) -> None:
     size = np.linalg.norm(dpdu, axis=1) * np.linalg.norm(dpdv, axis=1)
     assert np.allclose(np.einsum("fk,fk->f", dpdu, dpdv), 0, atol=1e-12)
     for axis, step in ((1, dpdv), (2, dpdu)):
-        here = surfaces.face.take(range(TILE - 1), axis)
-        there = surfaces.face.take(range(1, TILE), axis)
-        p = surfaces.position.take(range(1, TILE), axis) - surfaces.position.take(range(TILE - 1), axis)
+        first, second = range(charts.tile - 1), range(1, charts.tile)
+        here, there = surfaces.face.take(first, axis), surfaces.face.take(second, axis)
+        p = surfaces.position.take(second, axis) - surfaces.position.take(first, axis)
         same = (here >= 0) & (there >= 0)
         same[same] = charts.face_chart[here[same]] == charts.face_chart[there[same]]
         assert np.allclose(p[same], step[here[same]], atol=1e-10)  # whole texels of rectangles: float64 only
@@ -132,7 +132,7 @@ def _random_charts(rng: np.random.Generator, scale: float) -> tuple[Scene, Chart
     )
     zero = np.zeros(1, np.int32)
     rects = np.array([[0, 0, 32, 32]], np.int32)
-    return scene, Charts((32, 32), 1.0, zero, np.zeros(1, bool), uv, zero, zero, rects, 0, "test")
+    return scene, Charts((32, 32), DEFAULT_TILE, 1.0, zero, np.zeros(1, bool), uv, zero, zero, rects, 0, "test")
 
 
 @pytest.mark.parametrize("scale", [0.01, 0.5, 3.0, 12.0])
@@ -151,9 +151,9 @@ def test_against_a_slow_clipper_on_mixed_leaves(scale: float) -> None:
         surfaces = texel_surfaces(scene, charts, leaves)
         for n, (level, tx, ty) in enumerate(tiles):
             size = 0.5**level
-            for row in range(TILE):
-                for column in range(TILE):
-                    x, y = (tx * TILE + column) * size, (ty * TILE + row) * size
+            for row in range(charts.tile):
+                for column in range(charts.tile):
+                    x, y = (tx * charts.tile + column) * size, (ty * charts.tile + row) * size
                     area, centroid = _area_and_centroid(charts.face_uv[0], x, y, size)
                     if area < 2e-9 * size**2:  # what counts as rounding
                         assert surfaces.area[n, row, column] < 4e-9 * size**2
@@ -170,7 +170,7 @@ def test_leaves_are_the_tiles_that_are_covered_row_by_row() -> None:
         leaves = uniform_leaves(charts, level)
         order = leaves.y.astype(np.int64) * 10**6 + leaves.x
         assert (np.diff(order) > 0).all() and (leaves.level == level).all()
-        everywhere = np.indices((charts.size[1] * 2**level // TILE, charts.size[0] * 2**level // TILE))
+        everywhere = np.indices((charts.size[1] * 2**level // charts.tile, charts.size[0] * 2**level // charts.tile))
         y, x = everywhere.reshape(2, -1).astype(np.int32)
         full = texel_surfaces(scene, charts, Leaves(np.full(len(x), level, np.int32), x, y))
         used = np.flatnonzero((full.face >= 0).any(axis=(1, 2)))

@@ -16,7 +16,6 @@ import pytest
 from PIL import Image
 
 import app.window
-from app.atlas.charts import TILE
 from app.cli import run
 from app.session import Session
 
@@ -75,7 +74,7 @@ def poison(monkeypatch: pytest.MonkeyPatch, texture: str, call: int) -> None:
         if len(calls) == call:
             nodes = session.lightmap.nodes
             tile, y, x = np.argwhere(nodes.surfaces.face >= 0)[100]
-            at = tile % nodes.columns * TILE + x, tile // nodes.columns * TILE + y
+            at = tile % nodes.columns * nodes.tile + x, tile // nodes.columns * nodes.tile + y
             session.lightmap.texture(texture).write(np.full(4, np.nan, "f4").tobytes(), viewport=(*map(int, at), 1, 1))
         return made
 

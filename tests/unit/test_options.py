@@ -28,6 +28,7 @@ class Sample(Options):
     free: float = option(0.0, "any")
     quick: bool = option(False, "less exact")
     kind: str = option("a", "which", choices=("a", "b"))
+    edge: int = option(8, "how wide", choices=(8, 16))
     limit: float | None = option(None, "unset: none", minimum=0.0)
 
 
@@ -47,6 +48,8 @@ CASES = [
     ("free", -1e9, "x", "--free x: must be a number"),
     ("quick", True, 1, "--quick 1: must be true or false"),
     ("kind", "b", "c", "--kind c: must be one of a, b"),
+    ("edge", 16, 12, "--edge 12: must be one of 8, 16"),
+    ("edge", 16, "16", "--edge 16: must be one of 8, 16"),
     ("limit", None, -1.0, "--limit -1.0: must be at least 0"),
     ("limit", 2.0, math.nan, "--limit nan: must be at least 0"),
 ]
@@ -74,13 +77,15 @@ def parsed(options: type[Options], *arguments: str) -> Options:
 
 
 def test_flags_say_the_same() -> None:
-    line = "--count 8 --size 96 --gain 2.5 --low -3 --quick --kind b --limit 0".split()
-    assert parsed(Sample, *line) == Sample(8, 96, 2.5, -3.0, 0.0, True, "b", 0.0)
+    line = "--count 8 --size 96 --gain 2.5 --low -3 --quick --kind b --edge 16 --limit 0".split()
+    assert parsed(Sample, *line) == Sample(8, 96, 2.5, -3.0, 0.0, True, "b", 16, 0.0)
     assert parsed(Sample) == Sample()
     assert parsed(Sample, "--no-quick") == Sample()
 
 
-@pytest.mark.parametrize(("flag", "text"), [("--count", "9"), ("--count", "1.0"), ("--gain", "nan"), ("--kind", "c")])
+@pytest.mark.parametrize(
+    ("flag", "text"), [("--count", "9"), ("--count", "1.0"), ("--gain", "nan"), ("--kind", "c"), ("--edge", "9")]
+)
 def test_a_bad_flag_says_what_is_allowed(flag: str, text: str) -> None:
     spec = next(s for s in specs(Sample) if s.flag == flag)
     with pytest.raises(argparse.ArgumentError) as error:
@@ -103,7 +108,7 @@ def test_every_option_of_the_program_is_well_declared(options: type[Options], sp
     assert spec.default == getattr(options(), spec.name)
     if spec.type is str:
         assert spec.choices
-    if spec.type in (int, float):
+    if spec.type in (int, float) and not spec.choices:
         assert spec.minimum is not None and spec.maximum is not None, "a widget needs a range"
         for edge in (spec.minimum, spec.maximum):
             spec.check(spec.type(edge))

@@ -9,7 +9,7 @@ import pytest
 from atlas_scenes import box_room, own_cache, scene_of
 from solver_scenes import grey, quads_scene, room, table_room
 
-from app.atlas.charts import TILE
+from app.atlas.charts import DEFAULT_TILE, TILES
 from app.atlas.collapse import collapse
 from app.atlas.node_set import NodeSet
 from app.atlas.parametrize import parametrize
@@ -49,11 +49,13 @@ SCENES = {
     "small lamp": small_lamp_room,
     "crumbs": crumbs_room,
 }
+OTHER_TILES = tuple(tile for tile in TILES if tile != DEFAULT_TILE)
+WITH_TILES = [*((name, DEFAULT_TILE) for name in SCENES), *(("small lamp", tile) for tile in OTHER_TILES)]
 
 
-def tree_of(name: str, density: float = 10.0) -> Quadtree:
+def tree_of(name: str, density: float = 10.0, tile: int = DEFAULT_TILE) -> Quadtree:
     scene = SCENES[name]()
-    return Quadtree(quadtree_nodes(scene, parametrize(scene, density=density)))
+    return Quadtree(quadtree_nodes(scene, parametrize(scene, density=density, tile=tile)))
 
 
 def grow(tree: Quadtree, slots: list[int], depth: int = DEPTH) -> Change | None:
@@ -99,10 +101,10 @@ def worst_step(nodes: NodeSet) -> int:
 # -- splits and merges -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(("name", "tile"), WITH_TILES)
 @pytest.mark.parametrize("seed", range(2))
-def test_whatever_splits_and_merges_the_surface_is_covered_once(name: str, seed: int) -> None:
-    tree, rng = tree_of(name), np.random.default_rng(seed)
+def test_whatever_splits_and_merges_the_surface_is_covered_once(name: str, tile: int, seed: int) -> None:
+    tree, rng = tree_of(name, tile=tile), np.random.default_rng(seed)
     nodes = tree.nodes
     _, areas = nodes.scene.normals_areas
     surface = areas[nodes.charts.face_triangle].sum()
@@ -141,7 +143,7 @@ def test_a_leaf_deep_in_a_corner_takes_its_neighbours_along() -> None:
     """Three splits of the leaf at one place leave all levels from 0 to 3 around it."""
     tree = tree_of("walls", density=24.0)
     x, y, w, h = tree.nodes.charts.chart_rects[0]
-    assert min(w, h) >= 4 * TILE
+    assert min(w, h) >= 4 * tree.nodes.tile
     for _ in range(3):
         grow(tree, [tree.nodes.slot_at((x + w / 2 + 0.1, y + h / 2 + 0.1))])
     assert set(tree.nodes.leaves.level[tree.nodes.used]) == {0, 1, 2, 3}
@@ -249,7 +251,7 @@ def test_enlarging_keeps_everything() -> None:
     receivers = [a.copy() for a in (nodes.flat_spans, nodes.shaped_tiles)]
     tree.enlarge(tiles + 100)
     assert (nodes.tiles, nodes.columns, tree.room, tree.slots) == (tiles + 100, columns, room + 100, slots)
-    assert nodes.size == (columns * TILE, -(-nodes.tiles // columns) * TILE)
+    assert nodes.size == (columns * nodes.tile, -(-nodes.tiles // columns) * nodes.tile)
     for name, array in nodes.tile_arrays(np.arange(tiles)).items():
         np.testing.assert_array_equal(array, arrays[name])
     np.testing.assert_array_equal(nodes.slot_tables["t_pages"], pages)
@@ -262,9 +264,9 @@ def test_enlarging_keeps_everything() -> None:
 # -- places ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_the_page_table_finds_the_leaf_at_any_place(name: str, rng: np.random.Generator) -> None:
-    tree = tree_of(name)
+@pytest.mark.parametrize(("name", "tile"), WITH_TILES)
+def test_the_page_table_finds_the_leaf_at_any_place(name: str, tile: int, rng: np.random.Generator) -> None:
+    tree = tree_of(name, tile=tile)
     shuffle(tree, rng, rounds=3)
     nodes = tree.nodes
     pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64) - 1
@@ -276,8 +278,8 @@ def test_the_page_table_finds_the_leaf_at_any_place(name: str, rng: np.random.Ge
             continue
         found += 1
         leaf = nodes.leaves.only(np.array([slot]))
-        low = np.array([leaf.x[0], leaf.y[0]]) * TILE / 2.0 ** leaf.level[0]
-        assert ((uv >= low) & (uv < low + TILE / 2.0 ** leaf.level[0])).all()
+        low = np.array([leaf.x[0], leaf.y[0]]) * tile / 2.0 ** leaf.level[0]
+        assert ((uv >= low) & (uv < low + tile / 2.0 ** leaf.level[0])).all()
     assert found > 100
 
 
@@ -291,10 +293,11 @@ def test_all_covered_places_have_a_leaf(rng: np.random.Generator) -> None:
         assert tree.nodes.slot_at((float(u), float(v))) >= 0
 
 
-def test_lamps_and_small_charts_begin_with_enough_texels() -> None:
-    """A lamp has a whole tile's edge of texels, a small panel one patch; what is larger begins with its root."""
+@pytest.mark.parametrize("tile", [8, 16])  # in a larger one the two share a leaf
+def test_lamps_and_small_charts_begin_with_enough_texels(tile: int) -> None:
+    """A lamp has WHOLE_CHART texels along its edge, a small panel one patch; what is larger begins with its root."""
     scene = small_lamp_room()
-    charts = parametrize(scene, density=10)
+    charts = parametrize(scene, density=10, tile=tile)
     leaves = first_leaves(scene, charts, 6)
     nodes = NodeSet(scene, charts, leaves, depth=6)
     longer = charts.chart_rects[:, 2:].max(1)
@@ -320,9 +323,9 @@ def unlit_walls() -> tuple[Scene, object]:
 
 
 def texel_places(nodes: NodeSet) -> F64:
-    """(slots, 16, 16, 2) middle of every texel in the atlas [texels of level 0]."""
-    inside = np.stack(np.meshgrid(np.arange(TILE), np.arange(TILE)), -1) + 0.5
-    corner = np.stack([nodes.leaves.x, nodes.leaves.y], -1)[:, None, None] * TILE
+    """(slots, t, t, 2) middle of every texel in the atlas [texels of level 0]."""
+    inside = np.stack(np.meshgrid(*2 * [np.arange(nodes.tile)]), -1) + 0.5
+    corner = np.stack([nodes.leaves.x, nodes.leaves.y], -1)[:, None, None] * nodes.tile
     return (corner + inside) * np.exp2(-nodes.leaves.level.astype(float))[:, None, None, None]
 
 
@@ -340,11 +343,13 @@ def in_charts(nodes: NodeSet, uv: F64, margin: float) -> np.ndarray:
     return inside
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_linear_light_collapses_to_linear_light(seed: int) -> None:
+@pytest.mark.parametrize(
+    ("seed", "tile"), [*((seed, DEFAULT_TILE) for seed in range(3)), *((0, t) for t in OTHER_TILES)]
+)
+def test_linear_light_collapses_to_linear_light(seed: int, tile: int) -> None:
     """Means of linear light and its interpolation are linear: no step where levels change. From 1.5 texels of the coarsest level
     on from where a chart ends, where nothing is there to interpolate with."""
-    tree = tree_of("walls")
+    tree = tree_of("walls", density=0.625 * tile, tile=tile)
     shuffle(tree, np.random.default_rng(seed), rounds=3)
     nodes = tree.nodes
     finest = int(nodes.leaves.level.max())
@@ -378,10 +383,11 @@ def test_one_level_collapses_to_itself() -> None:
     grow(tree, np.flatnonzero(tree.nodes.used).tolist(), depth=1)
     nodes = tree.nodes
     assert set(nodes.leaves.level[nodes.used]) == {1}
-    values = np.random.default_rng(1).random((nodes.tiles, TILE, TILE, 3), np.float32)
+    tile = nodes.tile
+    values = np.random.default_rng(1).random((nodes.tiles, tile, tile, 3), np.float32)
     image, covered = collapse(nodes, values)
-    rows, columns = (side // TILE for side in image.shape[:2])
-    tiled = image.reshape(rows, TILE, columns, TILE, 3).swapaxes(1, 2)
+    rows, columns = (side // tile for side in image.shape[:2])
+    tiled = image.reshape(rows, tile, columns, tile, 3).swapaxes(1, 2)
     mine = nodes.used
     seen = nodes.surfaces.face[mine] >= 0
     np.testing.assert_array_equal(tiled[nodes.leaves.y[mine], nodes.leaves.x[mine]][seen], values[mine][seen])

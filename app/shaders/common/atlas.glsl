@@ -1,5 +1,4 @@
 // Reading the lightmap: texels, tiles, tables. See app/atlas/lightmap.py for what the textures hold.
-#define TILE 16
 #define MATERIAL_BITS 1
 
 const float PI = 3.14159265358979323846;

@@ -1,4 +1,4 @@
-// From the virtual atlas to the node set: the page table holds the slot (from 1, 0 = none) of each 16×16 cell of the finest
+// From the virtual atlas to the node set: the page table holds the slot (from 1, 0 = none) of each cell of TILE×TILE texels of the finest
 // level, t_leaves what each slot holds. [Coombe03, 4.2]
 #include "common/leaves.glsl"
 uniform usampler2D t_pages;

@@ -2,6 +2,7 @@
 // them replace; their areas sum to its area, so that pushing keeps all energy. What a texel has shot, R, it has shot all over: its
 // children keep that and r = E + ρH - R, or a patch that has shot would shoot again what its neighbours have not.
 #include "common/atlas.glsl"
+#include "common/tile.glsl"
 #include "lightmap/radiosity.glsl"
 
 uniform sampler2D t_position_area;

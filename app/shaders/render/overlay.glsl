@@ -4,6 +4,7 @@
 uniform float u_checker;  // 0 to 1
 uniform float u_grid;     // 0 to 1
 uniform float u_leaves;   // 1 for a quadtree
+uniform float u_tile;     // texels along the edge of a leaf
 uniform vec4 u_shooter;   // atlas texels: lower corner, upper corner
 
 float line_at_integers(vec2 uv, vec2 per_px, float width_px) {
@@ -21,7 +22,7 @@ vec3 overlaid(vec3 colour, vec2 root_uv, vec2 root_per_px, float finer) {
     colour *= 1.0 - u_checker * dark;
 
     float texels = line_at_integers(uv, texels_per_px, 1.0) * smoothstep(3.0, 8.0, texel_px);
-    float tiles = line_at_integers(uv / 16.0, texels_per_px / 16.0, 1.6) * smoothstep(0.2, 0.5, texel_px);
+    float tiles = line_at_integers(uv / u_tile, texels_per_px / u_tile, 1.6) * smoothstep(0.2, 0.5, texel_px);
     vec3 contrast = vec3(max(colour.r, max(colour.g, colour.b)) > 0.72 ? 0.0 : 0.95);
     colour = mix(colour, contrast, u_grid * max(0.15 * texels, 0.35 * tiles * (1.0 - u_leaves)));
     colour = mix(colour, level_colour(log2(finer)), u_grid * u_leaves * 0.8 * tiles);

@@ -1,5 +1,5 @@
 // Power that a tile would receive from a batch, Σ A a: receive.frag.glsl leaves Σ r F V of all its shots in a.
-#include "common/atlas.glsl"
+#include "common/tile.glsl"
 
 uniform sampler2D t_position_area;
 uniform sampler2D t_received;

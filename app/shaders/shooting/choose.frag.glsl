@@ -4,6 +4,7 @@
 // sampled from the middle of the residual; where part of the patch holds none (something stands on it), or the patch is not
 // flat, from its leading texel.
 #include "common/atlas.glsl"
+#include "common/tile.glsl"
 #include "shooting/patch_level.glsl"
 #include "shooting/shooter.glsl"
 #include "shooting/belongs.glsl"

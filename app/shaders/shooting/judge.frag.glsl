@@ -3,7 +3,7 @@
 // Where the gradient does not change, linear interpolation shows all there is, and more texels would show no more: the second
 // difference is the jump of the gradient [Coombe03, 4.1; Vedel92]. H and not B = E + ρH: textures of albedo have texels of
 // their own to be sharp in.
-#define TILE 16
+#include "common/tile.glsl"
 
 uniform sampler2D t_position_area;
 uniform sampler2D t_irradiance;  // a: Σ_i P_i F_ji V_ji

@@ -1,11 +1,11 @@
 // Mip level of the patches that shoot. In a quadtree, patches of all leaves are about as large in the scene: a leaf that is split
 // shoots from as many texels more. Where a shot would make or lose light, patches are finer.
 #define LEVEL 2
+#define HIGHEST 4  // no patch is larger than a tile
 
 #include "common/leaves.glsl"
 
-const int MAX_LEVEL = 4;  // a whole tile
-const int BLOCK = 4;      // texels along the edge of a block
+const int BLOCK = 4;  // texels along the edge of a block
 
 uniform sampler2D t_finer;  // levels that patches in each block are finer than elsewhere
 
@@ -13,5 +13,5 @@ uniform sampler2D t_finer;  // levels that patches in each block are finer than 
 int patch_level(ivec2 px) {
     float texel_size = texelFetch(t_leaves, px / TILE, 0).z;
     int level = LEVEL - int(round(log2(texel_size))) - int(texelFetch(t_finer, px / BLOCK, 0).r);
-    return texel_size > 0.0 ? clamp(level, 0, MAX_LEVEL) : -1;
+    return texel_size > 0.0 ? clamp(level, 0, HIGHEST) : -1;
 }

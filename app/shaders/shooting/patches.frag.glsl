@@ -1,7 +1,7 @@
 // Residual power of patches, |Σ r·A| [stored units · solver area], summed over RGB. Less light than was shot is a negative residual,
 // and is shot like any other [Chen90].
 // One texel per block of 4×4, with the strongest patch that begins in it.
-#include "common/atlas.glsl"
+#include "common/tile.glsl"
 #include "shooting/patch_level.glsl"
 
 uniform sampler2D t_position_area;

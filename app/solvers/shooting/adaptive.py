@@ -20,14 +20,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap, receiver_meshes
 from app.atlas.quadtree import Change, Quadtree, Tile
 from app.atlas.regrow import QUAD_FORMAT, Regrowth, corners, quads
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, ReadBack, Texture
 from app.scene.model import F64, Material
 from app.solvers.shooting.log import ShotLog
-from app.solvers.shooting.options import MAX_LEVEL, TREE, ShootingOptions
+from app.solvers.shooting.options import TREE, ShootingOptions, highest_level
 from app.solvers.shooting.stages import BATCH, ROOT_LEVEL
 from app.solvers.shooting.uniform import UniformShooting
 
@@ -49,7 +48,7 @@ class AdaptiveShooting(UniformShooting):
         self.tree = Quadtree(lightmap.nodes)
         self._regrowth = Regrowth(gpu, lightmap)
         self._log = ShotLog(gpu)
-        self._judge = Pass(gpu, "shooting/judge")
+        self._judge = Pass(gpu, "shooting/judge", defines=lightmap.defines("TILE"))
         self._inherit = Pass(gpu, "shooting/inherit", vertex="common/rects")
         self._correct = Pass(
             gpu,
@@ -126,8 +125,9 @@ class AdaptiveShooting(UniformShooting):
 
     def patch_edges(self) -> NDArray[np.int64]:
         """Patches are about as large in the scene at every level, see patch_level.glsl."""
-        level = self._choice.level - ROOT_LEVEL + self.lightmap.nodes.leaves.level
-        return np.asarray(2 ** np.clip(level, 0, MAX_LEVEL), np.int64)
+        nodes = self.lightmap.nodes
+        level = self._choice.level - ROOT_LEVEL + nodes.leaves.level
+        return np.asarray(2 ** np.clip(level, 0, highest_level(nodes.tile)), np.int64)
 
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
         return super().passes(shots) | {
@@ -204,8 +204,8 @@ class AdaptiveShooting(UniformShooting):
         nodes = self.lightmap.nodes
         if self.tree.room >= slots:
             return
-        longest = self.gpu.limits.max_texture // (TILE + 2)  # slots in a column of display texels
-        most = min(self.options.budget // TILE**2, nodes.columns * longest)
+        longest = self.gpu.limits.max_texture // (nodes.tile + 2)  # slots in a column of display texels
+        most = min(self.options.budget // nodes.tile**2, nodes.columns * longest)
         wanted = max(nodes.tiles * 3 // 2, nodes.tiles + slots)
         if min(wanted, most) > nodes.tiles:
             self._end_redo()
@@ -323,7 +323,7 @@ class _Redo:
         self._gpu, self.slots, self.next, self.end = gpu, slots, 0, shots
         nodes = lightmap.nodes
         place = corners(lightmap, slots)
-        self.quads = Mesh(gpu, quads(place, TILE, place).tobytes(), QUAD_FORMAT, per_instance=True)
+        self.quads = Mesh(gpu, quads(place, nodes.tile, place).tobytes(), QUAD_FORMAT, per_instance=True)
         flat, shaped = nodes.receivers_of(slots)
         self.receivers = receiver_meshes(gpu, flat, shaped)
 

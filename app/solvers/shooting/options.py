@@ -9,18 +9,25 @@ from app.atlas.quadtree import MAX_DEPTH
 from app.options import Options, option
 from app.projections import PROJECTIONS
 
-MAX_LEVEL = 4  # a patch is a whole tile
+MAX_LEVEL = 4  # of the patches that shoot: 16×16 texels
 FORM_FACTORS = ("polygon", "disc")
 CRITERIA = ("gradient", "shadow")
 TREE = ("depth", "criterion", "gradient", "shadow", "budget")  # options of quadtrees only
 VISIBILITIES = ("item-id", "depth", "combined")  # in the order of VISIBILITY in shooting/visible.glsl
 
 
+def highest_level(tile: int) -> int:
+    """Of patches in leaves of so many texels along the edge: none is larger than its leaf."""
+    return min(MAX_LEVEL, tile.bit_length() - 1)
+
+
 @dataclass(frozen=True)
 class ShootingOptions(Options):
     """Only ``storage`` restarts the solution when it changes; the rest acts on the next shot."""
 
-    level: int = option(2, "mip level that shoots: patches of 2^level texels squared", minimum=0, maximum=MAX_LEVEL)
+    level: int = option(
+        2, "mip level that shoots: patches of 2^level texels squared, at most a leaf", minimum=0, maximum=MAX_LEVEL
+    )
     coarsen: bool = option(
         True, "shoot from a level higher once the strongest patch is weak: faint light needs no fine patches"
     )

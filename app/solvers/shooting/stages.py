@@ -6,11 +6,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from app.atlas.charts import TILE
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, Pass, Texture
 from app.projections import PROJECTIONS, Occluders
-from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
+from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions, highest_level
 
 BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
 RUNS = 64  # at least, of slots: a batch is chosen from the strongest patch of each
@@ -29,7 +28,7 @@ class ShotBuffers:
     """What a shot writes besides the lightmap and does not depend on the options."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
-        self._gpu = gpu
+        self._gpu, self._tile = gpu, lightmap.nodes.tile
         self.runs = gpu.texture((max(RUNS, lightmap.rows), 1), 4, "f4")
         self.shooters = gpu.texture((BLOCK_ROWS, BATCH), 4, "f4")
         self.shooter_blocks = gpu.buffer(BATCH * BLOCK_BYTES)  # the same, as uniforms
@@ -59,7 +58,7 @@ class ShotBuffers:
 
     def shoot_alike(self, corners: Iterable[tuple[int, int]]) -> None:
         """Let the tiles that begin at these texels shoot from patches like all others."""
-        edge = TILE >> BLOCK_LEVEL
+        edge = self._tile >> BLOCK_LEVEL
         for column, row in ((x >> BLOCK_LEVEL, y >> BLOCK_LEVEL) for x, y in corners):
             self.finer_levels[row : row + edge, column : column + edge] = 0
         self.finer.write(self.finer_levels.tobytes())
@@ -90,9 +89,11 @@ class ChoiceStages:
         self.patch_size = (lightmap.size[0] >> BLOCK_LEVEL, lightmap.size[1] >> BLOCK_LEVEL)
         self.patches = gpu.texture(self.patch_size, 4, "f4")
         self.patch_target = gpu.target(self.patches)
-        kind = {"LEVEL": level - ROOT_LEVEL if adaptive else level}
+        tile = lightmap.nodes.tile
+        kind = lightmap.defines("TILE") | {"LEVEL": level - ROOT_LEVEL if adaptive else level}
+        kind["HIGHEST"] = highest_level(tile)
         self.add_patches = Pass(gpu, "shooting/patches", defines=kind)
-        self.add_runs = Pass(gpu, "shooting/runs", defines={"TILE_PATCHES": TILE >> BLOCK_LEVEL})
+        self.add_runs = Pass(gpu, "shooting/runs", defines={"TILE_PATCHES": tile >> BLOCK_LEVEL})
         self.choose = Pass(gpu, "shooting/choose", defines=kind | lightmap.defines("MATERIAL_BITS"))
 
     def release(self) -> None:
@@ -122,7 +123,9 @@ class ShotStages:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, adaptive: bool = False) -> None:
         self._gpu, self.projection, self._visibility = gpu, PROJECTIONS[options.projection], options.visibility
-        levels = range(options.level, (MAX_LEVEL if options.coarsen else options.level) + 1)
+        top = MAX_LEVEL if adaptive else highest_level(lightmap.nodes.tile)
+        first = min(options.level, top)
+        levels = range(first, (top if options.coarsen else first) + 1)
         self.choices = [ChoiceStages(gpu, lightmap, level, adaptive=adaptive) for level in levels]
         width, height = self.map_size = self.projection.size(options.resolution)
         self.most_maps = max(1, min(BATCH, MAPS_TEXELS // (width * height)))
@@ -147,13 +150,15 @@ class ShotStages:
             for near in (False, True)
         }
         self.add_open = Pass(gpu, "shooting/open", defines={"BLOCK": OPEN_BLOCK})
-        self.audit = Pass(gpu, "shooting/audit")
+        self.audit = Pass(gpu, "shooting/audit", defines=lightmap.defines("TILE"))
         self.enter = Pass(gpu, "shooting/ledger")
         self.tell = Pass(gpu, "shooting/report")
         weights_target = gpu.target(self.weights)
         Pass(gpu, "shooting/weights", defines=resolution, slots=reads).draw(weights_target)
         gpu.release_all(weights_target)
-        self.add_books = Pass(gpu, "shooting/books", defines=lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"))
+        self.add_books = Pass(
+            gpu, "shooting/books", defines=lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE")
+        )
 
     @property
     def sight_textures(self) -> dict[str, Texture]:

@@ -37,11 +37,12 @@ def _statistics(session: Session, state: State) -> None:
     """Counts in two columns, and the warnings of loading."""
     stats = state.stats
     assert stats is not None
+    tile = session.charts.tile
     counts = (
         ("Triangles", f"{stats.triangles:,}", "after repair"),
         ("Charts", f"{stats.charts:,}", "pieces of surface that unfold together"),
         ("Texels", f"{stats.texels:,}", "that cover a surface"),
-        ("Tiles", f"{stats.tiles:,}", "of 16×16 texels"),
+        ("Tiles", f"{stats.tiles:,}", f"of {tile}×{tile} texels"),
         ("Density", f"{widgets.number(session.charts.density, 3)}/m", "texels per metre that was aimed at"),
         ("Memory", f"{widgets.number(stats.memory_mib, 3)} MiB", "of the texels on the GPU"),
     )

@@ -1,5 +1,5 @@
 // A colour per level of the quadtree's leaves.
-#include "common/atlas.glsl"
+#include "common/tile.glsl"
 #include "common/leaves.glsl"
 #include "render/level_colour.glsl"
 
