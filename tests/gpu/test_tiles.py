@@ -94,15 +94,15 @@ def test_lines_of_the_grid_are_as_far_apart_as_tiles(gpu: Gpu) -> None:
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_the_light_does_not_depend_on_the_tile(gpu: Gpu, solver: str) -> None:
-    """Means over each object's area. What is still unshot is that of other patches each time."""
-    options: dict[str, object] = {"density": 4.0, "level": 1, "resolution": 64, "residual": 0.03, "solver": solver}
+    """Means over each object's area. What is still unshot is that of other patches each time, and makes twice its light."""
+    options: dict[str, object] = {"density": 4.0, "level": 1, "resolution": 64, "residual": 0.015, "solver": solver}
     means = []
     for tile in (8, 32):
         mine = solve(gpu, table_room(), tile=tile, **options)  # type: ignore[arg-type]
         means.append(mine.means(mine.H))
         assert abs(mine.book.imbalance_share) < 0.02  # what patches of half a metre lose at contacts
         mine.release()
-    np.testing.assert_allclose(*means, rtol=options["residual"])
+    np.testing.assert_allclose(*means, rtol=0.03)
 
 
 @pytest.mark.parametrize(("solver", "density"), [("shooting", 8.0), ("adaptive", 4.0)])
