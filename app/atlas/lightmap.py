@@ -35,7 +35,7 @@ _BYTES = {"f4": 4, "u4": 4, "f2": 2, "f1": 1}
 
 
 class Lightmap:
-    """Texel surfaces, irradiance H and residual r of one scene. Whoever makes it releases it.
+    """Texel surfaces, irradiance H and residual r of one scene. Whoever makes it clears it before use, and releases it.
 
     Made from a NodeSet, or at once from a scene and its charts. tiles: leaf tiles; columns, rows: of the node set in tiles;
     size: in texels; unit: W/m² per stored unit of H and r.
@@ -63,7 +63,10 @@ class Lightmap:
 
     @staticmethod
     def of(gpu: Gpu, scene: Scene, charts: Charts, *, storage: str = "rgba32f") -> Lightmap:
-        return Lightmap(gpu, NodeSet(scene, charts), storage=storage)
+        """With no light yet."""
+        lightmap = Lightmap(gpu, NodeSet(scene, charts), storage=storage)
+        lightmap.clear()
+        return lightmap
 
     # -- what passes bind ----------------------------------------------------------------------------------------------
 
@@ -97,11 +100,10 @@ class Lightmap:
     # -- state ---------------------------------------------------------------------------------------------------------
 
     def set_storage(self, storage: str) -> None:
-        """Choose how H and r are stored (a key of STORAGE), and start from no light."""
+        """Choose how H and r are stored (a key of STORAGE). What they hold then is undefined: clear."""
         self.gpu.release_all(*self._targets, *(self._textures.pop(name) for name in LIGHT if name in self._textures))
         self.storage = storage
         self._make_light()
-        self.clear()
 
     def _make_light(self) -> None:
         for name in LIGHT:

@@ -40,6 +40,7 @@ class Forest:
     ) -> None:
         charts = parametrize(scene, texels=texels, tile=tile)
         self.lightmap = Lightmap(gpu, quadtree_nodes(scene, charts), storage=storage)
+        self.lightmap.clear()
         self.nodes, self.storage = self.lightmap.nodes, storage
         self.tree, self.regrowth = Quadtree(self.nodes), Regrowth(gpu, self.lightmap)
 

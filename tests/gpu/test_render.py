@@ -451,6 +451,7 @@ def test_a_frame_follows_storage_and_materials(gpu: Gpu, box: Lightmap) -> None:
     target = gpu.target(colour)
     renderer.render(target, SIZE, box, view_of(box), PLAIN)
     box.set_storage("rgba16f")
+    box.clear()
     dim = tuple(replace(m, emission=tuple(0.01 * e for e in m.emission)) for m in box.scene.materials)
     box.set_materials(dim)
     box.clear()
