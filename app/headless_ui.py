@@ -18,7 +18,7 @@ from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, ShaderError, Texture
 from app.gpu.imgui import ImguiRenderer
 from app.render.false_colour import Scale, colour_map, false_colour_scale
-from app.render.resolve import TEXELS_PER_FRAME, display_size
+from app.render.resolve import BORDER, TEXELS_PER_FRAME, display_size
 from app.ui import theme
 from app.ui.app import Ui
 from app.ui.state import Legend, Request
@@ -97,7 +97,8 @@ class UiFrame:
         """How many frames it takes until a change is seen everywhere."""
         if self._whole or not session.opened:
             return WARM_UP
-        return WARM_UP + math.ceil(math.prod(display_size(session.lightmap)) / TEXELS_PER_FRAME)
+        border = BORDER[session.display.interpolation]
+        return WARM_UP + math.ceil(math.prod(display_size(session.lightmap, border)) / TEXELS_PER_FRAME)
 
     def release(self) -> None:
         """Give back the GL objects. The interface is still usable by another renderer, or can be released."""

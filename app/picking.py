@@ -74,5 +74,29 @@ def picked_from_hit(lightmap: Lightmap, hit: PickHit, level: int) -> Picked:
     )
 
 
+@dataclass(frozen=True)
+class LeafAt:
+    """A leaf: its level, (u, v, u, v) in the virtual atlas [texels of level 0], how many of its texels cover a surface, and
+    the edge of a texel at the density aimed at [m]."""
+
+    level: int
+    rect: tuple[float, float, float, float]
+    texels: int
+    texel: float
+
+
+def leaf_at(lightmap: Lightmap, uv: tuple[float, float]) -> LeafAt | None:
+    """The leaf at a place of the virtual atlas [texels of level 0]; None where there is none."""
+    nodes = lightmap.nodes
+    slot = nodes.slot_at(uv)
+    if slot < 0:
+        return None
+    level = int(nodes.leaves.level[slot])
+    covered = int((nodes.surfaces.face[slot] >= 0).sum())
+    return LeafAt(
+        level, nodes.atlas_rect(nodes.corner(slot), nodes.tile), covered, 0.5**level / lightmap.charts.density
+    )
+
+
 def _rgb(values: np.ndarray) -> RGB:
     return float(values[0]), float(values[1]), float(values[2])

@@ -405,6 +405,10 @@ class Session:
             return None
         return self.lightmap.nodes.atlas_rect(shot.corner, shot.size)
 
+    def atlas_image(self, size: tuple[int, int], *, turned: bool = False) -> Texture | None:
+        """The virtual atlas with what was drawn last, v up or to the right; None before the first picture."""
+        return self.renderer.atlas(self.lightmap, size, turned=turned)
+
     def hemicube_image(self) -> Texture:
         """The last shooter's visibility map, in one colour per facet."""
         seen, projection = self.solver.inspect(), PROJECTIONS[self.shooting.projection]

@@ -6,6 +6,7 @@ import numpy as np
 
 from app.atlas.lightmap import Lightmap
 from app.gpu import Framebuffer, Gpu, Pass, Texture
+from app.render.atlas_image import AtlasImage
 from app.render.camera import CameraView
 from app.render.false_colour import LAYER, Scale, false_colour_scale
 from app.render.options import DisplayOptions
@@ -27,6 +28,7 @@ class FrameRenderer:
         self._gpu = gpu
         self._background = Pass(gpu, "render/background", label="background")
         self._picker = Picker(gpu)
+        self._atlas = AtlasImage(gpu)
         self._surfaces: Surfaces | None = None
         self._prepared: Surfaces | None = None
         self._picture: _Picture | None = None
@@ -92,6 +94,12 @@ class FrameRenderer:
             present.draw(target, textures={"t_picture": picture.colour}, viewport=(0, 0, *size))
         self._last = lightmap, view.copy(), size
 
+    def atlas(self, lightmap: Lightmap, size: tuple[int, int], *, turned: bool) -> Texture | None:
+        """The virtual atlas with what the last frame showed, see AtlasImage; None before the first frame of that lightmap."""
+        if self._surfaces is None or self._surfaces.lightmap is not lightmap or not self._surfaces.drawn:
+            return None
+        return self._atlas.draw(self._surfaces, size, turned=turned)
+
     def pick(self, x_px: float, y_px: float) -> PickHit | None:
         """The surface under a pixel of the last frame, counted from its top left corner; None for the background."""
         if self._last is None:
@@ -106,7 +114,7 @@ class FrameRenderer:
 
     def release(self) -> None:
         self.give_up()
-        for resource in (self._surfaces, self._picture, self._picker):
+        for resource in (self._surfaces, self._picture, self._picker, self._atlas):
             if resource is not None:
                 resource.release()
 

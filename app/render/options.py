@@ -8,6 +8,7 @@ from app.options import Options, option
 
 LAYERS = ("combined", "irradiance", "residual", "albedo", "charts", "leaves", "texels")
 TONE_MAPS = ("clamp", "reinhard", "aces", "agx", "neutral")
+INTERPOLATIONS = ("nearest", "bilinear", "bicubic")
 FALSE_COLOURS = ("off", "illuminance", "luminance")  # lux, cd/m²
 
 
@@ -18,7 +19,7 @@ class DisplayOptions(Options):
     )
     exposure: float = option(0.0, "exposure; where not given, found from the light", unit="EV", minimum=-24, maximum=24)
     tone_map: str = option("agx", "tone curve", choices=TONE_MAPS)
-    smooth: bool = option(True, "bilinear texels instead of nearest")
+    interpolation: str = option("bilinear", "what is shown between the middles of texels", choices=INTERPOLATIONS)
     ambient: bool = option(False, "add the ambient estimate of light not yet shot (Cohen et al. 1988); display only")
     grid: bool = option(False, "draw texels and tiles, in a quadtree each level in its colour")
     last_shooter: bool = option(False, "mark the patch that shot last")

@@ -1,4 +1,4 @@
-"""Display texels: a layer on every texel, developed for the screen, in tiles with a border that the sampler interpolates.
+"""Display texels: a layer on every texel, developed for the screen, in tiles with a border, which the sampler interpolates.
 
 Doing exposure, tone curve and sRGB here leaves one look-up per pixel: that is what holds 30 frames/s on a software
 rasteriser. A texel that covers nothing copies a neighbour, so that no gutter or tile border darkens the picture.
@@ -11,26 +11,29 @@ from typing import TypeVar
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
-from app.atlas.node_set import TABLE_WIDTH, NodeSet
-from app.atlas.quadtree import SIDES
+from app.atlas.node_set import TABLE_WIDTH
 from app.gpu import Gpu, Mesh, Pass, Texture
+from app.render.ages import LeafAges
 from app.render.develop import curve
+from app.render.edges import EDGE_FORMAT, unequal_edges
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS, Layer
 from app.render.options import DisplayOptions
 from app.render.targets import release_targets
-from app.scene.model import F32, RGB
+from app.scene.model import RGB
 
+# Texels around each tile: as many as interpolation at its edge reaches beyond it
+BORDER = {"nearest": 1, "bilinear": 1, "bicubic": 2}
 TEXELS_PER_FRAME = 1 << 17  # that are brought up to date in one frame, where not all must be
 T = TypeVar("T")
 
 
 class DisplayTexels:
-    """The display texels of one lightmap. Whoever makes it releases it."""
+    """The display texels of one lightmap; border: see BORDER. Whoever makes it releases it."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
-        self._gpu, self._lightmap = gpu, lightmap
-        self.size = display_size(lightmap)
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, ages: LeafAges, border: int = 1) -> None:
+        self._gpu, self._lightmap, self._ages, self._border = gpu, lightmap, ages, border
+        self.size = display_size(lightmap, border)
         self._colour = gpu.texture(self.size, 4, "f1")
         self._target = gpu.target(self._colour)
         self._target.clear()
@@ -44,18 +47,17 @@ class DisplayTexels:
             "t_source": gpu.texture(self.size, 1, "u4"),
         }
         self._version = lightmap.version
-        self._edges: Mesh | None = None
+        self._edges: dict[bool, Mesh] = {}
         self._find_edges()
-        self._find_sources = Pass(gpu, "render/source", defines=lightmap.defines("TILE"))
+        self._find_sources = Pass(gpu, "render/source", defines=lightmap.defines("TILE") | {"BORDER": border})
         self._source_target = gpu.target(self._tables["t_source"])
         self._sourced_rows = 0
-        self._passes: dict[tuple[str, Layer, str], Pass] = {}
+        self._passes: dict[tuple[object, ...], Pass] = {}
         self._next_row = 0
 
-    @property
-    def fits(self) -> bool:
-        """Whether the lightmap is still as large as it was."""
-        return self.size == display_size(self._lightmap)
+    def fits(self, border: int) -> bool:
+        """Whether the lightmap is still as large as it was, and the border as wide as it shall be."""
+        return self.size == display_size(self._lightmap, border) and self._border == border
 
     def resolve(
         self, layer_name: str, display: DisplayOptions, *, scale: Scale | None, ambient: RGB, whole: bool
@@ -84,14 +86,13 @@ class DisplayTexels:
             resolve = self._pass(name, layer, shader)
             bound, values = declared(resolve, textures), declared(resolve, uniforms)
             resolve.draw(target, textures=bound, uniforms=values, viewport=viewport)
-        if self._edges is not None:
-            edges = self._pass("edges", layer, shader)
-            uniforms |= {"u_size": self.size, "u_pages": self._pages}
-            textures |= lightmap.textures("t_pages", "t_position_area")
-            edges.draw(
-                self._target, textures=declared(edges, textures), uniforms=declared(edges, uniforms), mesh=self._edges
-            )
-        smooth = layer.smooth and display.smooth
+        uniforms |= {"u_size": self.size, "u_pages": self._pages, "u_border": self._border}
+        textures |= lightmap.textures("t_pages", "t_position_area")
+        for follows, mesh in self._edges.items():
+            edges = self._pass("edges", layer, shader, FOLLOWS=follows)
+            bound, values = declared(edges, textures), declared(edges, uniforms)
+            edges.draw(self._target, textures=bound, uniforms=values, mesh=mesh, scissor=(0, first, self.size[0], rows))
+        smooth = layer.smooth and display.interpolation != "nearest"
         filtering = self._gpu.ctx.LINEAR if smooth else self._gpu.ctx.NEAREST
         self._colour.filter = (filtering, filtering)
         return {"t_display": self._colour, "t_unlit": self._unlit, "t_places": self._tables["t_places"]}
@@ -106,10 +107,11 @@ class DisplayTexels:
 
     def _find_edges(self) -> None:
         """Where leaves meet those of another level."""
-        if self._edges is not None:
-            self._gpu.release_all(self._edges)
-        edges = unequal_edges(self._lightmap.nodes)
-        self._edges = Mesh(self._gpu, edges.tobytes(), EDGE_FORMAT, per_instance=True) if len(edges) else None
+        self._gpu.release_all(*self._edges.values())
+        edges = unequal_edges(self._lightmap.nodes, self._border)
+        self._edges = {
+            follows: Mesh(self._gpu, some.tobytes(), EDGE_FORMAT, per_instance=True) for follows, some in edges.items()
+        }
 
     @property
     def _pages(self) -> tuple[float, float]:
@@ -117,8 +119,7 @@ class DisplayTexels:
 
     def release(self) -> None:
         release_targets(self._gpu, self._target, self._unlit_target, self._source_target)
-        if self._edges is not None:
-            self._gpu.release_all(self._edges)
+        self._gpu.release_all(*self._edges.values())
         for texture in (self._colour, self._unlit, *self._tables.values()):
             texture.release()
 
@@ -144,11 +145,11 @@ class DisplayTexels:
         )
         self._sourced_rows = end
 
-    def _pass(self, name: str, layer: Layer, shader: str) -> Pass:
-        key = name, layer, shader
+    def _pass(self, name: str, layer: Layer, shader: str, **more: bool) -> Pass:
+        key = name, layer, shader, *more.values()
         if key not in self._passes:
-            own = () if name == "unlit" else ("TILE",)
-            defines = self._lightmap.defines(*layer.defines, *own)
+            own = ("TILE",) if name == "edges" else ()
+            defines = self._lightmap.defines(*layer.defines, *own) | more
             slots = {"layer": f"render/layers/{layer.shader}.glsl", "curve": f"render/{shader}.glsl"}
             self._passes[key] = Pass(self._gpu, f"render/{name}", defines=defines, slots=slots, label=name)
         return self._passes[key]
@@ -162,59 +163,26 @@ class DisplayTexels:
         return self._gpu.texture((TABLE_WIDTH, rows), 1, "u4", chart_of_facet.tobytes())
 
     def _place_table(self) -> Texture:
-        """For each page of the atlas, the display texel of a place uv [texels of level 0]: z·uv + (x, y), RGBA32F."""
+        """For each page of the atlas, the display texel of a place uv [texels of level 0]: z·uv + (x, y), z 0 where no leaf is;
+        and when its leaf was split off, see LeafAges. RGBA32F."""
         nodes = self._lightmap.nodes
         pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64)
         slot = np.maximum(pages - 1, 0)
-        first = np.stack([slot % nodes.columns, slot // nodes.columns], -1) * bordered(nodes) + 1
+        first = (
+            np.stack([slot % nodes.columns, slot // nodes.columns], -1) * (nodes.tile + 2 * self._border) + self._border
+        )
         tile = np.stack([nodes.leaves.x[slot], nodes.leaves.y[slot]], -1)
         places = np.zeros((*pages.shape, 4), np.float32)
         places[..., :2] = first - tile * nodes.tile
-        places[..., 2] = 2.0 ** nodes.leaves.level[slot]
+        places[..., 2] = np.where(pages > 0, 2.0 ** nodes.leaves.level[slot], 0.0)
+        places[..., 3] = self._ages.born(nodes)
         return self._gpu.texture(pages.shape[::-1], 4, "f4", places.tobytes())
 
 
-def bordered(nodes: NodeSet) -> int:
-    """Display texels along the edge of a leaf: one more on each side."""
-    return nodes.tile + 2
-
-
-def display_size(lightmap: Lightmap) -> tuple[int, int]:
+def display_size(lightmap: Lightmap, border: int) -> tuple[int, int]:
     """Display texels of the whole node set."""
-    return lightmap.columns * bordered(lightmap.nodes), lightmap.rows * bordered(lightmap.nodes)
-
-
-EDGE_FORMAT = {"in_rect": "4f", "in_outward": "3f"}
-
-
-def unequal_edges(nodes: NodeSet) -> F32:
-    """(n, 7) f32 instances of EDGE_FORMAT: half edges of leaves that meet a leaf of another level."""
-    if nodes.depth == 0:
-        return np.zeros((0, 7), np.float32)
-    slots = np.flatnonzero(nodes.used)
-    level = nodes.leaves.level[slots]
-    pages = np.pad(nodes.slot_tables["t_pages"][..., 0].astype(np.int64), 1)
-    side = 1 << (nodes.depth - level)  # pages along an edge of each leaf
-    left, bottom = nodes.leaves.x[slots] * side + 1, nodes.leaves.y[slots] * side + 1
-    corner = np.stack([slots % nodes.columns, slots // nodes.columns], 1) * bordered(nodes)
-    last, length = bordered(nodes) - 1, nodes.tile // 2
-    found = []
-    for dx, dy in SIDES:
-        for half in (0, 1):
-            along = side // 4 + half * (side // 2)
-            x = left + (along if dy else np.where(dx > 0, side, -1))
-            y = bottom + (along if dx else np.where(dy > 0, side, -1))
-            near = pages[y, x] - 1
-            finer = np.where(near >= 0, nodes.leaves.level[near] - level, 0)
-            which = np.flatnonzero(finer != 0)
-            start = 1 + half * length
-            place = (last * (dx > 0), start) if dx else (start, last * (dy > 0))
-            extent = (1, length) if dx else (length, 1)
-            count = len(which)
-            found.append(
-                np.column_stack([corner[which] + place, np.tile([*extent, dx, dy], (count, 1)), np.sign(finer[which])])
-            )
-    return np.concatenate(found).astype(np.float32)
+    bordered = lightmap.nodes.tile + 2 * border
+    return lightmap.columns * bordered, lightmap.rows * bordered
 
 
 def declared(program: Pass, offered: dict[str, T]) -> dict[str, T]:

@@ -91,6 +91,8 @@ class State:
     picked_view: CameraView | None = None
     hemicube: tuple[object, Any] | None = None
     hemicube_age: float = 0.0
+    inset: tuple[object, Any] | None = None
+    inset_age: float = 0.0
     drag_button: int = -1
     flight: Flight | None = None
     material: int = 0

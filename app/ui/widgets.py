@@ -162,6 +162,12 @@ def dim(text: str) -> None:
     imgui.pop_style_color()
 
 
+def steady_width() -> float:
+    """Width of a window's inside, whether it has a scroll bar or not: pictures that are as wide cannot make one come and go."""
+    style = imgui.get_style()
+    return max(imgui.get_window_width() - 2 * style.window_padding.x - style.scrollbar_size, 1.0)
+
+
 def wrapped(text: str, colour: theme.RGBA = theme.TEXT) -> None:
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*colour))
     imgui.push_text_wrap_pos(0.0)

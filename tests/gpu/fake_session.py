@@ -50,7 +50,7 @@ class FakeHistory:
 
 
 class FakeSession:
-    """What the interface uses of a session. ``calls`` lists what it was asked to do."""
+    """What the interface uses of a session. ``calls`` lists what it was asked to do, ``insets`` the pictures of the atlas."""
 
     def __init__(self, *, opened: bool = True) -> None:
         self.opened, self.running, self.name, self.message = opened, True, "fake box", None
@@ -58,7 +58,7 @@ class FakeSession:
         cameras = (SimpleNamespace(name="front", world_from_camera=np.eye(4), yfov=0.7),)
         self.scene = SimpleNamespace(materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras)
         self.unedited = self.scene
-        self.charts = SimpleNamespace(density=40.0, tile=16, warnings=())
+        self.charts = SimpleNamespace(density=40.0, tile=16, warnings=(), size=(160, 96))
         self.lightmap = SimpleNamespace(frame=FakeFrame())
         self.shooting, self.atlas, self.display = ShootingOptions(), AtlasOptions(), DisplayOptions()
         self.view = CameraView(np.eye(4), 0.7, 2.0)
@@ -67,6 +67,7 @@ class FakeSession:
         self.image = None
         self.picked = None
         self.calls: list[tuple[object, ...]] = []
+        self.insets: list[tuple[tuple[int, int], bool]] = []
 
     @property
     def stats(self) -> SimpleNamespace:
@@ -87,6 +88,10 @@ class FakeSession:
         target.clear(0.2, 0.3, 0.4, 1.0)
 
     def hemicube_image(self):
+        return self.image
+
+    def atlas_image(self, size, *, turned=False):
+        self.insets.append((size, turned))
         return self.image
 
     def pick(self, x_px: int, y_px: int):

@@ -20,6 +20,7 @@ from app.options import specs
 from app.projections import PROJECTIONS
 from app.render.layers import LAYER_SHADERS
 from app.render.options import TONE_MAPS
+from app.render.resolve import BORDER
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 from app.solvers.shooting.stages import OPEN_BLOCK
 
@@ -38,6 +39,9 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "ALBEDO_TEXTURE": FLAG,
     "EMISSION_TEXTURE": FLAG,
     "OVERLAY": FLAG,
+    "BICUBIC": FLAG,
+    "FOLLOWS": FLAG,
+    "BORDER": tuple(sorted(set(BORDER.values()))),
     "SAMPLES": (1, 4),
     "FLAT": FLAG,
     "NEAR_FIELD": FLAG,

@@ -24,6 +24,7 @@ from app.ui import layout, overlays, widgets
 from app.ui.app import Ui
 from app.ui.file_dialog import readable
 from app.ui.keys import SHORTCUTS
+from app.ui.panels import atlas
 from app.ui.state import Legend, Pace, Request
 
 SIZE = (1280, 720)
@@ -377,6 +378,47 @@ def test_what_is_picked_is_read_again_while_shooting(desk: Desk) -> None:
     assert (
         len([c for c in desk.session.calls if c[0] == "pick"]) == before + again
     )  # the pixel shows something else now
+
+
+def test_the_atlas_is_drawn_only_where_it_is_seen(desk: Desk) -> None:
+    insets = desk.session.insets
+    desk.frames(3, seconds=1.0)
+    (width, height), turned = insets[-1]
+    assert not turned and 150 < width <= 512 and width / height == pytest.approx(160 / 96, rel=0.02)
+    insets.clear()
+    desk.ui.state.hidden_panels.add("Inspect")
+    desk.frames(3, seconds=1.0)
+    assert insets == []
+
+
+@pytest.mark.parametrize("size", [(160, 96), (96, 160)], ids=str)
+def test_pointing_at_the_atlas_tells_of_the_leaf(
+    desk: Desk, gpu: Gpu, monkeypatch: pytest.MonkeyPatch, size: tuple[int, int]
+) -> None:
+    asked: list[tuple[float, float]] = []
+    places: list[atlas.Place] = []
+
+    def leaf(lightmap: object, uv: tuple[float, float]) -> SimpleNamespace:
+        asked.append(uv)
+        return SimpleNamespace(level=2, rect=(64.0, 32.0, 68.0, 36.0), texels=256, texel=0.01)
+
+    place = atlas._place
+    monkeypatch.setattr(atlas, "leaf_at", leaf)
+    monkeypatch.setattr(atlas, "_place", lambda *args: places.append(place(*args)) or places[-1])
+    desk.session.image = gpu.texture((64, 28), 4, "f1", bytes(64 * 28 * 4))
+    desk.session.charts.size = size
+    desk.point(5, 5)
+    desk.frames(40)
+    assert places[-1].turned == (size[0] < size[1]), "the longer edge lies along the longer one of what room there is"
+    before, asked[:] = desk.image(), []
+    assert len({(p.left, p.top, p.scale) for p in places[-10:]}) == 1, "it stays where it is"
+    at = places[-1].screen_from_atlas(65.0, 33.0)
+    desk.point(at.x, at.y)
+    desk.frames(2)
+    assert asked[-1] == pytest.approx((65.0, 33.0), abs=1 / places[-1].scale)  # Dear ImGui cuts to whole pixels
+    corner = places[-1].screen_from_atlas(64.0, 32.0)
+    assert (desk.image()[int(corner.y) - 1, int(corner.x) + 2] > 120).all(), "framed"
+    assert (desk.image() != before).any(-1).sum() > 2000, "a tooltip"
 
 
 # -- layout ------------------------------------------------------------------------------------------------------------

@@ -82,6 +82,13 @@ REELS = (
         SQUARE,
         adaptive=True,
     ),
+    Reel(
+        "cornell-box",
+        1_500,  # few, so that it shows
+        ShootingOptions(residual=1e-2),
+        (Picture("bicubic", 200, exposure=CORNELL_EV, display={"interpolation": "bicubic"}),),
+        SQUARE,
+    ),
     Reel("textured-room", 60_000, ShootingOptions(level=3, residual=3e-2), (Picture("textured-room"),)),
     Reel(
         "two-rooms",
@@ -97,7 +104,7 @@ REELS = (
 )
 
 
-@pytest.mark.parametrize("reel", REELS, ids=lambda reel: reel.scene + "-quadtree" * reel.adaptive)
+@pytest.mark.parametrize("reel", REELS, ids=lambda reel: f"{reel.scene}-{reel.texels}" + "-quadtree" * reel.adaptive)
 def test_the_gallery_looks_as_it_did(gpu: Gpu, reel: Reel, request: pytest.FixtureRequest) -> None:
     regenerate = request.config.getoption("--regenerate-screenshots")
     session = Session(gpu, shooting=reel.shooting, atlas=AtlasOptions(texels=reel.texels, adaptive=reel.adaptive))

@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from app.atlas.options import AtlasOptions
 from app.gpu import gpu_context
 from app.headless_ui import ui_image
+from app.render.options import DisplayOptions
 from app.session import Session, Stop
 
 ROOT = Path(__file__).parent.parent.parent
-GOLDEN = ROOT / "screenshots" / "viewer.png"
 FAILED = Path(__file__).parent / "failed"
 SIZE = (1280, 720)
 SHOTS = 200
@@ -28,9 +29,18 @@ SHARE = (
 MAGNIFIED = 8
 
 
-def test_the_viewer_looks_as_it_did(request: pytest.FixtureRequest) -> None:
+GOLDENS = {
+    "viewer": (AtlasOptions(), DisplayOptions()),
+    "viewer-quadtree": (AtlasOptions(adaptive=True), DisplayOptions(grid=True)),
+}
+
+
+@pytest.mark.parametrize("name", GOLDENS)
+def test_the_viewer_looks_as_it_did(request: pytest.FixtureRequest, name: str) -> None:
+    golden = ROOT / "screenshots" / f"{name}.png"
+    atlas, display = GOLDENS[name]
     with gpu_context() as gpu:
-        session = Session(gpu)
+        session = Session(gpu, atlas=atlas, display=display)
         session.open_now("cornell-box")
         session.solve(Stop(shots=SHOTS))
         session.expose()
@@ -43,12 +53,12 @@ def test_the_viewer_looks_as_it_did(request: pytest.FixtureRequest) -> None:
     if not software:
         pytest.skip("goldens are compared on the software rasteriser only")
     if request.config.getoption("--regenerate-screenshots"):
-        Image.fromarray(image).save(GOLDEN)
-    difference = np.abs(image.astype(int) - np.asarray(Image.open(GOLDEN).convert("RGB"), int)).max(axis=-1)
+        Image.fromarray(image).save(golden)
+    difference = np.abs(image.astype(int) - np.asarray(Image.open(golden).convert("RGB"), int)).max(axis=-1)
     wrong = float((difference > STEP).mean())
     if wrong > SHARE:
         FAILED.mkdir(exist_ok=True)
-        Image.fromarray(image).save(FAILED / GOLDEN.name)
+        Image.fromarray(image).save(FAILED / golden.name)
         magnified = np.clip(difference * MAGNIFIED, 0, 255).astype(np.uint8)
-        Image.fromarray(magnified).save(FAILED / f"{GOLDEN.stem}-difference.png")
+        Image.fromarray(magnified).save(FAILED / f"{golden.stem}-difference.png")
     assert wrong <= SHARE, f"{wrong:.2%} of the pixels differ: see {FAILED}"

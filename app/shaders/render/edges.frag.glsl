@@ -1,49 +1,76 @@
 // Border texels of leaves next to leaves of another level, so that both sides interpolate to the same light: no T-vertices.
 // [Coombe03, 4.4]
 //
-// Next to a finer leaf, the mean g of the four texels that the border texel covers. Next to a coarser one, whose outermost texels lie
-// at -1 and the leaf's own at 1/2 of its texels from the edge, the straight line through both at -1/2: g = f/3 + 2c/3. Where the
-// light is linear, both sides then agree along the whole edge.
+// Interpolation at an edge weighs the n-th texels on its two sides alike. So both leaves agree along it if, for every n, the sum of
+// a leaf's own n-th texel and of its n-th border texel is the same for both. Next to a finer leaf the border is the mean h of the
+// four texels that it covers, and the sum is c + h; the finer leaf follows with g = c + h - f, with c and h interpolated along the
+// edge. The sums are of what is shown, since that is what the sampler interpolates. Where light is linear, g goes on as f does.
 #include "common/atlas.glsl"
 #include "common/pages.glsl"
+#include "common/tile.glsl"
 #include "common/colour.glsl"
-#include "render/display.glsl"
+#define FOLLOWS 0
 uniform sampler2D t_position_area;
 uniform float u_gain;  // exposure
+uniform int u_border;  // texels around each tile
 
 flat in vec2 v_outward;
-flat in float v_finer;
 
 layout(location = 0) out vec4 out_colour;
 
 #include <layer>
 #include <curve>
 
+vec3 shown(vec3 colour) { return encode_srgb(develop(colour * u_gain)); }
+
 vec3 own_or(vec3 otherwise, ivec2 texel_px) {
     return texelFetch(t_position_area, texel_px, 0).w > 0.0 ? layer_colour(texel_px) : otherwise;
 }
 
-void main() {
-    ivec2 px = ivec2(gl_FragCoord.xy), slot = px / BORDERED;
-    ivec2 inside = clamp(px - slot * BORDERED - 1, 0, TILE - 1);
-    vec3 leaf = texelFetch(t_leaves, slot, 0).xyz;
-    vec3 f = layer_colour(slot * TILE + inside);
-    vec2 uv = (leaf.xy * float(TILE) + vec2(inside) + 0.5 + v_outward) * leaf.z;
-    ivec2 other = slot_at(uv);
-    vec3 near = texelFetch(t_leaves, max(other, 0), 0).xyz;
-    vec2 at = uv / max(near.z, 1e-9) - near.xy * float(TILE);  // in the neighbour [its texels]
-    vec3 colour = vec3(0.0);
-    if (v_finer > 0.0) {
-        ivec2 base = clamp(ivec2(round(at)) - 1, 0, TILE - 2);
-        for (int k = 0; k < 4; ++k) colour += 0.25 * own_or(f, other * TILE + base + ivec2(k & 1, k >> 1));
-    } else {
-        vec2 along = vec2(1.0) - abs(v_outward);
-        ivec2 row = clamp(ivec2(floor(at)), 0, TILE - 1);
-        vec2 start = mix(vec2(row), clamp(at - 0.5, 0.0, float(TILE - 2)), along);
-        float share = dot(clamp(at - 0.5 - floor(start), 0.0, 1.0), along);
-        ivec2 first = other * TILE + ivec2(floor(start)), second = first + ivec2(along);
-        vec3 c = mix(own_or(f, first), own_or(f, second), share);
-        colour = f / 3.0 + c * 2.0 / 3.0;
+#if FOLLOWS
+// g beside a coarser leaf. inside: the own n-th texel opposite; mirrored in the edge, the middle of four own texels is that of a
+// coarser one.
+vec3 border_texel(vec3 f, ivec2 slot, vec3 leaf, ivec2 inside, ivec2 other, vec3 near, vec2 at) {
+    ivec2 across = abs(ivec2(v_outward)), along = 1 - across;
+    bool lower = v_outward.x + v_outward.y < 0.0;
+    int from_low = inside.x * across.x + inside.y * across.y;
+    int n = lower ? from_low : TILE - 1 - from_low;
+    float pair = 0.5 * dot(vec2(inside), vec2(along)) - 0.25;
+    float base = clamp(floor(pair), 0.0, float(TILE / 2 - 2));
+    vec3 c[2], h[2];
+    for (int k = 0; k < 2; ++k) {
+        ivec2 four = 2 * (int(base) + k) * along + (lower ? 2 * n : TILE - 2 - 2 * n) * across;
+        vec2 middle = vec2(four) + 1.0 + v_outward * float(4 * n + 2);
+        ivec2 coarse = ivec2(floor((leaf.xy * float(TILE) + middle) * (leaf.z / near.z) - near.xy * float(TILE)));
+        c[k] = own_or(f, other * TILE + clamp(coarse, 0, TILE - 1));
+        h[k] = vec3(0.0);
+        for (int i = 0; i < 4; ++i) h[k] += 0.25 * own_or(f, slot * TILE + four + ivec2(i & 1, i >> 1));
     }
-    out_colour = vec4(encode_srgb(develop(colour * u_gain)), 1.0);
+    return shown(mix(c[0], c[1], pair - base)) + shown(mix(h[0], h[1], pair - base)) - shown(f);
+}
+#else
+// Between four texels of the other leaf: h beside a finer one. At a corner of a coarser one, from beyond its outermost texels, on the
+// line through the last two.
+vec3 border_texel(vec3 f, ivec2 slot, vec3 leaf, ivec2 inside, ivec2 other, vec3 near, vec2 at) {
+    vec2 base = clamp(floor(at - 0.5), 0.0, float(TILE - 2)), share = at - 0.5 - base;
+    ivec2 first = other * TILE + ivec2(base);
+    vec3 below = mix(own_or(f, first), own_or(f, first + ivec2(1, 0)), share.x);
+    vec3 above = mix(own_or(f, first + ivec2(0, 1)), own_or(f, first + ivec2(1, 1)), share.x);
+    return shown(mix(below, above, share.y));
+}
+#endif
+
+void main() {
+    int bordered = TILE + 2 * u_border;
+    ivec2 px = ivec2(gl_FragCoord.xy), slot = px / bordered;
+    ivec2 place = px - slot * bordered - u_border;
+    ivec2 inside = max(place, -1 - place);
+    inside = min(inside, 2 * TILE - 1 - inside);
+    vec3 leaf = texelFetch(t_leaves, slot, 0).xyz;
+    vec2 uv = (leaf.xy * float(TILE) + vec2(place) + 0.5) * leaf.z;
+    ivec2 other = max(slot_at(uv), 0);
+    vec3 near = texelFetch(t_leaves, other, 0).xyz;
+    vec2 at = uv / max(near.z, 1e-9) - near.xy * float(TILE);  // in the neighbour [its texels]
+    vec3 f = own_or(layer_colour(other * TILE + clamp(ivec2(floor(at)), 0, TILE - 1)), slot * TILE + inside);
+    out_colour = vec4(border_texel(f, slot, leaf, inside, other, near, at), 1.0);
 }

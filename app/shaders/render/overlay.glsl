@@ -1,6 +1,6 @@
 // Texel checker, texel and tile lines, and the patch that shot: all as wide as pixels, faded before they would alias. Tiles of a
-// quadtree have the colour of their level.
-#include "render/level_colour.glsl"
+// quadtree have the colour of their level, and shine when they are new.
+#include "render/shine.glsl"
 uniform float u_checker;  // 0 to 1
 uniform float u_grid;     // 0 to 1
 uniform float u_leaves;   // 1 for a quadtree
@@ -12,8 +12,8 @@ float line_at_integers(vec2 uv, vec2 per_px, float width_px) {
     return clamp(0.5 * width_px + 0.5 - min(distance_px.x, distance_px.y), 0.0, 1.0);
 }
 
-// uv: texels of level 0; finer: texels of the leaf for each of these
-vec3 overlaid(vec3 colour, vec2 root_uv, vec2 root_per_px, float finer) {
+// uv: texels of level 0; finer: texels of the leaf for each of these; born: when the leaf was split off [s]
+vec3 overlaid(vec3 colour, vec2 root_uv, vec2 root_per_px, float finer, float born) {
     vec2 uv = root_uv * finer, texels_per_px = root_per_px * finer;
     float texel_px = 1.0 / max(texels_per_px.x, texels_per_px.y);
 
@@ -25,7 +25,9 @@ vec3 overlaid(vec3 colour, vec2 root_uv, vec2 root_per_px, float finer) {
     float tiles = line_at_integers(uv / u_tile, texels_per_px / u_tile, 1.6) * smoothstep(0.2, 0.5, texel_px);
     vec3 contrast = vec3(max(colour.r, max(colour.g, colour.b)) > 0.72 ? 0.0 : 0.95);
     colour = mix(colour, contrast, u_grid * max(0.15 * texels, 0.35 * tiles * (1.0 - u_leaves)));
-    colour = mix(colour, level_colour(log2(finer)), u_grid * u_leaves * 0.8 * tiles);
+    float level = log2(max(finer, 1.0));
+    colour = mix(colour, shining(colour, level, born), u_grid * u_leaves);
+    colour = mix(colour, level_colour(level), u_grid * u_leaves * 0.8 * tiles);
 
     vec2 outside = max(u_shooter.xy - root_uv, root_uv - u_shooter.zw) / root_per_px;
     float distance_px = max(outside.x, outside.y);

@@ -1,8 +1,9 @@
 // The display texels on the surfaces. Lean: this runs for every pixel, also on a software rasteriser.
 #define OVERLAY 0
+#define BICUBIC 0
 
 uniform sampler2D t_display;  // developed for the screen
-uniform sampler2D t_places;   // per page of the atlas: display texel = z · uv + xy
+uniform sampler2D t_places;   // per page of the atlas: display texel = z · uv + xy; w: when its leaf was split off [s]
 uniform vec3 u_texel;         // size of a display texel; pages per texel of level 0
 
 in vec4 v_uv;
@@ -14,15 +15,23 @@ layout(location = 0) out vec4 out_colour;
 #if OVERLAY
 #include "render/overlay.glsl"
 #endif
+#if BICUBIC
+#include "render/bicubic.glsl"
+#endif
 
 void main() {
     vec2 uv = gl_FrontFacing ? v_uv.xy : v_uv.zw;
-    vec3 place = texelFetch(t_places, max(ivec2(uv * u_texel.z), 0), 0).xyz;
-    vec3 colour = textureLod(t_display, (uv * place.z + place.xy) * u_texel.xy, 0.0).rgb;
+    vec4 place = texelFetch(t_places, max(ivec2(uv * u_texel.z), 0), 0);
+    vec2 texel = uv * place.z + place.xy;
+#if BICUBIC
+    vec3 colour = bicubic(t_display, texel, u_texel.xy);
+#else
+    vec3 colour = textureLod(t_display, texel * u_texel.xy, 0.0).rgb;
+#endif
     if (uv.x < 0.0) colour = gl_FrontFacing ? v_unlit_front : v_unlit_back;
 #if OVERLAY
     vec4 per_px = max(fwidth(v_uv), 1e-6);
-    if (uv.x >= 0.0) colour = overlaid(colour, uv, gl_FrontFacing ? per_px.xy : per_px.zw, place.z);
+    if (uv.x >= 0.0) colour = overlaid(colour, uv, gl_FrontFacing ? per_px.xy : per_px.zw, place.z, place.w);
 #endif
     out_colour = vec4(colour, 1.0);
 }

@@ -204,7 +204,7 @@ class AdaptiveShooting(UniformShooting):
         nodes = self.lightmap.nodes
         if self.tree.room >= slots:
             return
-        longest = self.gpu.limits.max_texture // (nodes.tile + 2)  # slots in a column of display texels
+        longest = self.gpu.limits.max_texture // (nodes.tile + 4)  # slots in a column of display texels and borders
         most = min(self.options.budget // nodes.tile**2, nodes.columns * longest)
         wanted = max(nodes.tiles * 3 // 2, nodes.tiles + slots)
         if min(wanted, most) > nodes.tiles:

@@ -1,4 +1,4 @@
-"""Inspect: the texel under the last click, and what the last shooter saw."""
+"""Inspect: the texel under the last click, what the last shooter saw, and the atlas."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from imgui_bundle import imgui
 
 from app.ui import theme, widgets
+from app.ui.panels import atlas
 from app.ui.state import State
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ def draw(session: Session, state: State) -> None:
     image = _hemicube(session, state)
     if image is not None and state.texture_id is not None:
         widgets.section("What the last shooter saw")
-        width = imgui.get_content_region_avail().x
+        width = widgets.steady_width()
         reference = imgui.ImTextureRef(state.texture_id(image))
         imgui.image(
             reference,
@@ -34,6 +35,7 @@ def draw(session: Session, state: State) -> None:
             imgui.ImVec2(1, 0),
         )
         widgets.tooltip(f"What the patch that shot last sees, one colour per surface: {session.shooting.projection}")
+    atlas.draw(session, state)
 
 
 def _hemicube(session: Session, state: State) -> Any:
