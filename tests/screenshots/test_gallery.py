@@ -99,8 +99,8 @@ REELS = (
             Picture("false-colour-lux", 2000, camera=1, display={"false_colour": "illuminance"}),
         ),
     ),
-    Reel("museum", 80_000, ShootingOptions(level=3), (Picture("museum", 300), Picture("museum-aisle", 300, camera=1))),
-    Reel("grotto", 60_000, ShootingOptions(level=3), (Picture("grotto", 300, exposure=0.0),)),
+    Reel("museum", 80_000, ShootingOptions(level=3), (Picture("museum", 700), Picture("museum-aisle", 700, camera=1))),
+    Reel("grotto", 60_000, ShootingOptions(level=3), (Picture("grotto", 500, exposure=0.0),)),
 )
 
 
