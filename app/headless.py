@@ -186,8 +186,13 @@ def report(session: Session) -> dict[str, Any]:
             for name in ("emitted", "absorbed", "escaped", "unshot", "imbalance")
         },
         "imbalance": stats.imbalance,
-        "warnings": [*session.scene.warnings, *session.charts.warnings],
+        "warnings": [*session.scene.warnings, *session.charts.warnings, *_notes(session)],
     }
+
+
+def _notes(session: Session) -> list[str]:
+    """What the solver has to say of the solution."""
+    return [] if session.solver.note is None else [session.solver.note]
 
 
 def _open(session: Session, scene: str, console: Console, note: str | None = None, *, needs_light: bool = True) -> None:
@@ -212,6 +217,8 @@ def _solve(session: Session, flags: argparse.Namespace, console: Console) -> Not
             session.solve(stop, say)
         except NotFiniteError as error:
             return error
+    for note in _notes(session):
+        console.warn(note)
     return None
 
 

@@ -1,4 +1,4 @@
-"""``glowtree info``: what a scene holds and what solving it would take, before any light is shot."""
+"""``glowtree info``: what a scene holds and what solving it would take, before any light is shot; quadtrees as they begin."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from app.atlas.charts import Charts
 from app.atlas.lightmap import STORAGE
 from app.atlas.node_set import TABLE_WIDTH
 from app.atlas.options import AtlasOptions
+from app.atlas.quadtree import quadtree_nodes
 from app.atlas.texels import uniform_leaves
 from app.console import Console
 from app.loading import read_and_unfold
 from app.options import from_flags
 from app.scene.model import Scene
+from app.solvers import ShootingOptions
 
 SURFACE_BYTES = 24  # per texel: position and area, normal and ids
 TEXTURE_BYTES = 8  # per texel, for albedo and for emission
@@ -26,8 +28,14 @@ def info(flags: argparse.Namespace) -> int:
     """Print triangles, charts, texels and memory."""
     console = Console(quiet=flags.json)
     with console.progress("reading") as tell:
-        scene, charts, _ = read_and_unfold(flags.scene, from_flags(AtlasOptions, flags), flags.light, tell)
-    tiles = len(uniform_leaves(charts))
+        atlas = from_flags(AtlasOptions, flags)
+        scene, charts, _ = read_and_unfold(flags.scene, atlas, flags.light, tell)
+        leaves, slots, depth = uniform_leaves(charts), 0, 0
+        if atlas.adaptive:
+            tell("planting quadtrees", 0.6)
+            nodes = quadtree_nodes(scene, charts)
+            leaves, slots, depth = nodes.leaves.only(nodes.used), nodes.tiles, nodes.depth
+    tiles = len(leaves)
     lower, upper = scene.bounds
     values: dict[str, Any] = {
         "scene": scene.name,
@@ -42,11 +50,12 @@ def info(flags: argparse.Namespace) -> int:
         "charts": charts.chart_count,
         "unfolded_by": charts.method,
         "texels_per_metre": charts.density,
-        "texels": len(uniform_leaves(charts, int(math.log2(charts.tile)))),
+        "texels": nodes.texel_count if atlas.adaptive else len(uniform_leaves(charts, int(math.log2(charts.tile)))),
         "tiles": tiles,
         "tile_edge": charts.tile,
         "atlas": list(charts.size),
-        "memory_mib": _memory(scene, charts, tiles, flags.storage) / 2**20,
+        "memory_mib": _memory(scene, charts, max(tiles, slots), depth, flags.storage) / 2**20,
+        **({"texels_if_uniform": nodes.uniform_texels(ShootingOptions().depth)} if atlas.adaptive else {}),
         "warnings": [*scene.warnings, *charts.warnings],
     }
     rows = [(name, value) for name, value in values.items() if name != "warnings"]
@@ -56,12 +65,13 @@ def info(flags: argparse.Namespace) -> int:
     return 0
 
 
-def _memory(scene: Scene, charts: Charts, tiles: int, storage: str) -> int:
-    """Bytes that the lightmap will take on the GPU: its tiles, side by side in a square, and their tables."""
-    columns = math.isqrt(max(tiles - 1, 0)) + 1
-    texels = columns * -(-tiles // columns) * charts.tile**2
+def _memory(scene: Scene, charts: Charts, slots: int, depth: int, storage: str) -> int:
+    """Bytes that the lightmap will take on the GPU to begin with: its slots, side by side in a square, and their tables; pages
+    count cells of the finest level."""
+    columns = math.isqrt(max(slots - 1, 0)) + 1
+    texels = columns * -(-slots // columns) * charts.tile**2
     light = 2 * 4 * int(STORAGE[storage][1:])  # H and r, four channels of f4, f2 or f1
-    pages = PAGE_BYTES * math.prod(charts.size) // charts.tile**2
+    pages = (PAGE_BYTES << 2 * depth) * math.prod(charts.size) // charts.tile**2
     facets = _whole_rows(FACET_ENTRY_BYTES, 2 * (charts.facet_count + 1))
     return texels * (SURFACE_BYTES + light + TEXTURE_BYTES * _textured(scene)) + pages + facets
 

@@ -220,6 +220,34 @@ def test_info_foretells_the_solve(folder: Path, scene: str, storage: str, capsys
     assert told["memory_mib"] == pytest.approx(came["memory_mib"], rel=0.01)
 
 
+def test_info_foretells_how_quadtrees_begin(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Before anything has split. Memory without the tables of leaves and materials: within 2 %."""
+    told = json_of(capsys, ["info", "cornell-box", "--json", "--adaptive"])
+    line = ["shot", "cornell-box", "-o", "a.png", "--size", "64x48", "--json", "--adaptive", "--shots", "1"]
+    came = json_of(capsys, line)
+    assert told["texels"] == came["texels"]
+    assert told["memory_mib"] == pytest.approx(came["memory_mib"], rel=0.02)
+    assert told["texels_if_uniform"] > 100 * told["texels"]
+
+
+def test_a_budget_that_is_reached_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = [
+        "shot",
+        "cornell-box",
+        "-o",
+        "a.png",
+        "--size",
+        "64x48",
+        "--adaptive",
+        "--budget",
+        "65536",
+        "--gradient",
+        "1e-3",
+    ]
+    assert run([*line, "--texels", "16000", "--shots", "200"]) == 0
+    assert "the budget of 65,536 texels is reached" in capsys.readouterr().err
+
+
 def test_info_as_text(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["info", "two-rooms"]) == 0
     rows = dict(line.strip().split("  ", 1) for line in capsys.readouterr().out.splitlines())
