@@ -21,12 +21,12 @@ class Pacer:
 
     def begin(self) -> None:
         """Forget how fast the last solve was."""
-        self._last = 0.0
+        self._last = self._start = 0.0
         self._batch = self._bands = 1
 
     def pause(self) -> None:
         """No lap runs until the next advance."""
-        self._last = 0.0
+        self._last = self._start = 0.0
 
     def advance(self, solver: Solver[Any], budget_ms: float, shots: int) -> int:
         """Make up to ``shots`` shots within ``budget_ms``; how many are whole."""
@@ -53,12 +53,13 @@ class Pacer:
 
     def _pieces(self, now: float) -> int:
         """Into how many bands a shot must be cut for frames to stay short: more after a long frame, fewer after a short one."""
-        if self._last:
-            frame = now - self._last
+        if self._start:
+            frame = now - self._start
             if frame > LONG_FRAME:
                 self._bands = min(2 * self._bands, MOST_BANDS)
             elif frame < 0.6 * LONG_FRAME:
                 self._bands = max(self._bands // 2, 1)
+        self._start = now
         return self._bands
 
     def _advance_some(self, solver: Solver[Any], start: float, budget_ms: float) -> int:

@@ -73,6 +73,7 @@ class Session:
         self.history = History()
         self.interrupted = False
         self.fresh_shots: int | None = None  # that it took from nothing until converged
+        self._from_nothing = True  # with the knobs as they are now
         self.edited_at: int | None = None  # shots made when the materials were last edited
         self.seconds, self._pace = 0.0, Pacer(gpu)
         self._books: EnergyBook
@@ -260,6 +261,7 @@ class Session:
         """Other knobs, from the next shot on; only another storage format begins again."""
         begins = options.storage != self.shooting.storage
         self.shooting, self.edited_at = options, None
+        self.fresh_shots, self._from_nothing = None, False
         if self._opened:
             self.solver.set_options(options)
             if begins:
@@ -274,7 +276,7 @@ class Session:
         if self.solver.shots == 0:
             self._begin_again()
         elif rested or self.edited_at is None:
-            self.edited_at = self.solver.shots
+            self.edited_at, self._from_nothing = self.solver.shots, False
         self.history.add(self.solver.shots, self.seconds, self.solver.report.residual, self._escaped_share)
         self._quiet_after = time.perf_counter() + EDIT_SECONDS
         self._books_due, self._settled = 0.0, False
@@ -286,7 +288,7 @@ class Session:
     def _begin(self, books: EnergyBook) -> None:
         """books: with nothing shot."""
         self.seconds, self._books = 0.0, books
-        self.fresh_shots = self.edited_at = None
+        self.fresh_shots, self.edited_at, self._from_nothing = None, None, True
         self._pace.begin()
         self.gpu.timers.reset()
         self._books_due, self._quiet_after = time.perf_counter() + BOOKS_SECONDS, 0.0
@@ -312,7 +314,7 @@ class Session:
         elif books and now >= self._books_due:
             self._busy = True
             self._make_books()
-        if self.edited_at is None and self.converged:
+        if self._from_nothing and self.converged:
             self.fresh_shots = self.solver.report.shots
         if report.shots != before and not self._settled:
             self.history.add(report.shots, self.seconds, report.residual, self._escaped_share)

@@ -41,7 +41,7 @@ class Regrowth:
         self._draw(self._lift, target, quads(aside, tile, corners(lightmap, lifted)), light)
         lightmap.write_tiles(np.unique(np.concatenate([old, new])))
 
-        lights = dict(zip(("t_lifted_irradiance", "t_lifted_shot", "t_lifted_area"), textures, strict=True))
+        lights = dict(zip(("t_lifted_irradiance", "t_lifted_kept", "t_lifted_area"), textures, strict=True))
         if split:
             pushed = quads(corners(lightmap, new), tile, aside[nth] + change.corner * half)
             self._draw(self._push, lightmap.light_target, pushed, lights | lightmap.textures("t_position_area"))
@@ -54,6 +54,7 @@ class Regrowth:
         mesh = Mesh(self._gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)
         materials = self._lightmap.textures("t_normal_ids", "t_materials", "t_albedo", "t_emission")
         uniforms = {"u_size": target.size, "u_unit": self._lightmap.unit}
+        uniforms |= {"u_signed": self._lightmap.storage != "fixed8"}
         how.draw(target, textures=textures | materials, uniforms=uniforms, mesh=mesh)
         self._gpu.release_all(mesh)
 

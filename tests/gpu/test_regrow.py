@@ -201,6 +201,33 @@ def places(trees: Forest) -> F64:
     return (corner + inside) * np.exp2(-leaves.level.astype(float))[:, None, None, None]
 
 
+def test_what_was_sent_to_a_texel_is_known_to_its_children(forest: Callable[..., Forest]) -> None:
+    """In the residual's a: with that of H, it tells whether a texel lies in shadow."""
+    trees = forest(table_room())
+    residual = trees.lightmap.texture("t_residual")
+    residual.write(np.full((*residual.size[::-1], 4), 0.7, np.float32).tobytes())
+    for change in (trees.grow, trees.shrink):
+        change()
+        raw = np.frombuffer(residual.read(), np.float32).reshape(*residual.size[::-1], 4)
+        sent = trees.nodes.tiles_from_image(raw)[..., 3]
+        np.testing.assert_allclose(sent[trees.nodes.surfaces.area > 0], 0.7, rtol=1e-5)
+
+
+@pytest.mark.parametrize("storage", STORAGE)
+def test_what_has_shot_all_makes_no_light(
+    forest: Callable[..., Forest], rng: np.random.Generator, storage: str
+) -> None:
+    """r = 0 everywhere: as much below zero as above it in children that receive more and less than their parent did, or, where
+    nothing can be negative, zero."""
+    trees = forest(table_room(), storage=storage)
+    noise = rng.uniform(0.2, 1.0, (*trees.nodes.surfaces.face.shape, 3))
+    trees.write({"t_irradiance": noise, "t_residual": 0 * noise})
+    trees.grow()
+    area = trees.nodes.surfaces.area[..., None]
+    unshot, light = ((tiles * area).sum() for tiles in reversed(trees.light.values()))
+    assert abs(unshot) <= RELATIVE[storage] * light
+
+
 def test_light_is_never_made_negative(forest: Callable[..., Forest], rng: np.random.Generator) -> None:
     """Single bright texels among black ones: what is interpolated must not go below zero."""
     trees = forest(table_room())

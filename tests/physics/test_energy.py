@@ -291,3 +291,20 @@ def audited(gpu: Gpu, scene: Scene, solver: str, *, audits: bool) -> float:
     lit.release()
     assert (finer > 0) == audits
     return share
+
+
+@EVERY_SOLVER
+def test_patches_that_were_split_are_not_lost_at_another_level(gpu: Gpu, solver: str) -> None:
+    """All residual is in some patch, once, whatever was split before patches grew: with residuals of one sign, Σ |Σ r A| over
+    patches is Σ r A over texels."""
+    lit = begin(gpu, coffered_room(), density=8, solver=solver, level=2)
+    lit.light_up()
+    whole = lit.book.unshot.sum()
+    tile, columns, edges = lit.lightmap.nodes.tile, lit.lightmap.columns, lit.solver.patch_edges()
+    lit.solver.buffers.shoot_finer(
+        [(x, y, int(edges[y // tile * columns + x // tile])) for x, y in lit.patches()[::7].tolist()]
+    )
+    assert lit.solver.unshot_share() * lit.book.emitted.sum() == pytest.approx(whole, rel=1e-4)
+    lit.solver.set_options(lit.solver.options.replace(level=4))
+    assert lit.solver.unshot_share() * lit.book.emitted.sum() == pytest.approx(whole, rel=1e-4)
+    lit.release()

@@ -20,7 +20,7 @@ def test_parts_add_up_to_the_shot(gpu: Gpu, bands: int) -> None:
         parts += 1
         while not cut.solver.step_part(bands):
             parts += 1
-    assert parts == SHOTS * (bands + 3)  # choose, see, the bands, the rest
+    assert parts == SHOTS * (bands + 4)  # audit, choose, see, the bands, the rest
     assert cut.solver.shots == whole.solver.shots == SHOTS
     # bands share no texel: each gets the same numbers, added in the same order
     np.testing.assert_array_equal(cut.H, whole.H)

@@ -1,6 +1,6 @@
-// Copies tiles aside, before others take their light over: H, what each texel has shot, R = E + ρH - r, and its area.
+// Copies tiles aside, before others take their light over: H, what each texel keeps, and its area.
 #include "common/atlas.glsl"
-#include "lightmap/radiosity.glsl"
+#include "lightmap/kept.glsl"
 
 uniform sampler2D t_position_area;
 uniform sampler2D t_irradiance;
@@ -10,12 +10,12 @@ flat in vec2 v_corner;
 flat in vec2 v_from;
 
 layout(location = 0) out vec4 out_irradiance;
-layout(location = 1) out vec4 out_shot;
+layout(location = 1) out vec4 out_kept;
 layout(location = 2) out float out_area;
 
 void main() {
     ivec2 px = ivec2(gl_FragCoord.xy - v_corner + v_from);
     out_irradiance = texelFetch(t_irradiance, px, 0);
-    out_shot = vec4(radiosity(px, out_irradiance.rgb) - texelFetch(t_residual, px, 0).rgb, 0.0);
+    out_kept = kept_from_residual(px, out_irradiance.rgb, texelFetch(t_residual, px, 0));
     out_area = texelFetch(t_position_area, px, 0).w;
 }

@@ -3,11 +3,11 @@
 // children keep that and r = E + ρH - R, or a patch that has shot would shoot again what its neighbours have not.
 #include "common/atlas.glsl"
 #include "common/tile.glsl"
-#include "lightmap/radiosity.glsl"
+#include "lightmap/kept.glsl"
 
 uniform sampler2D t_position_area;
 uniform sampler2D t_lifted_irradiance;
-uniform sampler2D t_lifted_shot;
+uniform sampler2D t_lifted_kept;
 uniform sampler2D t_lifted_area;
 
 flat in vec2 v_corner;
@@ -47,7 +47,8 @@ void main() {
     // by a factor, so that it stays positive
     vec4 scale = texelFetch(t_lifted_irradiance, px, 0) * area / max(mean_H, 1e-30);
     out_irradiance = interpolated(px, inside - 2 * block) * mix(vec4(0.0), scale, greaterThan(mean_H, vec4(0.0)));
-    vec3 B = radiosity(ivec2(gl_FragCoord.xy), out_irradiance.rgb);
-    bool covered = texelFetch(t_position_area, ivec2(gl_FragCoord.xy), 0).w > 0.0;
-    out_residual = covered ? vec4(B - texelFetch(t_lifted_shot, px, 0).rgb, 0.0) : vec4(0.0);
+    ivec2 own_px = ivec2(gl_FragCoord.xy);
+    bool covered = texelFetch(t_position_area, own_px, 0).w > 0.0;
+    vec4 kept = texelFetch(t_lifted_kept, px, 0);
+    out_residual = covered ? residual_from_kept(own_px, out_irradiance.rgb, kept) : vec4(0.0);
 }

@@ -12,6 +12,6 @@ uniform sampler2D t_finer;  // levels that patches in each block are finer than 
 // px: a texel of the node set; -1: its slot holds no leaf
 int patch_level(ivec2 px) {
     float texel_size = texelFetch(t_leaves, px / TILE, 0).z;
-    int level = LEVEL - int(round(log2(texel_size))) - int(texelFetch(t_finer, px / BLOCK, 0).r);
-    return texel_size > 0.0 ? clamp(level, 0, HIGHEST) : -1;
+    int level = min(LEVEL - int(round(log2(texel_size))), HIGHEST) - int(texelFetch(t_finer, px / BLOCK, 0).r);
+    return texel_size > 0.0 ? max(level, 0) : -1;
 }

@@ -1,4 +1,4 @@
-// The record of one shooter, made by choose.frag.glsl: a row of t_shooters. See app/solvers/shooting/uniform.py.
+// The record of one shooter, made by choose.frag.glsl: a row of t_shooters. See app/solvers/shooting/shot.py.
 struct Shooter {
     vec3 origin;     // where visibility is sampled from, solver frame
     float area;      // A_i, solver frame

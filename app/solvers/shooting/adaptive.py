@@ -124,7 +124,7 @@ class AdaptiveShooting(UniformShooting):
         return True
 
     def patch_edges(self) -> NDArray[np.int64]:
-        """Patches are about as large in the scene at every level, see patch_level.glsl."""
+        """(tiles,) texels along the edge of those patches that no audit has split: about as large in the scene at every level."""
         nodes = self.lightmap.nodes
         level = self._choice.level - ROOT_LEVEL + nodes.leaves.level
         return np.asarray(2 ** np.clip(level, 0, highest_level(nodes.tile)), np.int64)
@@ -244,8 +244,8 @@ class AdaptiveShooting(UniformShooting):
         self._end_redo()
         self._regrowth.apply(change)
         self._emitted = self.lightmap.emitted
-        self.buffers.shoot_alike(corners(self.lightmap, np.concatenate([change.parents, change.children])).tolist())
         gone, came = (change.parents, change.children) if change.split else (change.children, change.parents)
+        self.buffers.hand_down(*([(x, y) for x, y in corners(self.lightmap, at).tolist()] for at in (gone, came)))
         inherits = change.split or not self._fresh.isdisjoint(gone.tolist())
         self._fresh.difference_update(gone.tolist())
         if inherits and self.lightmap.storage != "fixed8":

@@ -12,7 +12,7 @@ a box, it is not. So strong batches are audited before they shoot, and shoot fro
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,10 +79,10 @@ class ShotPasses:
         for first, some in self.stages.groups(shots):
             part(first, some)
 
-    def _choose(self, shots: int) -> None:
-        """The strongest patches, those that fail their audit split. [Coombe03, 3.4]"""
+    def _choose(self, shots: int) -> Iterator[None]:
+        """The strongest patches, those that fail their audit split; in parts. [Coombe03, 3.4]"""
         self._pick(shots)
-        while self._audits and self._fails(shots):
+        while self._audits and (yield from self._fails(shots)):
             self._pick(shots)
 
     def _pick(self, shots: int) -> None:
@@ -101,23 +101,26 @@ class ShotPasses:
             strip=True,
         )
 
-    def _fails(self, shots: int) -> bool:
+    def _fails(self, shots: int) -> Generator[None, None, bool]:
         """Whether a chosen shooter would make or lose light and can shoot from finer patches: it will. Only strong batches are
-        worth asking: after the first weak one, none is. Waits for the GPU."""
+        worth asking: after the first weak one, none is. In parts; waits for the GPU."""
         rows = self._shooter_rows(shots)
         power = powers_of(rows)
-        if power.sum() * self._watt < AUDITED * self._emitted.sum():
+        if power.sum() * self._watt <= AUDITED * self._emitted.sum():
             self._audits = False
             return False
-        off = np.abs([sum(self._hand_out(shot)) - 1 if power[shot] > 0 else 0.0 for shot in range(shots)])
-        failed = rows[(off > SOUND) & (rows[:, 5, 3] > 1)]  # of more than one texel
-        if len(failed):
-            self.buffers.shoot_finer(failed[:, 3:6, 3].astype(int).tolist())
-        return len(failed) > 0
+        failed = []
+        for shot in np.flatnonzero((power > 0) & (rows[:, 5, 3] > 1)).tolist():  # of more than one texel
+            if abs(sum(self._hand_out(shot, power[shot])) - 1) > SOUND:
+                failed.append(shot)
+            yield
+        if failed:
+            self.buffers.shoot_finer(rows[failed, 3:6, 3].astype(int).tolist())
+        return bool(failed)
 
-    def _hand_out(self, shot: int) -> tuple[float, float, float]:
-        """What would become of a shot of the batch: its shares received, open and black, see Audit. Changes no light. Waits for
-        the GPU."""
+    def _hand_out(self, shot: int, power: float) -> tuple[float, float, float]:
+        """What would become of a shot of the batch and its power: its shares received, open and black, see Audit. Changes no
+        light. Waits for the GPU."""
         gpu, lightmap = self.gpu, self.lightmap
         scratch = gpu.texture(lightmap.size, 4, "f4")
         powers = gpu.texture((lightmap.columns, lightmap.rows), 1, "f4")
@@ -130,7 +133,6 @@ class ShotPasses:
         self.stages.audit.draw(power_target, textures=area | {"t_received": scratch})
         received = np.frombuffer(powers.read(), np.float32).astype(np.float64).sum()
         gpu.release_all(target, power_target, scratch, powers)
-        power = powers_of(self._shooter_rows(BATCH))[shot]
         left = np.frombuffer(self.stages.maps.open.read(), np.float32).reshape(BATCH, -1, 2)[shot].astype(np.float64)
         return float(received / power), *left.sum(0).tolist()
 

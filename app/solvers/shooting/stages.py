@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, Pass, Texture
 from app.projections import PROJECTIONS, Occluders
+from app.scene.model import F32
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions, highest_level
 
 BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
@@ -56,12 +57,27 @@ class ShotBuffers:
         self.finer_levels[tuple(np.array(sorted(blocks)).T)] += 1
         self.finer.write(self.finer_levels.tobytes())
 
-    def shoot_alike(self, corners: Iterable[tuple[int, int]]) -> None:
-        """Let the tiles that begin at these texels shoot from patches like all others."""
-        edge = self._tile >> BLOCK_LEVEL
-        for column, row in ((x >> BLOCK_LEVEL, y >> BLOCK_LEVEL) for x, y in corners):
-            self.finer_levels[row : row + edge, column : column + edge] = 0
+    def hand_down(self, old: Sequence[tuple[int, int]], new: Sequence[tuple[int, int]]) -> None:
+        """Let each of the new tiles that begin at these texels shoot as fine as the old one in its place; places may recur."""
+        marks: dict[tuple[int, int], float] = {}
+        for gone, came in zip(old, new, strict=True):
+            marks[came] = max(marks.get(came, 0.0), float(self._blocks(gone).max()))
+        for corner in (*old, *new):
+            self._blocks(corner)[:] = marks.get(corner, 0.0)
         self.finer.write(self.finer_levels.tobytes())
+
+    def level_out(self) -> None:
+        """Let each tile shoot all over as finely as it does anywhere: for patches of another level."""
+        edge = self._tile >> BLOCK_LEVEL
+        rows, columns = (side // edge for side in self.finer_levels.shape)
+        most = self.finer_levels.reshape(rows, edge, columns, edge).max((1, 3))
+        self.finer_levels[:] = most.repeat(edge, 0).repeat(edge, 1)
+        self.finer.write(self.finer_levels.tobytes())
+
+    def _blocks(self, corner: tuple[int, int]) -> F32:
+        """Those of the tile that begins at this texel."""
+        (column, row), edge = (c >> BLOCK_LEVEL for c in corner), self._tile >> BLOCK_LEVEL
+        return self.finer_levels[row : row + edge, column : column + edge]
 
     def all_alike(self) -> None:
         """Let all shoot from patches of one level."""

@@ -24,7 +24,7 @@ from app.gpu import Gpu, ReadBack, Texture
 from app.scene.model import F64, Material
 from app.solvers.base import EnergyBook, StepReport
 from app.solvers.shooting.options import ShootingOptions
-from app.solvers.shooting.shot import Audit, Shot, ShotPasses
+from app.solvers.shooting.shot import Audit, Shot, ShotPasses, powers_of
 from app.solvers.shooting.stages import BATCH, ChoiceStages, ShotBuffers, ShotStages
 
 # With ``coarsen``, a shot should carry this share of the emitted power: about 4096 shots for each time that all light is
@@ -81,7 +81,8 @@ class UniformShooting(ShotPasses):
         fresh = self._make_stages(options)
         self.stages.release()
         self.stages, self.options = fresh, options
-        self._choice = fresh.choices[0]
+        self._choice, self._audits = fresh.choices[0], True
+        self.buffers.level_out()
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light that is there stays, and the difference is shot, negative too [Chen90]. Begins
@@ -149,6 +150,8 @@ class UniformShooting(ShotPasses):
 
     def poll(self, *, wait: bool = False) -> StepReport:
         """The newest report that has arrived: the state before the step that sent it; with ``wait`` that of the last step."""
+        if wait:
+            self.finish()
         while self._reports and (wait or len(self._reports) > REPORT_LAG):
             choice, readback = self._reports.popleft()
             self._hear(choice, np.frombuffer(readback.take(), np.float32).reshape(-1, 4).astype(np.float64))
@@ -180,7 +183,8 @@ class UniformShooting(ShotPasses):
         runs[0] = 1.0, *corner, 0.0
         self.buffers.runs.write(runs.tobytes())
         self._describe(self._choice, 1)
-        return Audit(*self._hand_out(0), self._shot_from_rows(self._shooter_rows(1)[0]))
+        row = self._shooter_rows(1)
+        return Audit(*self._hand_out(0, float(powers_of(row)[0])), self._shot_from_rows(row[0]))
 
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
         """Each part of a step by itself, to be timed. They leave the light wrong: reset afterwards."""
@@ -207,7 +211,7 @@ class UniformShooting(ShotPasses):
 
     def _parts(self, shots: int, bands: int) -> Iterator[None]:
         """A step, from choosing to the report. [Coombe03, 3]"""
-        self._choose(shots)
+        yield from self._choose(shots)
         self._zero(shots)
         yield
         for first, some in self.stages.groups(shots):
@@ -238,6 +242,7 @@ class UniformShooting(ShotPasses):
         faint = report[0, 1] * self._watt < FAINT * emitted
         if faint and choice is self._choice and choice is not self.stages.choices[-1]:
             self._choice = self.stages.choices[self.stages.choices.index(choice) + 1]
+            self.buffers.level_out()
         self.report = StepReport(int(report[1, 3]), float(residual), report[1, :3] * self._watt)
         if report[2 + 5, 3] > 0:
             self.last_shot = self._shot_from_rows(report[2:])
