@@ -32,7 +32,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "LEVEL": tuple(range(MAX_LEVEL + 1)),
     "HIGHEST": (MAX_LEVEL,),
     "TILE": (TILES[-1],),
-    "TILE_PATCHES": (TILES[-1],),
+    "TILE_BLOCKS": (TILES[-1],),
     "BLOCK": (OPEN_BLOCK,),
     "VIEWS": tuple({p.views for p in PROJECTIONS.values()}),
     "MATERIAL_BITS": (16,),

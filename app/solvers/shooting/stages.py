@@ -109,7 +109,7 @@ class ChoiceStages:
         kind = lightmap.defines("TILE") | {"LEVEL": level - ROOT_LEVEL if adaptive else level}
         kind["HIGHEST"] = highest_level(tile)
         self.add_patches = Pass(gpu, "shooting/patches", defines=kind)
-        self.add_runs = Pass(gpu, "shooting/runs", defines={"TILE_PATCHES": tile >> BLOCK_LEVEL})
+        self.add_runs = Pass(gpu, "shooting/runs", defines={"TILE_BLOCKS": tile >> BLOCK_LEVEL})
         self.choose = Pass(gpu, "shooting/choose", defines=kind | lightmap.defines("MATERIAL_BITS"))
 
     def release(self) -> None:
