@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -71,7 +70,7 @@ def _place(atlas: tuple[int, int], ratio: float) -> Place:
 def _image(session: Session, state: State, place: Place) -> Any:
     """Made anew a few times a second, and whenever it is of another size or the textures behind it may be others."""
     pixels = max(round(place.size.x * state.ratio), 1), max(round(place.size.y * state.ratio), 1)
-    source = weakref.ref(session.lightmap), session.display, pixels, place.turned
+    source = session.lightmap, session.display, pixels, place.turned
     state.inset_age += imgui.get_io().delta_time
     known = state.inset
     if known is None or known[1] is None or known[0] != source or state.inset_age >= REFRESH_SECONDS:
