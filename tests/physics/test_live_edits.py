@@ -38,11 +38,11 @@ def difference(a: Solution, b: Solution) -> float:
 def test_an_edit_ends_where_a_fresh_solve_ends(gpu: Gpu, name: str) -> None:
     scene = table_room()
     materials = edited(scene, *EDITS[name])
-    room = solve(gpu, scene, density=8, coarsen=False, residual=RESIDUAL)
+    room = solve(gpu, scene, density=5, coarsen=False, residual=RESIDUAL, resolution=128)
     before, unedited = room.solver.report.shots, room.B
     room.solver.set_materials(materials)
     room.shoot()
-    fresh = solve(gpu, scene.with_materials(materials), density=8, coarsen=False, residual=RESIDUAL)
+    fresh = solve(gpu, scene.with_materials(materials), density=5, coarsen=False, residual=RESIDUAL, resolution=128)
     moved = np.abs(unedited - fresh.B).mean() / fresh.B.mean()
     assert moved > 0.05, "the edit must change something, or nothing is tested"
     # both leave 1e-3 of the emitted power unshot, the edited one once more than the fresh one
@@ -72,10 +72,10 @@ def test_one_of_two_lamps_switched_off(gpu: Gpu) -> None:
     still unshot."""
     scene = table_room()
     lit = scene.with_materials(edited(scene, RED, {"emission": (0.3, 0.3, 0.3)}))
-    room = solve(gpu, lit, density=8, coarsen=False, residual=RESIDUAL)
+    room = solve(gpu, lit, density=5, coarsen=False, residual=RESIDUAL, resolution=128)
     room.solver.set_materials(scene.materials)
     room.shoot()
-    fresh = solve(gpu, scene, density=8, coarsen=False, residual=RESIDUAL)
+    fresh = solve(gpu, scene, density=5, coarsen=False, residual=RESIDUAL, resolution=128)
     assert difference(room, fresh) < 5e-3
     assert room.B.min() > -1e-2 * room.B.mean()
     room.release()
