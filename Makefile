@@ -10,7 +10,7 @@ run: $(VENV)/.run
 
 test: $(VENV)/.dev lint
 	$(BIN)/python -m pytest
-	$(BIN)/python -m pytest tests/gpu tests/physics --gl41
+	$(BIN)/python -m pytest tests/gpu tests/physics --gl41 -m "not long"
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

@@ -30,6 +30,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if config.getoption("--gl41"):
         os.environ |= GL41
     config.addinivalue_line("markers", "display: needs an X server or Xvfb")
+    config.addinivalue_line("markers", "long: whole solves, left out of the second run in an OpenGL 4.1 context")
 
 
 SESSION_GPU = pytest.StashKey["Gpu"]()

@@ -13,6 +13,8 @@ from app.gpu import Gpu
 from app.scene.load import load_scene
 from app.scene.model import Scene
 
+pytestmark = pytest.mark.long
+
 DENSITY = 4.0  # of the roots [1/m]
 ROUGH = 0.1  # a threshold that splits about half of a room with shadows
 FEW_STEPS = 1500

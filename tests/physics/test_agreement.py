@@ -13,6 +13,8 @@ from app.reference.form_factors import point_to_polygon
 from app.scene.model import F64, Material, Scene
 from app.solvers import SOLVERS
 
+pytestmark = pytest.mark.long
+
 
 def object_means(dense: DenseSolution, scene: Scene) -> F64:
     """(objects, 3) area-weighted mean irradiance [W/m²]."""
