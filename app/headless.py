@@ -29,7 +29,7 @@ from app.render.options import DisplayOptions
 from app.scene.load import NO_LIGHT
 from app.session import Session, Stats, Stop
 from app.solvers import ShootingOptions
-from app.solving import NotFiniteError
+from app.solving import NotFiniteError, share_done
 
 
 def shot(flags: argparse.Namespace, note: str | None = None) -> int:
@@ -210,7 +210,7 @@ def _solve(session: Session, flags: argparse.Namespace, console: Console) -> Not
     stop = Stop(shots=flags.shots, seconds=flags.time)
 
     def say(stats: Stats) -> None:
-        tell(f"{stats.shots} shots, {stats.residual:.3%} unshot", session.progress(stop))
+        tell(f"{stats.shots} shots, {stats.residual:.3%} unshot", share_done(session, stop))
 
     with console.progress("shooting") as tell:
         try:

@@ -66,7 +66,8 @@ def load(
     start = time.perf_counter()
     tell("cutting into texels", 0.6)
     nodes = quadtree_nodes(scene, charts) if atlas.adaptive else NodeSet(scene, charts)
-    exposure, arrays, _ = first_exposure(nodes), nodes.arrays, nodes.emission_weights
+    exposure, arrays = first_exposure(nodes), nodes.arrays
+    _ = nodes.emission_weights  # cached here: the window, which reads them next, does not wait
     tell("done", 1.0)
     return Loaded(nodes, arrays, atlas, exposure, seconds | {"texels": time.perf_counter() - start})
 

@@ -18,11 +18,13 @@ def prepare(
     arrays: Mapping[str, Array],
     options: ShootingOptions,
     renderer: FrameRenderer,
+    interpolation: str,
     *,
     solver_name: str = DEFAULT_SOLVER,
 ) -> Generator[None, None, tuple[Lightmap, Solver[ShootingOptions]]]:
     """Upload a node set's ``arrays``, and draw once with each program, since drivers compile it then; yields after each part. The
-    light is as before the first shot. Raises UserError; then, and when given up between two parts, nothing stays on the GPU."""
+    light is as before the first shot. interpolation: that pictures will be drawn with. Raises UserError; then, and when given
+    up between two parts, nothing stays on the GPU."""
     with contextlib.ExitStack() as undo:
         textures: dict[str, Texture] = {}
         uploads = undo.enter_context(contextlib.ExitStack())
@@ -44,7 +46,7 @@ def prepare(
             yield
         solver.reset()
         yield
-        renderer.prepare(lightmap)
+        renderer.prepare(lightmap, interpolation)
         undo.callback(renderer.give_up)
         gpu.ctx.finish()
         yield

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +14,9 @@ from app.scene.model import RGB
 
 @dataclass(frozen=True)
 class Picked:
-    """A picked point. Indices are the scene's and its charts'; texel and patch (column, row) in the node set; position [m], area
-    [m²]; B, E, H, r are RGB [W/m²]. A side without texels has chart and facet -1 and area 0: it only emits."""
+    """A picked point. Indices are the scene's and its charts'; texel (column, row) in the node set; patch (column, row) that it
+    shoots from, counted in patches of its size, ``patch_edge`` texels along each edge; position [m], area [m²]; B, E, H, r are
+    RGB [W/m²]. A side without texels has chart and facet -1 and area 0: it only emits."""
 
     triangle: int
     object: str
@@ -24,6 +26,7 @@ class Picked:
     facet: int
     texel: tuple[int, int]
     patch: tuple[int, int]
+    patch_edge: int
     position: RGB
     normal: RGB
     area: float
@@ -34,18 +37,19 @@ class Picked:
     albedo: RGB
 
 
-def picked_from_hit(lightmap: Lightmap, hit: PickHit, level: int) -> Picked:
-    """Look up the texel that was hit; ``level`` is that of the shooting patches. Waits for the GPU."""
+def picked_from_hit(lightmap: Lightmap, hit: PickHit, patch_edge: Callable[[tuple[int, int]], int]) -> Picked:
+    """Look up the texel that was hit; ``patch_edge`` tells how many texels along its edge the patch of a texel has. Waits for the
+    GPU."""
     scene, charts = lightmap.scene, lightmap.charts
     material = scene.materials[hit.material]
     normal = scene.normals_areas[0][hit.triangle] * (-1.0 if hit.back else 1.0)
     albedo, E = np.array(material.albedo), np.pi * np.array(material.emission)
     if hit.back and not material.double_sided:
         albedo, E = np.zeros(3), np.zeros(3)
-    H, r, area, texel, chart = np.zeros(3), np.zeros(3), 0.0, (0, 0), -1
+    H, r, area, texel, chart, edge = np.zeros(3), np.zeros(3), 0.0, (0, 0), -1, 1
     if hit.tile is not None and hit.tile_texel is not None and hit.texel is not None:
         texel, (column, row) = hit.texel, hit.tile_texel
-        at = (hit.tile, row, column)
+        at, edge = (hit.tile, row, column), patch_edge(texel)
         H, r = lightmap.light_at(texel)
         area = float(lightmap.nodes.surfaces.area[at])
         face = int(lightmap.nodes.surfaces.face[at])
@@ -62,7 +66,8 @@ def picked_from_hit(lightmap: Lightmap, hit: PickHit, level: int) -> Picked:
         chart=chart,
         facet=-1 if hit.facet is None else hit.facet,
         texel=texel,
-        patch=(texel[0] >> level, texel[1] >> level),
+        patch=(texel[0] // edge, texel[1] // edge),
+        patch_edge=edge,
         position=hit.position,
         normal=_rgb(normal),
         area=area,

@@ -16,6 +16,7 @@ import numpy as np
 from app.atlas.charts import Charts
 from app.atlas.lightmap import Lightmap
 from app.atlas.options import AtlasOptions
+from app.bookkeeping import Books, Effort
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Texture
 from app.history import History
@@ -32,14 +33,9 @@ from app.render.items import ItemImage
 from app.render.options import DisplayOptions
 from app.render.surfaces import Rect
 from app.scene.model import RGB, Camera, Material, Scene
-from app.solvers import DEFAULT_SOLVER, EnergyBook, ShootingOptions, Solver, highest_level
-from app.solving import not_finite, share_done, solve
+from app.solvers import DEFAULT_SOLVER, EnergyBook, ShootingOptions, Solver
+from app.solving import not_finite, solve
 from app.stats import Stats, Stop, stats_of
-
-BOOKS_SECONDS = 0.5  # between two looks at the energy book while shooting, at least: it reads every texel
-BOOKS_SHARE = 0.05  # of the time may go into it
-SLOW_BOOKS, RARE_SECONDS = 0.03, 3.0  # a look that takes longer than this is felt, and waits at least so long
-EDIT_SECONDS = 0.2  # without another edit, until the book is made: a slider that is dragged edits every frame
 
 
 class Session:
@@ -72,12 +68,9 @@ class Session:
         self.load_seconds: dict[str, float] = {}
         self.history = History()
         self.interrupted = False
-        self.fresh_shots: int | None = None  # that it took from nothing until converged
-        self._from_nothing = True  # with the knobs as they are now
-        self.edited_at: int | None = None  # shots made when the materials were last edited
+        self.effort = Effort()
         self.seconds, self._pace = 0.0, Pacer(gpu)
-        self._books: EnergyBook
-        self._books_due = self._quiet_after = 0.0
+        self._books = Books()
         self._settled, self._busy, self._opened = True, False, False
         self._swapping: Generator[None, None, None] | None = None
         self.lightmap: Lightmap
@@ -138,6 +131,7 @@ class Session:
             loaded.arrays,
             self.shooting,
             self.renderer,
+            self.display.interpolation,
             solver_name="adaptive" if loaded.atlas.adaptive else DEFAULT_SOLVER,
         )
         if solver.options != self.shooting:  # changed between two parts
@@ -156,7 +150,8 @@ class Session:
             self.display = self.display.replace(exposure=loaded.exposure)
         self.message = None if self.scene.emits else f"{self.scene.name} has no light: try --light for a ceiling light"
         self._opened = True
-        self._begin(self.solver.books())
+        self._books.begin(self.solver.books())
+        self._begin()
 
     def _stop_loading(self) -> None:
         if self.loading is not None:
@@ -222,11 +217,7 @@ class Session:
         self.seconds += self._pace.lap()
         return made
 
-    def shoot_once(self) -> None:
-        """One shot, also when paused."""
-        self.shoot(1)
-
-    def shoot(self, shots: int) -> int:
+    def shoot(self, shots: int = 1) -> int:
         """Up to ``shots`` shots, of one batch at most, also when paused or converged; how many."""
         self._settled = False
         return self.solver.step(shots)
@@ -235,21 +226,17 @@ class Session:
         """Shoot until ``stop``, or until converged, see ``solving.solve``. Raises NotFiniteError."""
         solve(self, stop, progress)
 
-    def progress(self, stop: Stop) -> float:
-        """Share done of a solve."""
-        return share_done(self, stop)
-
     def settle(self) -> None:
         """Wait for the GPU and bring report, book and history up to the last shot. Raises NotFiniteError, once."""
         known = np.isfinite(self.solver.report.residual)
         self.solver.poll(wait=True)
-        self._make_books()
+        self._books.make(self.solver)
         self._settled = True
-        if self._books.emitted.sum() > 0:
+        if self.books.emitted.sum() > 0:
             unshot = self.solver.unshot_share()
             self.solver.report = replace(self.solver.report, residual=unshot)
             self.history.add(self.solver.shots, self.seconds, unshot, self._escaped_share)
-            if known and not np.isfinite(unshot + float(self._books.absorbed.sum())):
+            if known and not np.isfinite(unshot + float(self.books.absorbed.sum())):
                 raise not_finite(self)
 
     def restart(self) -> None:
@@ -260,12 +247,13 @@ class Session:
     def set_shooting(self, options: ShootingOptions) -> None:
         """Other knobs, from the next shot on; only another storage format begins again."""
         begins = options.storage != self.shooting.storage
-        self.shooting, self.edited_at = options, None
-        self.fresh_shots, self._from_nothing = None, False
+        self.shooting = options
+        self.effort.turned()
         if self._opened:
             self.solver.set_options(options)
             if begins:
-                self._begin(self.solver.books())
+                self._books.begin(self.solver.books())
+                self._begin()
 
     def set_material(self, index: int, material: Material) -> None:
         """Another albedo or emission: charts, texels and light stay, and the difference is shot."""
@@ -275,24 +263,21 @@ class Session:
         self.solver.set_materials(tuple(materials))
         if self.solver.shots == 0:
             self._begin_again()
-        elif rested or self.edited_at is None:
-            self.edited_at, self._from_nothing = self.solver.shots, False
+        else:
+            self.effort.edited(self.solver.shots, rested=rested)
         self.history.add(self.solver.shots, self.seconds, self.solver.report.residual, self._escaped_share)
-        self._quiet_after = time.perf_counter() + EDIT_SECONDS
-        self._books_due, self._settled = 0.0, False
+        self._books.edited()
+        self._settled = False
 
     def _begin_again(self) -> None:
-        nothing = np.zeros(3)
-        self._begin(replace(self._books, absorbed=nothing, escaped=nothing, unshot=self._books.emitted))
+        self._books.begin_again()
+        self._begin()
 
-    def _begin(self, books: EnergyBook) -> None:
-        """books: with nothing shot."""
-        self.seconds, self._books = 0.0, books
-        self.fresh_shots, self.edited_at, self._from_nothing = None, None, True
+    def _begin(self) -> None:
+        self.seconds, self._settled = 0.0, True
+        self.effort.begin()
         self._pace.begin()
         self.gpu.timers.reset()
-        self._books_due, self._quiet_after = time.perf_counter() + BOOKS_SECONDS, 0.0
-        self._settled = True
         self.history = History()
         self.history.add(0, 0.0, self.solver.report.residual, 0.0)
 
@@ -304,38 +289,29 @@ class Session:
         if self.running and not np.isfinite(report.residual):
             self.running = False
             raise not_finite(self)
-        now = time.perf_counter()
-        books = books and now >= self._quiet_after
         if not self.shooting_goes_on:
             self._pace.pause()
-            if books and not self._settled:
+            if books and self._books.quiet and not self._settled:
                 self._busy = True
                 self.settle()
-        elif books and now >= self._books_due:
+        elif books and self._books.due:
             self._busy = True
-            self._make_books()
-        if self._from_nothing and self.converged:
-            self.fresh_shots = self.solver.report.shots
+            self._books.make(self.solver)
+        if self.converged:
+            self.effort.converged(self.solver.report.shots)
         if report.shots != before and not self._settled:
             self.history.add(report.shots, self.seconds, report.residual, self._escaped_share)
 
     @property
     def _escaped_share(self) -> float:
-        return float(self.solver.report.escaped.sum()) / max(float(self._books.emitted.sum()), 1e-300)
-
-    def _make_books(self) -> None:
-        start = time.perf_counter()
-        self._books = self.solver.books()
-        now = time.perf_counter()
-        cost = now - start
-        self._books_due = now + max(BOOKS_SECONDS if cost < SLOW_BOOKS else RARE_SECONDS, cost / BOOKS_SHARE)
+        return float(self.solver.report.escaped.sum()) / max(float(self.books.emitted.sum()), 1e-300)
 
     # -- what is known -------------------------------------------------------------------------------------------------
 
     @property
     def books(self) -> EnergyBook:
         """The last energy book that was made."""
-        return self._books
+        return self._books.book
 
     @property
     def stats(self) -> Stats:
@@ -355,8 +331,7 @@ class Session:
     def pick(self, x_px: int, y_px: int) -> Picked | None:
         """What surface is at that pixel of the last frame, and the light on it."""
         hit = self.renderer.pick(x_px, y_px)
-        level = min(self.shooting.level, highest_level(self.charts.tile))
-        return None if hit is None else picked_from_hit(self.lightmap, hit, level)
+        return None if hit is None else picked_from_hit(self.lightmap, hit, self.solver.patch_edge)
 
     def look_through(self, camera: Camera) -> None:
         """Stand where a camera of the scene stands; orbit around the scene's middle from there."""
@@ -388,7 +363,7 @@ class Session:
 
     def expose(self) -> None:
         """Set the exposure from the light of the scene."""
-        mean_residual = self._books.unshot / max(self._books.area, 1e-300)
+        mean_residual = self.books.unshot / max(self.books.area, 1e-300)
         self.display = self.display.replace(exposure=exposure_of(self.lightmap, mean_residual))
 
     @property
@@ -396,7 +371,7 @@ class Session:
         """Ambient radiosity of the light not yet shot [W/m²], for display only."""
         if not self.display.ambient:
             return None
-        red, green, blue = self._books.ambient
+        red, green, blue = self.books.ambient
         return float(red), float(green), float(blue)
 
     @property
@@ -410,6 +385,10 @@ class Session:
     def atlas_image(self, size: tuple[int, int], *, turned: bool = False) -> Texture | None:
         """The virtual atlas with what was drawn last, v up or to the right; None before the first picture."""
         return self.renderer.atlas(self.lightmap, size, turned=turned)
+
+    def vanished(self) -> int:
+        """Triangles that lie between the samples of the last shooter's map."""
+        return self.solver.vanished()
 
     def hemicube_image(self) -> Texture:
         """The last shooter's visibility map, in one colour per facet."""

@@ -153,7 +153,8 @@ class Solution:
     def patches(self) -> NDArray[np.int64]:
         """(p, 2) column and row of the lower texel of every patch of the shooting level that covers a surface."""
         nodes, found = self.lightmap.nodes, []
-        for slot, edge in enumerate(self.solver.patch_edges().tolist()):
+        for slot in range(nodes.tiles):
+            edge = self.solver.patch_edge(nodes.corner(slot))
             inside = (
                 nodes.surfaces.area[slot].reshape(nodes.tile // edge, edge, nodes.tile // edge, edge).sum((1, 3)) > 0
             )

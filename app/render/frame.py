@@ -34,10 +34,10 @@ class FrameRenderer:
         self._picture: _Picture | None = None
         self._last: tuple[Lightmap, CameraView, tuple[int, int]] | None = None
 
-    def prepare(self, lightmap: Lightmap) -> None:
+    def prepare(self, lightmap: Lightmap, interpolation: str) -> None:
         """Make what it takes to draw a lightmap, ahead of its first frame; ``give_up`` where that will not come."""
         self.give_up()
-        self._prepared = Surfaces(self._gpu, lightmap)
+        self._prepared = Surfaces(self._gpu, lightmap, interpolation)
 
     def give_up(self) -> None:
         """Release what was prepared and not drawn yet."""
@@ -72,7 +72,7 @@ class FrameRenderer:
         else:
             layer, scale = LAYER[display.false_colour], scale or false_colour_scale(display, lightmap)
         clip_from_local = view.clip_from_local(size[0] / size[1], lightmap.frame)
-        surfaces = self._surfaces_of(lightmap)
+        surfaces = self._surfaces_of(lightmap, display.interpolation)
         picture = self._picture_for(target, size, samples)
 
         picture.target.clear(depth=1.0)
@@ -118,12 +118,12 @@ class FrameRenderer:
             if resource is not None:
                 resource.release()
 
-    def _surfaces_of(self, lightmap: Lightmap) -> Surfaces:
+    def _surfaces_of(self, lightmap: Lightmap, interpolation: str) -> Surfaces:
         if self._surfaces is None or self._surfaces.lightmap is not lightmap:
             if self._surfaces:
                 self._surfaces.release()
             if self._prepared is None or self._prepared.lightmap is not lightmap:
-                self.prepare(lightmap)
+                self.prepare(lightmap, interpolation)
             self._surfaces, self._prepared = self._prepared, None
             assert self._surfaces is not None
         return self._surfaces

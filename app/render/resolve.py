@@ -31,7 +31,7 @@ T = TypeVar("T")
 class DisplayTexels:
     """The display texels of one lightmap; border: see BORDER. Whoever makes it releases it."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, ages: LeafAges, border: int = 1) -> None:
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, ages: LeafAges, border: int) -> None:
         self._gpu, self._lightmap, self._ages, self._border = gpu, lightmap, ages, border
         self.size = display_size(lightmap, border)
         self._colour = gpu.texture(self.size, 4, "f1")

@@ -19,10 +19,10 @@ DARK: RGB = (0.0, 0.0, 0.0)
 class Surfaces:
     """Draws one lightmap. Whoever makes it releases it."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, interpolation: str) -> None:
         self._gpu, self.lightmap = gpu, lightmap
         self._ages = LeafAges(lightmap.nodes)
-        self._texels = DisplayTexels(gpu, lightmap, self._ages)
+        self._texels = DisplayTexels(gpu, lightmap, self._ages, BORDER[interpolation])
         self._passes = {(overlay, False): self._pass(overlay, bicubic=False) for overlay in (False, True)}
         self._shown: dict[str, Texture] = {}
         self._live = False

@@ -6,7 +6,7 @@ from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu
 from app.solvers.base import EnergyBook, Solver, StepReport
 from app.solvers.shooting.adaptive import AdaptiveShooting
-from app.solvers.shooting.options import TREE, ShootingOptions, highest_level
+from app.solvers.shooting.options import TREE, ShootingOptions
 from app.solvers.shooting.uniform import UniformShooting
 
 SOLVERS: dict[str, Callable[[Gpu, Lightmap, ShootingOptions], Solver[ShootingOptions]]] = {
@@ -24,5 +24,4 @@ __all__ = [
     "Solver",
     "StepReport",
     "UniformShooting",
-    "highest_level",
 ]

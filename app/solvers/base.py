@@ -115,8 +115,14 @@ class Solver(Protocol[OptionsT]):
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
         """Each part of a step of so many shots by itself, to be timed and warmed up. They spoil the light: reset afterwards."""
 
+    def patch_edge(self, texel: tuple[int, int]) -> int:
+        """Texels along the edge of the patch that a texel (column, row) of the node set would shoot from now."""
+
     def inspect(self) -> dict[str, Texture]:
         """Textures that explain the last step, by name; ``items`` and ``depth`` are what its first shooter saw."""
+
+    def vanished(self) -> int:
+        """Triangles that this shooter sees only because each is drawn as one sample at least. Waits for the GPU."""
 
     def release(self) -> None:
         """Give back what is on the GPU, but for the lightmap."""

@@ -54,7 +54,7 @@ def _pause(session: Session, state: State) -> None:
 
 def _one_shot(session: Session, state: State) -> None:
     session.running = False
-    state.act(session.shoot_once)
+    state.act(session.shoot)
 
 
 def _restart(session: Session, state: State) -> None:

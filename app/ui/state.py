@@ -89,7 +89,7 @@ class State:
     picked_age: float = 0.0
     picked_px: tuple[int, int] = (0, 0)
     picked_view: CameraView | None = None
-    hemicube: tuple[object, Any] | None = None
+    hemicube: tuple[object, Any, int] | None = None
     hemicube_age: float = 0.0
     inset: tuple[object, Any] | None = None
     inset_age: float = 0.0

@@ -90,6 +90,9 @@ class FakeSession:
     def hemicube_image(self):
         return self.image
 
+    def vanished(self) -> int:
+        return 3
+
     def atlas_image(self, size, *, turned=False):
         self.insets.append((size, turned))
         return self.image
@@ -98,8 +101,8 @@ class FakeSession:
         self.calls.append(("pick", x_px, y_px))
         return self.picked
 
-    def shoot_once(self) -> None:
-        self.calls.append(("shoot_once",))
+    def shoot(self) -> None:
+        self.calls.append(("shoot",))
 
     def expose(self) -> None:
         self.calls.append(("expose",))

@@ -21,6 +21,7 @@ from app.errors import SceneError, UserError
 from app.gpu import Gpu
 from app.session import Session, Stop
 from app.solvers import ShootingOptions
+from app.solving import share_done
 
 ATLAS = AtlasOptions(texels=900)
 SHOOTING = ShootingOptions(resolution=64, residual=0.05)
@@ -65,7 +66,7 @@ def test_paused_and_converged_sessions_do_not_shoot(session: Session) -> None:
     session.running = False
     assert session.advance(budget_ms=PLENTY, shots=5) == 0
     assert irradiance(session) == 0
-    session.shoot_once()
+    session.shoot()
     assert irradiance(session) > 0
     session.running = True
     session.solve(Stop())
@@ -83,7 +84,7 @@ def test_solve_stops_after_shots(session: Session) -> None:
     assert session.solver.shots == 12 and not session.converged
     assert heard == sorted(heard)
     assert session.stats.shots == 12
-    assert session.progress(Stop(shots=24)) >= 0.5
+    assert share_done(session, Stop(shots=24)) >= 0.5
 
 
 def test_solve_stops_after_seconds(session: Session) -> None:
@@ -104,7 +105,7 @@ def test_solve_runs_to_convergence_and_knows_it(session: Session) -> None:
         stats.emitted, rel=5e-3
     )  # form factors: 0.5 %
     assert session.history.column("shots")[-1] == stats.shots
-    assert session.progress(Stop()) == 1
+    assert share_done(session, Stop()) == 1
 
 
 # -- what begins again -------------------------------------------------------------------------------------------------
@@ -240,7 +241,7 @@ def test_what_is_stopped_while_it_is_uploaded_keeps_the_scene(
     assert session.loading is None and session.name == "Furnace" and irradiance(session) == light
     assert session.message == "cornell-box: stopped; Furnace stays as it is"
     assert not forgotten()
-    session.shoot_once()
+    session.shoot()
     assert irradiance(session) > light
 
 

@@ -104,7 +104,7 @@ def test_numbers_settle_when_shooting_stops(session: Session, stop: str) -> None
 def test_one_shot_settles_too(session: Session) -> None:
     session.running = False
     opened(session, "cornell-box")
-    session.shoot_once()
+    session.shoot()
     frames(session, lambda: session.at_rest)
     assert session.stats.shots == 1 and session.stats.unshot < session.stats.emitted
 

@@ -31,7 +31,14 @@ SIZE = (1280, 720)
 VIEW = (640, 260)  # in the middle of the 3-D view
 PICKED = SimpleNamespace(
     **{"triangle": 12, "object": "box", "material": 0, "back": False, "chart": 3, "facet": 4, "texel": (112, 93)},
-    **{"position": (0.0, 0.0, -2.0), "normal": (0.0, 1.0, 0.0), "area": 6e-4, "patch": (28, 23), "B": (12.0, 8.0, 2.0)},
+    **{
+        "position": (0.0, 0.0, -2.0),
+        "normal": (0.0, 1.0, 0.0),
+        "area": 6e-4,
+        "patch": (28, 23),
+        "patch_edge": 4,
+        "B": (12.0, 8.0, 2.0),
+    },
     **{"E": (0.0, 0.0, 0.0), "H": (16.0, 11.0, 3.0), "r": (0.02, 0.01, 0.004), "albedo": (0.7, 0.7, 0.7)},
 )
 
@@ -132,7 +139,7 @@ EFFECTS: dict[str, Callable[[Desk], bool]] = {
     "F5": lambda d: any("reloaded" in t.text for t in d.ui.state.toasts),
     "F12": lambda d: Request.SCREENSHOT in d.requests,
     "Space": lambda d: not d.session.running,
-    ".": lambda d: ("shoot_once",) in d.session.calls and not d.session.running,
+    ".": lambda d: ("shoot",) in d.session.calls and not d.session.running,
     "R": lambda d: ("restart",) in d.session.calls,
     "F": lambda d: d.ui.state.flight is not None,
     "Ctrl+O": lambda d: imgui.is_popup_open("", imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level),

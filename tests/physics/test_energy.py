@@ -286,7 +286,8 @@ def audited(gpu: Gpu, scene: Scene, solver: str, *, audits: bool) -> float:
     lit = begin(gpu, scene, density=8, residual=0.05, level=3, solver=solver)
     lit.solver._audits = audits
     lit.settle()
-    finer = lit.solver.buffers.finer_levels.max()
+    finer, shot = lit.solver.buffers.finer_levels.max(), lit.solver.last_shot
+    assert shot.size == lit.solver.patch_edge(shot.corner)  # host and shaders agree on what shoots
     share = abs(shares(lit)["imbalance"])
     lit.release()
     assert (finer > 0) == audits
@@ -300,10 +301,7 @@ def test_patches_that_were_split_are_not_lost_at_another_level(gpu: Gpu, solver:
     lit = begin(gpu, coffered_room(), density=8, solver=solver, level=2)
     lit.light_up()
     whole = lit.book.unshot.sum()
-    tile, columns, edges = lit.lightmap.nodes.tile, lit.lightmap.columns, lit.solver.patch_edges()
-    lit.solver.buffers.shoot_finer(
-        [(x, y, int(edges[y // tile * columns + x // tile])) for x, y in lit.patches()[::7].tolist()]
-    )
+    lit.solver.buffers.shoot_finer([(x, y, lit.solver.patch_edge((x, y))) for x, y in lit.patches()[::7].tolist()])
     assert lit.solver.unshot_share() * lit.book.emitted.sum() == pytest.approx(whole, rel=1e-4)
     lit.solver.set_options(lit.solver.options.replace(level=4))
     assert lit.solver.unshot_share() * lit.book.emitted.sum() == pytest.approx(whole, rel=1e-4)

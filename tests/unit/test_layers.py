@@ -16,7 +16,7 @@ LAYERS = [
     {"atlas"},
     {"projections"},
     {"solvers", "reference", "render", "metrics", "bake"},
-    {"history", "picking", "opening", "pacing", "stats"},
+    {"bookkeeping", "history", "picking", "opening", "pacing", "stats"},
     {"loading", "solving"},
     {"session"},
     {"ui"},

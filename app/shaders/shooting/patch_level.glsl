@@ -4,8 +4,7 @@
 #define HIGHEST 4  // no patch is larger than a tile
 
 #include "common/leaves.glsl"
-
-const int BLOCK = 4;  // texels along the edge of a block
+#include "shooting/block.glsl"
 
 uniform sampler2D t_finer;  // levels that patches in each block are finer than elsewhere
 

@@ -1,7 +1,7 @@
 // The strongest patch of each run of slots, and the run's power: (power, corner x, y [texels], Σ power). One texel per run.
 #define TILE_BLOCKS 4
 
-const int BLOCK = 4;  // texels along the edge of a block, see patches.frag.glsl
+#include "shooting/block.glsl"
 
 uniform sampler2D t_patches;
 uniform int u_runs;

@@ -26,7 +26,7 @@ from app.atlas.regrow import QUAD_FORMAT, Regrowth, corners, quads
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, ReadBack, Texture
 from app.scene.model import F64, Material
 from app.solvers.shooting.log import ShotLog
-from app.solvers.shooting.options import TREE, ShootingOptions, highest_level
+from app.solvers.shooting.options import TREE, ShootingOptions
 from app.solvers.shooting.stages import BATCH, ROOT_LEVEL
 from app.solvers.shooting.uniform import UniformShooting
 
@@ -123,11 +123,9 @@ class AdaptiveShooting(UniformShooting):
         self.step(1)
         return True
 
-    def patch_edges(self) -> NDArray[np.int64]:
-        """(tiles,) texels along the edge of those patches that no audit has split: about as large in the scene at every level."""
-        nodes = self.lightmap.nodes
-        level = self._choice.level - ROOT_LEVEL + nodes.leaves.level
-        return np.asarray(2 ** np.clip(level, 0, highest_level(nodes.tile)), np.int64)
+    def _patch_level(self, slot: int) -> int:
+        """Patches are about as large in the scene in leaves of every level."""
+        return self._choice.level - ROOT_LEVEL + int(self.lightmap.nodes.leaves.level[slot])
 
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
         return super().passes(shots) | {

@@ -16,7 +16,6 @@ from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.atlas.lightmap import Lightmap
 from app.gpu import Buffer, Framebuffer, Gpu, Mesh
@@ -55,6 +54,22 @@ class Audit:
     @property
     def total(self) -> float:
         return self.received + self.open + self.black
+
+
+class AuditTargets:
+    """What a shot that is only tried writes: light on texels, and the power on each tile. Gone when the audit is."""
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
+        self._gpu = gpu
+        self.light = gpu.texture(lightmap.size, 4, "f4")
+        self.powers = gpu.texture((lightmap.columns, lightmap.rows), 1, "f4")
+        self.light_target, self.power_target = gpu.target(self.light), gpu.target(self.powers)
+
+    def __enter__(self) -> AuditTargets:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._gpu.release_all(self.light_target, self.power_target, self.light, self.powers)
 
 
 def powers_of(rows: F64) -> F64:
@@ -110,29 +125,25 @@ class ShotPasses:
             self._audits = False
             return False
         failed = []
-        for shot in np.flatnonzero((power > 0) & (rows[:, 5, 3] > 1)).tolist():  # of more than one texel
-            if abs(sum(self._hand_out(shot, power[shot])) - 1) > SOUND:
-                failed.append(shot)
-            yield
+        with AuditTargets(self.gpu, self.lightmap) as targets:
+            for shot in np.flatnonzero((power > 0) & (rows[:, 5, 3] > 1)).tolist():  # of more than one texel
+                if abs(sum(self._hand_out(targets, shot, power[shot])) - 1) > SOUND:
+                    failed.append(shot)
+                yield
         if failed:
             self.buffers.shoot_finer(rows[failed, 3:6, 3].astype(int).tolist())
         return bool(failed)
 
-    def _hand_out(self, shot: int, power: float) -> tuple[float, float, float]:
+    def _hand_out(self, targets: AuditTargets, shot: int, power: float) -> tuple[float, float, float]:
         """What would become of a shot of the batch and its power: its shares received, open and black, see Audit. Changes no
         light. Waits for the GPU."""
-        gpu, lightmap = self.gpu, self.lightmap
-        scratch = gpu.texture(lightmap.size, 4, "f4")
-        powers = gpu.texture((lightmap.columns, lightmap.rows), 1, "f4")
-        target, power_target = gpu.target(scratch), gpu.target(powers)
-        target.clear()
+        targets.light_target.clear()
         self._see(shot, 1)
-        self._receive(target, shot, 1, blend="add")
+        self._receive(targets.light_target, shot, 1, blend="add")
         self._look_out(shot, 1)
-        area = lightmap.textures("t_position_area")
-        self.stages.audit.draw(power_target, textures=area | {"t_received": scratch})
-        received = np.frombuffer(powers.read(), np.float32).astype(np.float64).sum()
-        gpu.release_all(target, power_target, scratch, powers)
+        area = self.lightmap.textures("t_position_area")
+        self.stages.audit.draw(targets.power_target, textures=area | {"t_received": targets.light})
+        received = np.frombuffer(targets.powers.read(), np.float32).astype(np.float64).sum()
         left = np.frombuffer(self.stages.maps.open.read(), np.float32).reshape(BATCH, -1, 2)[shot].astype(np.float64)
         return float(received / power), *left.sum(0).tolist()
 
@@ -263,10 +274,6 @@ class ShotPasses:
     def _watt(self) -> float:
         """Watts in one stored unit of power: lightmap unit [W/m²] times solver area."""
         return self.lightmap.unit * self.lightmap.frame.scale**2
-
-    def patch_edges(self) -> NDArray[np.int64]:
-        """(tiles,) texels along the edge of those patches in each slot that no audit has split, at the level that shoots now."""
-        return np.full(self.lightmap.nodes.tiles, 1 << self._choice.level)
 
     def vanished(self) -> int:
         """Triangles that the first shooter of the last step sees, but between the samples of its map: each was drawn as one

@@ -19,7 +19,7 @@ SHOOTER_ROWS = 7  # texels that describe one shooter, see shooter.glsl
 BLOCK_BYTES = 256  # no driver asks for a coarser uniform block alignment
 BLOCK_ROWS = BLOCK_BYTES // 16  # texels in a row of t_shooters: one shooter, padded to a uniform block
 REPORT_TEXELS = 2 + SHOOTER_ROWS  # see report.frag.glsl
-BLOCK_LEVEL = 2  # blocks of 4×4 texels, see patches.frag.glsl
+BLOCK_LEVEL = 2  # blocks of so many texels along each edge, as a power of 2, are summed once, see patches.frag.glsl
 ROOT_LEVEL = 2  # quadtrees: at this level a texel of the root shoots by itself
 OPEN_BLOCK = 8  # visibility texels along the edge of a block that open.frag.glsl sums
 MAPS_TEXELS = 2**21  # of visibility that are drawn at once: more gain little and cost memory
@@ -59,6 +59,8 @@ class ShotBuffers:
 
     def hand_down(self, old: Sequence[tuple[int, int]], new: Sequence[tuple[int, int]]) -> None:
         """Let each of the new tiles that begin at these texels shoot as fine as the old one in its place; places may recur."""
+        if not self.finer_levels.any():
+            return
         marks: dict[tuple[int, int], float] = {}
         for gone, came in zip(old, new, strict=True):
             marks[came] = max(marks.get(came, 0.0), float(self._blocks(gone).max()))
@@ -68,11 +70,17 @@ class ShotBuffers:
 
     def level_out(self) -> None:
         """Let each tile shoot all over as finely as it does anywhere: for patches of another level."""
+        if not self.finer_levels.any():
+            return
         edge = self._tile >> BLOCK_LEVEL
         rows, columns = (side // edge for side in self.finer_levels.shape)
         most = self.finer_levels.reshape(rows, edge, columns, edge).max((1, 3))
         self.finer_levels[:] = most.repeat(edge, 0).repeat(edge, 1)
         self.finer.write(self.finer_levels.tobytes())
+
+    def finer_at(self, texel: tuple[int, int]) -> int:
+        """Levels by which the patch of this texel is finer than others."""
+        return int(self.finer_levels[texel[1] >> BLOCK_LEVEL, texel[0] >> BLOCK_LEVEL])
 
     def _blocks(self, corner: tuple[int, int]) -> F32:
         """Those of the tile that begins at this texel."""
@@ -107,9 +115,11 @@ class ChoiceStages:
         self.patch_target = gpu.target(self.patches)
         tile = lightmap.nodes.tile
         kind = lightmap.defines("TILE") | {"LEVEL": level - ROOT_LEVEL if adaptive else level}
-        kind["HIGHEST"] = highest_level(tile)
+        kind |= {"HIGHEST": highest_level(tile), "BLOCK": 1 << BLOCK_LEVEL}
         self.add_patches = Pass(gpu, "shooting/patches", defines=kind)
-        self.add_runs = Pass(gpu, "shooting/runs", defines={"TILE_BLOCKS": tile >> BLOCK_LEVEL})
+        self.add_runs = Pass(
+            gpu, "shooting/runs", defines={"TILE_BLOCKS": tile >> BLOCK_LEVEL, "BLOCK": 1 << BLOCK_LEVEL}
+        )
         self.choose = Pass(gpu, "shooting/choose", defines=kind | lightmap.defines("MATERIAL_BITS"))
 
     def release(self) -> None:

@@ -23,8 +23,8 @@ from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, ReadBack, Texture
 from app.scene.model import F64, Material
 from app.solvers.base import EnergyBook, StepReport
-from app.solvers.shooting.options import ShootingOptions
-from app.solvers.shooting.shot import Audit, Shot, ShotPasses, powers_of
+from app.solvers.shooting.options import ShootingOptions, highest_level
+from app.solvers.shooting.shot import Audit, AuditTargets, Shot, ShotPasses, powers_of
 from app.solvers.shooting.stages import BATCH, ChoiceStages, ShotBuffers, ShotStages
 
 # With ``coarsen``, a shot should carry this share of the emitted power: about 4096 shots for each time that all light is
@@ -184,7 +184,9 @@ class UniformShooting(ShotPasses):
         self.buffers.runs.write(runs.tobytes())
         self._describe(self._choice, 1)
         row = self._shooter_rows(1)
-        return Audit(*self._hand_out(0, float(powers_of(row)[0])), self._shot_from_rows(row[0]))
+        with AuditTargets(self.gpu, self.lightmap) as targets:
+            shares = self._hand_out(targets, 0, float(powers_of(row)[0]))
+        return Audit(*shares, self._shot_from_rows(row[0]))
 
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
         """Each part of a step by itself, to be timed. They leave the light wrong: reset afterwards."""
@@ -197,6 +199,17 @@ class UniformShooting(ShotPasses):
             "look out": lambda: self._for_groups(self._look_out, shots),
             "book": lambda: self._book(shots),
         }
+
+    def patch_edge(self, texel: tuple[int, int]) -> int:
+        """Texels along the edge of the patch that a texel (column, row) of the node set would shoot from now: its level, and how
+        much finer an audit made it."""
+        nodes = self.lightmap.nodes
+        slot = texel[1] // nodes.tile * nodes.columns + texel[0] // nodes.tile
+        level = min(self._patch_level(slot), highest_level(nodes.tile)) - self.buffers.finer_at(texel)
+        return 1 << max(level, 0)
+
+    def _patch_level(self, slot: int) -> int:
+        return self._choice.level
 
     def inspect(self) -> dict[str, Texture]:
         """What the first shot of the last step saw, in the lowest of the maps that lie above each other."""

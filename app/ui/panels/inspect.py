@@ -23,7 +23,7 @@ def draw(session: Session, state: State) -> None:
         widgets.wrapped("Click a surface to read its texel.", theme.DIM)
     else:
         _picked(session, state.picked)
-    image = _hemicube(session, state)
+    image, vanished = _hemicube(session, state)
     if image is not None and state.texture_id is not None:
         widgets.section("What the last shooter saw")
         width = widgets.steady_width()
@@ -35,18 +35,21 @@ def draw(session: Session, state: State) -> None:
             imgui.ImVec2(1, 0),
         )
         widgets.tooltip(f"What the patch that shot last sees, one colour per surface: {session.shooting.projection}")
+        if vanished:
+            widgets.facts("small", [("Smaller than a sample", f"{vanished:,} triangles")])
+            widgets.tooltip("They lie between the samples of this map, and are drawn as one sample each")
     atlas.draw(session, state)
 
 
-def _hemicube(session: Session, state: State) -> Any:
-    """The picture of the last shot, made anew a few times a second, and whenever the textures behind it may be
-    others.
+def _hemicube(session: Session, state: State) -> tuple[Any, int]:
+    """The picture of the last shot and the triangles that vanish in it, made anew a few times a second, and whenever the
+    textures behind it may be others.
     """
     source = session.lightmap, session.shooting
     state.hemicube_age += imgui.get_io().delta_time
     if state.hemicube is None or state.hemicube[0] != source or state.hemicube_age >= REFRESH_SECONDS:
-        state.hemicube, state.hemicube_age = (source, session.hemicube_image()), 0.0
-    return state.hemicube[1]
+        state.hemicube, state.hemicube_age = (source, session.hemicube_image(), session.vanished()), 0.0
+    return state.hemicube[1:]
 
 
 def _picked(session: Session, picked: Picked) -> None:
@@ -59,7 +62,8 @@ def _picked(session: Session, picked: Picked) -> None:
             ("Material", material),
             ("Triangle", f"{picked.triangle}{' (back)' if picked.back else ''}"),
             ("Chart, facet", f"{picked.chart}, {picked.facet}"),
-            ("Texel, patch", f"({picked.texel[0]}, {picked.texel[1]}), ({picked.patch[0]}, {picked.patch[1]})"),
+            ("Texel", f"{picked.texel[0]}, {picked.texel[1]}"),
+            ("Patch", f"{picked.patch[0]}, {picked.patch[1]} of {picked.patch_edge}×{picked.patch_edge} texels"),
             ("Position [m]", widgets.triple(picked.position, 3)),
             ("Normal", widgets.triple(picked.normal, 3)),
             ("Area [m²]", widgets.number(picked.area)),

@@ -63,7 +63,7 @@ def _buttons(session: Session, state: State) -> None:
     imgui.same_line()
     if imgui.button("One shot", size):
         session.running = False
-        state.act(session.shoot_once)
+        state.act(session.shoot)
     widgets.tooltip("Pause and shoot once: . (full stop)")
     imgui.same_line()
     if imgui.button(f"{ICONS.ICON_FA_ROTATE_LEFT} Restart", size):
