@@ -77,6 +77,8 @@ def test_no_shadow_no_split(planted: Callable[..., Solution]) -> None:
 # -- the table's shadow ------------------------------------------------------------------------------------------------
 
 SHADOW: dict[str, object] = {"density": 5.0, "level": 1, "resolution": 128, "residual": 0.01, "gradient": 0.3}
+# Energy that patches of a quarter of a metre make or lose where the table's feet stand on them: 0.3 to 0.6 %
+CONTACTS = 0.01
 
 
 def finest_light(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
@@ -98,9 +100,7 @@ def test_it_does_not_matter_when_the_tree_grows(planted: Callable[..., Solution]
     (a, here), (b, there) = finest_light(early), finest_light(late)
     both = here & there
     assert np.sqrt(((a - b)[both] ** 2).mean() / (a[both] ** 2).mean()) < 0.01
-    # both lose the same light at contacts of large patches, about 0.85 %
-    assert abs(early.book.imbalance_share - late.book.imbalance_share) < 3e-3
-    assert abs(early.book.imbalance_share) < 0.015
+    assert max(abs(early.book.imbalance_share), abs(late.book.imbalance_share)) < CONTACTS
 
 
 def test_leaves_follow_threshold_depth_and_budget(planted: Callable[..., Solution]) -> None:
@@ -113,7 +113,7 @@ def test_leaves_follow_threshold_depth_and_budget(planted: Callable[..., Solutio
             box.solver.step(8)
             box.solver.poll()
         box.settle()
-        assert np.isfinite(box.H).all() and abs(box.book.imbalance_share) < 0.02
+        assert np.isfinite(box.H).all() and abs(box.book.imbalance_share) < CONTACTS
         return len(box.solver.tree)  # type: ignore[attr-defined]
 
     few = settled()
@@ -141,5 +141,5 @@ def test_an_edit_of_a_grown_tree(planted: Callable[..., Solution]) -> None:
     box.settle()
     finer, covered = finest_light(box)
     coarse = H.repeat(2, 0).repeat(2, 1)[: finer.shape[0], : finer.shape[1]] if finer.shape != H.shape else H
-    assert finer[covered].mean() == pytest.approx(coarse[covered].mean() / 4, rel=0.02)
-    assert abs(box.book.imbalance_share) < 0.02
+    assert finer[covered].mean() == pytest.approx(coarse[covered].mean() / 4, rel=5e-3)
+    assert abs(box.book.imbalance_share) < CONTACTS
