@@ -35,20 +35,23 @@ class TileTexels:
     dpdv: F64
 
 
-# What a tile is as a receiver: whether it is flat; its in_a, in_b, in_c
-KIND = np.dtype([("flat", "?"), ("a", "f4", 4), ("b", "f4", 4), ("c", "f4", 4)])
+# What a tile is as a receiver: whether it is flat; the box of its covered texels, lower corner and the one beyond the upper
+# (x, y); its in_a, in_b, in_c
+KIND = np.dtype([("flat", "?"), ("box", "i4", 4), ("a", "f4", 4), ("b", "f4", 4), ("c", "f4", 4)])
 
 
 def tile_kinds(t: TileTexels, material: NDArray[np.int32]) -> NDArray[np.void]:
     """(n,) KIND of each tile; material (facets,)."""
     facet, flat = _flat_tiles(t)
     out = np.zeros(len(facet), KIND)
-    out["flat"] = flat
+    out["flat"], out["box"] = flat, _boxes(t.facet >= 0)
     owner = facet[flat]
-    size = t.size[flat, None]
-    out["a"][flat] = np.column_stack([_corners(t, facet)[flat], owner + 1])
-    out["b"][flat] = np.column_stack([t.dpdu[owner] * size, material[owner]])
-    out["c"][flat, :3] = t.dpdv[owner] * size
+    size, lower = t.size[flat, None], out["box"][flat]
+    du, dv = t.dpdu[owner] * size, t.dpdv[owner] * size
+    corner = _corners(t, facet)[flat] + lower[:, :1] * du + lower[:, 1:2] * dv
+    out["a"][flat] = np.column_stack([corner, owner + 1])
+    out["b"][flat] = np.column_stack([du, material[owner]])
+    out["c"][flat, :3] = dv
     out["a"][~flat], out["b"][~flat] = _bounds(t, ~flat)
     return out
 
@@ -59,7 +62,7 @@ def receivers(
     """(spans, 16) f32 of flat tiles and (tiles, 16) f32 of the others, see RECEIVER_FORMAT, of the ``used`` slots (n,), in order.
 
     kinds and leaves of all slots; columns of the node set; tile: edge of a tile [texels]. Neighbouring flat tiles of one
-    facet, side by side in atlas and node set, are one quad.
+    facet, side by side in atlas and node set, are one quad. Quads end where no texel is covered: most of a tile may be empty.
     """
     flat = used[kinds["flat"][used]]
     shaped = used[~kinds["flat"][used]]
@@ -67,16 +70,30 @@ def receivers(
     joins = np.isin(before, flat) & (flat % columns != 0) & (kinds["a"][before, 3] == kinds["a"][flat, 3])
     joins &= (leaves.level[before] == leaves.level[flat]) & (leaves.y[before] == leaves.y[flat])
     joins &= leaves.x[before] + 1 == leaves.x[flat]
+    left, right = kinds["box"][before], kinds["box"][flat]
+    joins &= (left[:, 2] == tile) & (right[:, 0] == 0) & (left[:, 1::2] == right[:, 1::2]).all(1)
     start = np.flatnonzero(~joins)
-    length = np.diff(np.append(start, len(flat)))
-    single = np.ones(len(shaped), int)
-    return _quads(kinds, flat[start], length, columns, tile), _quads(kinds, shaped, single, columns, tile)
+    last = np.append(start, len(flat))[1:] - 1
+    return _quads(kinds, flat[start], flat[last], columns, tile), _quads(kinds, shaped, shaped, columns, tile)
 
 
-def _quads(kinds: NDArray[np.void], slot: NDArray[np.int64], length: NDArray[np.int64], columns: int, tile: int) -> F32:
-    rect = np.stack([slot % columns, slot // columns, length, np.ones_like(slot)], 1) * tile
-    kind = kinds[slot]
-    return np.concatenate([rect, kind["a"], kind["b"], kind["c"]], 1).astype(np.float32)
+def _quads(kinds: NDArray[np.void], first: NDArray[np.int64], last: NDArray[np.int64], columns: int, tile: int) -> F32:
+    """From the lower corner of what the first tile of each covers to the upper of the last."""
+    lower, upper = (np.stack([slot % columns, slot // columns], 1) * tile for slot in (first, last))
+    lower, upper = lower + kinds["box"][first, :2], upper + kinds["box"][last, 2:]
+    kind = kinds[first]
+    return np.concatenate([lower, upper - lower, kind["a"], kind["b"], kind["c"]], 1).astype(np.float32)
+
+
+def _boxes(covered: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(n, 4) of covered texels (n, t, t): lower corner and the one beyond the upper (x, y); empty where none is."""
+    corners = []
+    for axis in (1, 2):  # over rows: columns; over columns: rows
+        some = np.asarray(covered.any(axis))
+        beyond = np.where(some.any(1), some.shape[1] - some[:, ::-1].argmax(1), 0)
+        corners.append((some.argmax(1), beyond))
+    (x, right), (y, top) = corners
+    return np.stack([x, y, right, top], 1)
 
 
 def _flat_tiles(t: TileTexels) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
