@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,8 +27,9 @@ class Regrowth:
             for name, *more in (("lift",), ("push", "TILE"), ("pull",))
         )
 
-    def apply(self, change: Change) -> None:
-        """Bring the lightmap's textures up to date with its node set, where ``change`` has just been made."""
+    def apply(self, change: Change, carried: Sequence[tuple[Texture, Framebuffer]] = ()) -> None:
+        """Bring the lightmap's textures up to date with its node set, where ``change`` has just been made; and other light on
+        the same texels that is ``carried`` along, as H is."""
         gpu, lightmap, split = self._gpu, self._lightmap, change.split
         tile, half = lightmap.nodes.tile, lightmap.nodes.tile // 2
         old, new = (change.parents, change.children) if split else (change.children, change.parents)
@@ -35,20 +38,27 @@ class Regrowth:
         size = (LIFTED_COLUMNS * tile, rows * tile)
         place = np.arange(len(lifted))
         aside = np.stack([place % LIFTED_COLUMNS, place // LIFTED_COLUMNS], 1) * tile
-        textures = [gpu.texture(size, 4, "f4"), gpu.texture(size, 4, "f4"), gpu.texture(size, 1, "f4")]
-        target = gpu.target(*textures)
-        light = lightmap.textures("t_position_area", "t_irradiance", "t_residual")
-        self._draw(self._lift, target, quads(aside, tile, corners(lightmap, lifted)), light)
-        lightmap.write_tiles(np.unique(np.concatenate([old, new])))
-
-        lights = dict(zip(("t_lifted_irradiance", "t_lifted_kept", "t_lifted_area"), textures, strict=True))
+        out = quads(aside, tile, corners(lightmap, lifted))
         if split:
-            pushed = quads(corners(lightmap, new), tile, aside[nth] + change.corner * half)
-            self._draw(self._push, lightmap.light_target, pushed, lights | lightmap.textures("t_position_area"))
+            into, how = quads(corners(lightmap, new), tile, aside[nth] + change.corner * half), self._push
         else:
-            pulled = quads(corners(lightmap, new) + change.corner * half, half, aside[nth])
-            self._draw(self._pull, lightmap.light_target, pulled, lights)
-        gpu.release_all(target, *textures)
+            into, how = quads(corners(lightmap, new) + change.corner * half, half, aside[nth]), self._pull
+        lights = [(lightmap.texture("t_irradiance"), lightmap.light_target), *carried]
+        copies = []
+        for light, _ in lights:
+            copy = [gpu.texture(size, 4, "f4"), gpu.texture(size, 4, "f4"), gpu.texture(size, 1, "f4")]
+            target = gpu.target(*copy)
+            self._draw(
+                self._lift, target, out, lightmap.textures("t_position_area", "t_residual") | {"t_irradiance": light}
+            )
+            gpu.release_all(target)
+            copies.append(copy)
+        lightmap.write_tiles(np.unique(np.concatenate([old, new])))
+        for (_, target), copy in zip(lights, copies, strict=True):
+            names = ("t_lifted_irradiance", "t_lifted_kept", "t_lifted_area")
+            textures = dict(zip(names, copy, strict=True))
+            self._draw(how, target, into, textures | (lightmap.textures("t_position_area") if split else {}))
+            gpu.release_all(*copy)
 
     def _draw(self, how: Pass, target: Framebuffer, rects: F32, textures: dict[str, Texture]) -> None:
         mesh = Mesh(self._gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)

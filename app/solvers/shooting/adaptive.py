@@ -3,43 +3,35 @@
 After each batch every leaf is judged on the GPU, and the host hears of it one step later: how much the gradient of H jumps in it,
 or how many of its texels lie in shadow [Wallner10, 5]. Light is pushed down to children and pulled up to parents.
 
-A leaf that came late inherited interpolated light from earlier shots. So all shots so far are made again into fresh leaves, a
-batch per step, and their sum takes the place of what was inherited:
-
-    C = Σ_i r_i F_ji V_ji - H_j,   H_j += C,   r_j += ρ_j C
-
-The solution then does not depend on when the tree grew. New shots meanwhile reach fresh leaves as any other.
+A leaf that came late inherited interpolated light from earlier shots: reshooting.py makes them again into fresh leaves.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import Lightmap, receiver_meshes
+from app.atlas.lightmap import Lightmap
 from app.atlas.quadtree import Change, Quadtree, Tile
-from app.atlas.regrow import QUAD_FORMAT, Regrowth, corners, quads
-from app.gpu import Framebuffer, Gpu, Mesh, Pass, ReadBack, Texture
-from app.scene.model import F64, Material
-from app.solvers.shooting.log import ShotLog
+from app.atlas.regrow import Regrowth, corners
+from app.gpu import Framebuffer, Gpu, Pass, ReadBack, Texture
+from app.scene.model import Material
 from app.solvers.shooting.options import TREE, ShootingOptions
+from app.solvers.shooting.reshooting import Reshooting
 from app.solvers.shooting.stages import BATCH, ROOT_LEVEL
-from app.solvers.shooting.uniform import UniformShooting
 
 # A second difference of smooth light grows fourfold when texels double: leaves merge below a quarter of the threshold, and half
 # of that again, so that what was merged is not split at once.
 MERGE = 1 / 8
-REDO_AFTER = 4  # times as many shots as at the last time, so that all redoing costs a third of all shots
 MERGE_AFTER = 4  # times as many shots as when it was split, a leaf may merge
-LOOK_AFTER = 32  # shots between two judgements of a tree that did not change at the last
+LOOK_AFTER = 32  # shots, or a quarter of all, between two judgements of a tree that did not change at the last
 PER_SHOT = 8  # leaves that split or families that merge, for each shot of a step: bounded work for a frame
 
 
-class AdaptiveShooting(UniformShooting):
+class AdaptiveShooting(Reshooting):
     """Shoots a lightmap whose node set has room for more leaves than it holds. Whoever makes it releases it."""
 
     adaptive = True
@@ -47,25 +39,11 @@ class AdaptiveShooting(UniformShooting):
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
         self.tree = Quadtree(lightmap.nodes)
         self._regrowth = Regrowth(gpu, lightmap)
-        self._log = ShotLog(gpu)
         self._judge = Pass(gpu, "shooting/judge", defines=lightmap.defines("TILE"))
-        self._inherit = Pass(gpu, "shooting/inherit", vertex="common/rects")
-        self._correct = Pass(
-            gpu,
-            "shooting/correct",
-            defines=lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"),
-            vertex="common/rects",
-        )
-        self.gpu, self.lightmap = gpu, lightmap
-        self._sized: list[Framebuffer | Texture] = []
-        self._make_targets()
+        self._roughness, self._roughness_target = self._slots(gpu, lightmap)
         self._judged: deque[tuple[int, ReadBack]] = deque()
-        self._fresh: set[int] = set()  # slots whose light is partly inherited
-        self._redone: _Redo | None = None
-        self._redone_at = 0  # shots in the log when they were last made again
         self._look_at = 0
         self._split_at: dict[Tile, int] = {}  # shots in the log when a leaf was split
-        self._asked = False  # the user turned a knob of the tree: do not wait
         self._calm = False  # the last look at the leaves found nothing to do
         super().__init__(gpu, lightmap, options)
 
@@ -73,49 +51,42 @@ class AdaptiveShooting(UniformShooting):
 
     def reset(self) -> None:
         """Forget all light. The leaves stay: those that are not needed merge."""
-        self._log.clear()
-        self._end_redo()
         self._drop_judged()
-        self._fresh.clear()
-        self._calm, self._redone_at, self._look_at = False, 0, 0
+        self._calm, self._look_at = False, 0
         self._split_at.clear()
         super().reset()
 
     def set_options(self, options: ShootingOptions) -> None:
         self._calm = False
         if options.replace(**{name: getattr(self.options, name) for name in TREE}) == self.options:
-            self.options, self._asked = options, True
+            self.options, self._all_again = options, True
             self._split_at.clear()
         else:
             super().set_options(options)
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
-        self._end_redo()
         self._calm = False
         super().set_materials(materials)
-
-    def _scale_light(self, factor: F64) -> None:
-        super()._scale_light(factor)
-        self._log.scale(factor)
 
     @property
     def settled(self) -> bool:
         """Whether the tree has stopped growing and all its leaves hold what the shots gave them."""
-        return self._calm and not self._fresh and self._redone is None
+        return self._calm and not self._fresh and self._redo_under_way is None
 
     def step(self, shots: int) -> int:
         """First what there is to do for fresh leaves, a batch of earlier shots at a time, then shots while light is left."""
         made = 0
         done = bool(self._log.count) and self.report.residual <= self.options.residual
-        if self._redone is not None:
+        if self._redo_under_way is not None:
             made = self._redo()
-        elif self._fresh and self._log.count >= (0 if done or self._asked else REDO_AFTER * self._redone_at):
+        elif self._fresh and (self._calm if done or self._all_again else self._redo_pays):
             made = self._begin_redo()
         elif not done:
             made = super().step(shots)
-        if self._redone is None and (not self._calm or done or self._log.count >= self._look_at):
+        if self._redo_under_way is None and (not self._calm or done or self._log.count >= self._look_at):
             self._look(PER_SHOT * min(shots, BATCH))
-            self._look_at = self._log.count + LOOK_AFTER
+            self._look_at = self._log.count + max(LOOK_AFTER, self._log.count // 4)
+        self._all_again &= not self.settled
         return made or shots
 
     def step_part(self, bands: int) -> bool:
@@ -135,15 +106,9 @@ class AdaptiveShooting(UniformShooting):
         }
 
     def release(self) -> None:
-        self._end_redo()
         self._drop_judged()
-        self._log.release()
-        self.gpu.release_all(*self._sized)
+        self.gpu.release_all(self._roughness_target, self._roughness)
         super().release()
-
-    def _book(self, shots: int) -> None:
-        super()._book(shots)
-        self._log.add(self.buffers, shots)
 
     # -- judging and growing -------------------------------------------------------------------------------------------
 
@@ -210,22 +175,19 @@ class AdaptiveShooting(UniformShooting):
             self.poll(wait=True)
             self.tree.enlarge(min(wanted, most))
             self.lightmap.enlarge()
-            self._make_targets()
+            self._enlarged()
+            self.gpu.release_all(self._roughness_target, self._roughness)
+            self._roughness, self._roughness_target = self._slots(self.gpu, self.lightmap)
             self.buffers = self.buffers.enlarged(self.lightmap)
             self._remake_stages(self.options)
         if self.tree.room < slots:
             self.note = f"leaves stop growing: the budget of {self.options.budget:,} texels is reached"
 
-    def _make_targets(self) -> None:
-        """What is as large as the node set."""
-        if self._sized:
-            self.gpu.release_all(*self._sized)
-        lightmap = self.lightmap
-        self._roughness = self.gpu.texture((lightmap.columns, lightmap.rows), 4, "f4")
-        self._roughness_target = self.gpu.target(self._roughness)
-        self._correction = self.gpu.texture(lightmap.size, 4, "f4")
-        self._correction_target = self.gpu.target(self._correction)
-        self._sized = [self._roughness_target, self._roughness, self._correction_target, self._correction]
+    @staticmethod
+    def _slots(gpu: Gpu, lightmap: Lightmap) -> tuple[Texture, Framebuffer]:
+        """A texel for each slot of the node set."""
+        texture = gpu.texture((lightmap.columns, lightmap.rows), 4, "f4")
+        return texture, gpu.target(texture)
 
     def _opinion(self, judged: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which leaves should split, and which need not be as fine as they are."""
@@ -240,90 +202,12 @@ class AdaptiveShooting(UniformShooting):
 
     def _apply(self, change: Change) -> None:
         self._end_redo()
-        self._regrowth.apply(change)
+        self._regrowth.apply(change, self._carried)
         self._emitted = self.lightmap.emitted
         gone, came = (change.parents, change.children) if change.split else (change.children, change.parents)
         self.buffers.hand_down(*([(x, y) for x, y in corners(self.lightmap, at).tolist()] for at in (gone, came)))
-        inherits = change.split or not self._fresh.isdisjoint(gone.tolist())
-        self._fresh.difference_update(gone.tolist())
-        if inherits and self.lightmap.storage != "fixed8":
-            self._fresh.update(came.tolist())  # fixed8 holds no negative correction: leaves keep what they inherit
-
-    # -- earlier shots into fresh leaves -------------------------------------------------------------------------------
-
-    def _begin_redo(self) -> int:
-        slots = np.array(sorted(self._fresh), np.int64)
-        self._redone = _Redo(self.gpu, self.lightmap, slots, self._log.count)
-        self._take_back(self._redone)
-        return self._redo()
-
-    def _redo_one(self) -> None:
-        """The shot that was chosen last once more."""
-        redo = _Redo(self.gpu, self.lightmap, np.flatnonzero(self.lightmap.nodes.used), 1)
-        self._take_back(redo)
-        self._receive(self._correction_target, 0, 1, blend="add", meshes=redo.receivers)
-        self._put_right(redo)
-        redo.release()
-
-    def _take_back(self, redo: _Redo) -> None:
-        """C = -H."""
-        self._inherit.draw(
-            self._correction_target,
-            textures=self.lightmap.textures("t_irradiance"),
-            uniforms={"u_size": self.lightmap.size},
-            mesh=redo.quads,
-        )
-
-    def _put_right(self, redo: _Redo) -> None:
-        """H += C, r += ρ C."""
-        self._correct.draw(
-            self.lightmap.light_target,
-            textures=self.lightmap.textures("t_normal_ids", "t_materials", "t_albedo")
-            | {"t_correction": self._correction},
-            uniforms={"u_size": self.lightmap.size},
-            mesh=redo.quads,
-            blend="add",
-        )
-
-    def _redo(self) -> int:
-        """One batch of the log once more, for fresh leaves only; after the last, its sum takes its place. How many shots."""
-        redo = self._redone
-        assert redo is not None
-        if redo.next < redo.end:
-            shots = min(self._log.recall(self.buffers, redo.next), redo.end - redo.next)
-            for first, some in self.stages.groups(shots):
-                self._see(first, some)
-                self._receive(self._correction_target, first, some, blend="add", meshes=redo.receivers, own=False)
-            redo.next += shots
-            return shots
-        self._put_right(redo)
-        self._fresh.difference_update(redo.slots.tolist())
-        self._redone_at, self._asked = redo.end, False
-        self._end_redo()
-        self.poll(wait=True)  # or an older report would follow
-        self.report = replace(self.report, residual=self.unshot_share())
-        return 0
-
-    def _end_redo(self) -> None:
-        if self._redone is not None:
-            self._redone.release()
-            self._redone = None
+        self._exchange(gone, came, inherit=change.split)
 
     def _drop_judged(self) -> None:
         while self._judged:
             self._judged.popleft()[1].take()
-
-
-class _Redo:
-    """Fresh leaves on their way: their slots, quads and receivers, and which shots are still to be made into them."""
-
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, slots: NDArray[np.int64], shots: int) -> None:
-        self._gpu, self.slots, self.next, self.end = gpu, slots, 0, shots
-        nodes = lightmap.nodes
-        place = corners(lightmap, slots)
-        self.quads = Mesh(gpu, quads(place, nodes.tile, place).tobytes(), QUAD_FORMAT, per_instance=True)
-        flat, shaped = nodes.receivers_of(slots)
-        self.receivers = receiver_meshes(gpu, flat, shaped)
-
-    def release(self) -> None:
-        self._gpu.release_all(self.quads, *self.receivers.values())

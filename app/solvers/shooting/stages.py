@@ -18,7 +18,7 @@ OPEN = 0.0  # item of the open background, see common/item.glsl
 SHOOTER_ROWS = 7  # texels that describe one shooter, see shooter.glsl
 BLOCK_BYTES = 256  # no driver asks for a coarser uniform block alignment
 BLOCK_ROWS = BLOCK_BYTES // 16  # texels in a row of t_shooters: one shooter, padded to a uniform block
-REPORT_TEXELS = 2 + SHOOTER_ROWS  # see report.frag.glsl
+REPORT_HEAD = 2  # texels of the report before those of its first shooter, see report.frag.glsl
 BLOCK_LEVEL = 2  # blocks of so many texels along each edge, as a power of 2, are summed once, see patches.frag.glsl
 ROOT_LEVEL = 2  # quadtrees: at this level a texel of the root shoots by itself
 OPEN_BLOCK = 8  # visibility texels along the edge of a block that open.frag.glsl sums
@@ -35,7 +35,7 @@ class ShotBuffers:
         self.shooter_blocks = gpu.buffer(BATCH * BLOCK_BYTES)  # the same, as uniforms
         self.ledger = gpu.texture((BATCH, 2), 4, "f4")
         self.occluders = Occluders(gpu, lightmap)
-        self.report = gpu.texture((REPORT_TEXELS, 1), 4, "f4")
+        self.report = gpu.texture((REPORT_HEAD + SHOOTER_ROWS, 1), 4, "f4")
         self.books = [gpu.texture((lightmap.columns, lightmap.rows), 4, "f4") for _ in range(3)]
         self.finer = gpu.texture((lightmap.size[0] >> BLOCK_LEVEL, lightmap.size[1] >> BLOCK_LEVEL), 1, "f4")
         self.finer_levels = np.zeros(self.finer.size[::-1], np.float32)  # the same, see patch_level.glsl

@@ -25,7 +25,7 @@ from app.scene.model import F64, Material
 from app.solvers.base import EnergyBook, StepReport
 from app.solvers.shooting.options import ShootingOptions, highest_level
 from app.solvers.shooting.shot import Audit, AuditTargets, Shot, ShotPasses, powers_of
-from app.solvers.shooting.stages import BATCH, ChoiceStages, ShotBuffers, ShotStages
+from app.solvers.shooting.stages import BATCH, REPORT_HEAD, ChoiceStages, ShotBuffers, ShotStages
 
 # With ``coarsen``, a shot should carry this share of the emitted power: about 4096 shots for each time that all light is
 # reflected, whatever the scene's size. Measured on the Cornell box: a quarter of the shots, error 1.8 % -> 2.4 %.
@@ -249,7 +249,7 @@ class UniformShooting(ShotPasses):
         self._reports.append((self._choice, ReadBack(self.gpu, buffers.report_target)))
 
     def _hear(self, choice: ChoiceStages, report: F64) -> None:
-        """report (2 + SHOOTER_ROWS, 4), see report.frag.glsl; choice: the level that it is about."""
+        """report (REPORT_HEAD + SHOOTER_ROWS, 4), see report.frag.glsl; choice: the level that it is about."""
         emitted = self._emitted.sum()
         residual = report[0, 0] * self._watt / emitted if emitted > 0 else 0.0
         faint = report[0, 1] * self._watt < FAINT * emitted
@@ -257,8 +257,8 @@ class UniformShooting(ShotPasses):
             self._choice = self.stages.choices[self.stages.choices.index(choice) + 1]
             self.buffers.level_out()
         self.report = StepReport(int(report[1, 3]), float(residual), report[1, :3] * self._watt)
-        if report[2 + 5, 3] > 0:
-            self.last_shot = self._shot_from_rows(report[2:])
+        if report[REPORT_HEAD + 5, 3] > 0:
+            self.last_shot = self._shot_from_rows(report[REPORT_HEAD:])
 
     def _tile_sums(self) -> tuple[F64, F64, F64]:
         """Absorbed and unshot power [W] and Σ ρA, RGB and in the first Σ A, as books.frag.glsl adds them per tile."""
