@@ -326,7 +326,8 @@ class Session:
     @property
     def parameters(self) -> dict[str, Any]:
         """Every knob that shaped the solution."""
-        return {"shooting": self.shooting.as_dict(), "atlas": self.atlas.as_dict(), "light": self.default_light}
+        shooting = self.shooting.as_dict() | {"resolution": self.solver.resolution}
+        return {"shooting": shooting, "atlas": self.atlas.as_dict(), "light": self.default_light}
 
     def pick(self, x_px: int, y_px: int) -> Picked | None:
         """What surface is at that pixel of the last frame, and the light on it."""
@@ -393,7 +394,7 @@ class Session:
     def hemicube_image(self) -> Texture:
         """The last shooter's visibility map, in one colour per facet."""
         seen, projection = self.solver.inspect(), PROJECTIONS[self.shooting.projection]
-        return self.items.draw(seen["items"], seen["depth"], projection.size(self.shooting.resolution))
+        return self.items.draw(seen["items"], seen["depth"], projection.size(self.solver.resolution))
 
 
 __all__ = ["Session", "Stats", "Stop"]

@@ -39,6 +39,7 @@ class Stats:
     triangles: int
     charts: int
     memory_mib: float
+    resolution: int  # of a full face of the visibility map [px]
 
 
 def stats_of(session: Session) -> Stats:
@@ -63,4 +64,5 @@ def stats_of(session: Session) -> Stats:
         triangles=len(session.scene.triangles),
         charts=session.charts.chart_count,
         memory_mib=sum(lightmap.memory.values()) / 2**20,
+        resolution=session.solver.resolution,
     )

@@ -118,6 +118,10 @@ class Solver(Protocol[OptionsT]):
     def patch_edge(self, texel: tuple[int, int]) -> int:
         """Texels along the edge of the patch that a texel (column, row) of the node set would shoot from now."""
 
+    @property
+    def resolution(self) -> int:
+        """Edge of a full face of the visibility map [px]: as set, or as the scene asks for."""
+
     def inspect(self) -> dict[str, Texture]:
         """Textures that explain the last step, by name; ``items`` and ``depth`` are what its first shooter saw."""
 

@@ -27,7 +27,7 @@ def edit_options(options: OptionsT, *, skip: Iterable[str] = (), starts: Mapping
     """One widget per declared option; returns ``options`` itself, or a checked copy where something was changed.
 
     A right-click or double-click puts the default back. Labels of options that are not at their default are bright.
-    ``starts`` are the values that optional ones begin with when they are given one.
+    ``starts`` are the values that optional ones have while they are not given one, and begin with when they are.
     """
     imgui.push_id(type(options).__name__)
     changes: dict[str, Any] = {}
@@ -84,8 +84,10 @@ def _optional(spec: Spec, value: Any, start: Any) -> Any:
     if changed:
         first = spec.default if start is None else start
         value = (spec.type(spec.minimum or 0) if first is None else first) if on else None
-    if value is not None:
+    if value is not None or start is not None:
         imgui.same_line()
+    if value is None and start is not None:
+        dim(f"{shown(start)} {spec.unit}")
     return value
 
 

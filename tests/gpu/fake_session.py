@@ -72,7 +72,15 @@ class FakeSession:
     @property
     def stats(self) -> SimpleNamespace:
         energies = {"emitted": EMITTED, "absorbed": 30.1, "escaped": 3.4, "unshot": 1.1, "imbalance": 0.0002}
-        counts = {"texels": 31204, "tiles": 160, "triangles": 32, "charts": 18, "memory_mib": 7.3, "shots": 60}
+        counts = {
+            "texels": 31204,
+            "tiles": 160,
+            "triangles": 32,
+            "charts": 18,
+            "memory_mib": 7.3,
+            "shots": 60,
+            "resolution": 256,
+        }
         rates = {"residual": 0.0318, "seconds": 0.3, "shots_per_second": 212.0, "converged": False}
         rates |= {"edit_shots": None, "fresh_shots": None}
         return SimpleNamespace(**energies, **counts, **rates)

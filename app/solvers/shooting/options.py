@@ -40,8 +40,13 @@ class ShootingOptions(Options):
     discs: int = option(1, "discs along each edge of a patch (disc form factor)", minimum=1, maximum=8)
     visibility: str = option("combined", "how a texel looks itself up in the visibility map", choices=VISIBILITIES)
     projection: str = option("hemicube", "how the shooter sees the scene", choices=tuple(PROJECTIONS))
-    resolution: int = option(
-        256, "edge of a full face of the visibility map", unit="px", minimum=64, maximum=2048, multiple=64
+    resolution: int | None = option(
+        None,
+        "edge of a full face of the visibility map; unset: a sample for each texel as seen from afar, 256 to 512",
+        unit="px",
+        minimum=64,
+        maximum=2048,
+        multiple=64,
     )
     depth: int = option(
         4, "finest level of quadtree leaves, each half the texel of the one above", minimum=0, maximum=MAX_DEPTH

@@ -30,8 +30,8 @@ from app.solvers.shooting.shot import powers_of
 from app.solvers.shooting.stages import REPORT_HEAD, ChoiceStages
 from app.solvers.shooting.uniform import UniformShooting
 
-# Once the strongest shot left holds less of the emitted power, light is so even that interpolation serves: the Cornell box errs by
-# 1.7 % where 100 of 2200 shots count as strong, as where all do, and by 2.5 % where the first 60 do.
+# Once the strongest shot left holds less of the emitted power, light is so even that interpolation serves: the Cornell box errs
+# by 1.7 % where 100 of 2200 shots count as strong, as where all do, and by 2.5 % where the first 60 do.
 STRONG = 2.0**-10
 REDO_AFTER = 3  # new shots for each that was made again the last time: redoing is at most a quarter of all shots
 

@@ -178,7 +178,7 @@ class ShotPasses:
         used = None if shots == maps.count else (0, 0, maps.items.width, shots * maps.map_size[1])
         maps.target.clear(OPEN, depth=1.0, viewport=used)
         projection, occluders = self.stages.projection, self.buffers.occluders
-        casters = projection.casters(occluders, self.options.resolution)
+        casters = projection.casters(occluders, self.stages.resolution)
         self.stages.see.draw(
             maps.target,
             textures=casters.textures,

@@ -211,6 +211,10 @@ class UniformShooting(ShotPasses):
     def _patch_level(self, slot: int) -> int:
         return self._choice.level
 
+    @property
+    def resolution(self) -> int:
+        return self.stages.resolution
+
     def inspect(self) -> dict[str, Texture]:
         """What the first shot of the last step saw, in the lowest of the maps that lie above each other."""
         return {"items": self.stages.maps.items, "depth": self.stages.maps.depth}

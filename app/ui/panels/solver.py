@@ -32,7 +32,8 @@ def draw(session: Session, state: State) -> None:
     widgets.section("Energy [W]")
     _energy(state)
     widgets.section("Shooting")
-    edited = widgets.edit_options(edited, skip=TREE)
+    assert state.stats is not None
+    edited = widgets.edit_options(edited, skip=TREE, starts={"resolution": state.stats.resolution})
     if edited is not session.shooting:
         state.act(lambda: session.set_shooting(edited))
 
