@@ -82,11 +82,12 @@ class Session:
     def open(self, source: str | Path) -> None:
         """Start to load in the background; ``poll`` swaps the scene when it is there."""
         self._stop_loading()
-        self.loading = Loading(source, self.atlas, default_light=self.default_light)
+        self.loading = Loading(source, self.atlas, default_light=self.default_light, expose=self.expose_on_open)
 
     def open_now(self, source: str | Path, progress: Callable[[str, float], None] | None = None) -> None:
         """Load and wait."""
-        for _ in self._swap(load(source, self.atlas, default_light=self.default_light, progress=progress)):
+        light, expose = self.default_light, self.expose_on_open
+        for _ in self._swap(load(source, self.atlas, default_light=light, expose=expose, progress=progress)):
             pass
 
     def set_atlas(self, atlas: AtlasOptions) -> None:
@@ -146,7 +147,7 @@ class Session:
         self.source = self.scene.source or self.scene.name
         if not cut_anew:
             self.look_through(self.scene.cameras[0])
-        if self.expose_on_open and not cut_anew:
+        if loaded.exposure is not None:
             self.display = self.display.replace(exposure=loaded.exposure)
         self.message = None if self.scene.emits else f"{self.scene.name} has no light: try --light for a ceiling light"
         self._opened = True
