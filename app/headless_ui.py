@@ -158,7 +158,7 @@ def ui_image(gpu: Gpu, session: Session, size: tuple[int, int], *, measured: boo
         raise UserError(f"a picture of {size[0]}×{size[1]} pixels: each side must be 1 to {limit} on this GPU")
     texture = gpu.texture(size, 4, "f1")
     target = gpu.target(texture)
-    ui = Ui(measured=measured)
+    ui = Ui(measured=measured, live=False)
     frame = UiFrame(gpu, ui, samples=SAMPLES)
     try:
         for _ in range(WARM_UP):

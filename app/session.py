@@ -196,7 +196,7 @@ class Session:
 
     @property
     def converged(self) -> bool:
-        return self.solver.report.residual <= self.shooting.residual and self.solver.settled
+        return bool(self.solver.report.residual <= self.shooting.residual) and self.solver.settled
 
     @property
     def shooting_goes_on(self) -> bool:
