@@ -67,8 +67,7 @@ class Session:
         self.loading: Loading | None = None
         self.load_seconds: dict[str, float] = {}
         self.history = History()
-        self.interrupted = False
-        self.effort = Effort()
+        self.interrupted, self.effort = False, Effort()
         self.seconds, self._pace = 0.0, Pacer(gpu)
         self._books = Books()
         self._settled, self._busy, self._opened = True, False, False

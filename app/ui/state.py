@@ -13,7 +13,6 @@ from app.options import Options, option
 if TYPE_CHECKING:
     from app.atlas.options import AtlasOptions
     from app.picking import Picked
-    from app.render.camera import CameraView
     from app.session import Stats
     from app.ui.navigation import Flight
 
@@ -89,8 +88,6 @@ class State:
     fps: float = 0.0
     picked: Picked | None = None
     picked_age: float = 0.0
-    picked_px: tuple[int, int] = (0, 0)
-    picked_view: CameraView | None = None
     hemicube: tuple[object, Any, int] | None = None
     hemicube_age: float = 0.0
     inset: tuple[object, Any] | None = None

@@ -141,6 +141,7 @@ def _style_plots() -> None:
     style.plot_padding = imgui.ImVec2(16, 4)  # half a label stands out on the right
     style.label_padding = imgui.ImVec2(4, 3)
     style.legend_inner_padding = imgui.ImVec2(6, 4)
+    style.legend_padding = imgui.ImVec2(8, 2)
     style.minor_alpha = 0.35
 
 

@@ -19,6 +19,7 @@ from app.atlas.lightmap import STORAGE
 from app.atlas.options import AtlasOptions
 from app.errors import SceneError, UserError
 from app.gpu import Gpu
+from app.picking import read_again
 from app.session import Session, Stop
 from app.solvers import ShootingOptions
 from app.solving import share_done
@@ -365,3 +366,20 @@ def test_picking_reads_the_light_and_changes_none(session: Session, storage: str
     np.testing.assert_allclose(picked.B, np.add(picked.E, np.multiply(picked.albedo, picked.H)), rtol=1e-6)
     np.testing.assert_array_equal(session.lightmap.irradiance(), before)
     session.gpu.release_all(target, texture)
+
+
+def test_a_picked_point_is_found_again_in_a_tree_that_grew(gpu: Gpu) -> None:
+    session = Session(gpu, atlas=AtlasOptions(texels=1500, adaptive=True))
+    session.open_now("cornell-box")
+    texture = gpu.texture((64, 48), 4, "f1")
+    target = gpu.target(texture)
+    session.draw(target, (64, 48))
+    first = {at: session.pick(*at) for at in ((10, 24), (32, 40), (40, 44), (40, 12))}
+    session.solve(Stop(shots=300))
+    again = {at: read_again(session, picked) for at, picked in first.items()}
+    assert any(again[at].texel != first[at].texel for at in first), "leaves have split under some of the points"
+    for at, picked in again.items():
+        assert picked.position == first[at].position and picked.triangle == first[at].triangle
+        assert picked.H == session.pick(*at).H != first[at].H, "as if picked now"
+    session.release()
+    gpu.release_all(target, texture)
