@@ -145,6 +145,8 @@ def session_options(flags: argparse.Namespace) -> dict[str, Any]:
 def picture(session: Session, size: tuple[int, int]) -> np.ndarray:
     """(height, width, 3) u8 sRGB of the session as it is, top row first. Raises UserError for sizes beyond the GPU's."""
     check_size(session.gpu, size)
+    if session.display.false_colour != "off":
+        return ui_image(session.gpu, session, size, panels=False)  # with the legend
     texture = session.gpu.texture(size, 4, "f1")
     target = session.gpu.target(texture)
     try:

@@ -19,7 +19,9 @@ from app.atlas.lightmap import STORAGE
 from app.atlas.options import AtlasOptions
 from app.errors import SceneError, UserError
 from app.gpu import Gpu
+from app.headless import picture
 from app.picking import read_again
+from app.render.false_colour import colour_map
 from app.session import Session, Stop
 from app.solvers import ShootingOptions
 from app.solving import share_done
@@ -383,3 +385,16 @@ def test_a_picked_point_is_found_again_in_a_tree_that_grew(gpu: Gpu) -> None:
         assert picked.H == session.pick(*at).H != first[at].H, "as if picked now"
     session.release()
     gpu.release_all(target, texture)
+
+
+def test_a_false_colour_picture_has_its_legend(session: Session) -> None:
+    session.open_now("cornell-box")
+    session.solve(Stop(shots=30))
+    session.display = session.display.replace(false_colour="illuminance", layer="albedo")
+    image = picture(session, (640, 360)) / 255
+    corner = image[:300, :140]
+    for colour in colour_map(48)[[0, 12, 24, 36, 47]]:
+        assert (np.abs(corner - colour).max(-1) < 1.5 / 255).sum() > 30, "every part of the scale is there"
+    session.display = session.display.replace(false_colour="off")
+    plain = picture(session, (640, 360))[:300, :140] / 255
+    assert (np.abs(plain - colour_map(48)[24]).max(-1) < 1.5 / 255).sum() == 0
