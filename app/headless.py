@@ -90,6 +90,8 @@ def view_or_shot(flags: argparse.Namespace) -> int:
     scene_file(flags.scene)
 
     if reason := no_display():
+        if flags.frames is not None:
+            raise UserError(f"--frames {flags.frames}: no window can be opened here ({reason}), so there are no frames")
         flags.output = Path(f"{Path(flags.scene).stem}.png")
         flags.shots = flags.time = flags.camera = None
         flags.ui, flags.json = True, False
