@@ -1,7 +1,7 @@
 """The light to come, before the first shot and without a GPU: radiosity H = F (E + ρ H) between some hundred points.
 
-Points lie on texels drawn by area, and on lamps drawn by power; F_ij = cos_i cos_j A_j / (π d² + A_j / 4), the form factor of a
-disc on its axis [Wallace89], with sums of at most 1. What stands between two points is looked up in a grid of cells
+Points lie on texels drawn by area, and on lamps drawn by power; F_ij = cos_i cos_j A_j / (π d² + A_j / 4) is the form factor
+of a small patch, kept finite where points nearly touch, with sums of at most 1. What stands between two points is looked up in a grid of cells
 that surfaces lie in, so that the cost does not depend on the number of triangles. Coarse, but it knows where light escapes,
 and which rooms it hardly reaches.
 """
@@ -19,8 +19,8 @@ from app.scene.model import F64
 POINTS, LAMP_POINTS = 384, 64  # on all surfaces, and on lamps besides
 CELLS = 48  # along the scene's longest edge, at most
 TEXELS_PER_CELL = 1.5  # edges: a surface's cells have no holes
-LIFT = 0.6  # cells along the normal, from which a point looks
-NEAR = 3.0  # cells around both points that hide nothing: they are those of the points' own surfaces
+NEAR = 2.5  # cells around both points that hide nothing
+PLANE = 1.25  # cells above a point's plane, up to which lie those of its own surface
 BOUNCES = 50
 SEED = 2
 
@@ -74,9 +74,8 @@ def _form_factors(surfaces: TexelSurfaces, at: NDArray[np.int64], area: F64) -> 
     F = np.maximum(leaves, 0) * np.maximum(arrives, 0) / squared * area / (np.pi * squared + area / 4)
     i, j = np.nonzero(np.triu(F))
     grid = _Grid(surfaces)
-    lifted = p + n * (LIFT * grid.cell)
     free = np.zeros(F.shape, bool)
-    free[i, j] = free[j, i] = grid.free(lifted[i], lifted[j])
+    free[i, j] = free[j, i] = grid.free(p[i], n[i], p[j], n[j])
     F *= free
     total = np.maximum(F.sum(1), 1.0)
     return np.asarray(F / np.maximum(total[:, None], total))  # A_i F_ij = A_j F_ji stays true
@@ -95,16 +94,19 @@ class _Grid:
         self._filled = np.zeros(index.max(0) + 1, bool)
         self._filled[tuple(index.T)] = True
 
-    def free(self, start: F64, end: F64) -> NDArray[np.bool_]:
-        """Whether nothing lies between the points of each pair, (n, 3) each; looked up cell by cell."""
+    def free(self, start: F64, start_normal: F64, end: F64, end_normal: F64) -> NDArray[np.bool_]:
+        """Whether nothing lies between the points of each pair, (n, 3) each; looked up cell by cell. What lies in the plane of
+        either point is its own surface."""
         way = (end - start) / self.cell
         length = np.maximum(np.linalg.norm(way, axis=1), 1e-30)
         start, way = (start - self._low) / self.cell, way / length[:, None]
+        rise, fall = np.einsum("ij,ij->i", way, start_normal), -np.einsum("ij,ij->i", way, end_normal)
         free, along = np.ones(len(start), bool), np.arange(len(start))
         distance = NEAR
         while len(along := along[distance < length[along] - NEAR]):
             index = np.floor(start[along] + distance * way[along]).astype(np.int64)
-            inside = ((index >= 0) & (index < self._filled.shape)).all(1)
+            above = (distance * rise[along] > PLANE) & ((length[along] - distance) * fall[along] > PLANE)
+            inside = above & ((index >= 0) & (index < self._filled.shape)).all(1)
             hit = inside.copy()
             hit[inside] = self._filled[tuple(index[inside].T)]
             free[along[hit]] = False
