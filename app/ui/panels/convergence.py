@@ -116,6 +116,7 @@ def _passes(session: Session, size: imgui.ImVec2) -> None:
     flags = imgui.TableFlags_.sizing_stretch_prop | imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y
     if not imgui.begin_table("timings", 2 * columns, flags, imgui.ImVec2(size.x, height)):
         return
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, imgui.ImVec2(0, 0))  # a bar would push the next label down
     for column in range(columns):
         imgui.table_setup_column(f"pass {column}", imgui.TableColumnFlags_.width_fixed)
         imgui.table_setup_column(f"ms {column}", imgui.TableColumnFlags_.width_stretch)
@@ -126,4 +127,5 @@ def _passes(session: Session, size: imgui.ImVec2) -> None:
         imgui.table_next_column()
         line = imgui.ImVec2(-1, imgui.get_text_line_height())
         imgui.progress_bar(ms / longest if longest > 0 else 0.0, line, f"{ms:.2f} ms")
+    imgui.pop_style_var()
     imgui.end_table()
