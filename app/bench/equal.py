@@ -69,7 +69,8 @@ def irradiance_of(lightmap: Lightmap, points: Points) -> F64:
     place = np.einsum("nk,nkc->nc", points.weights, charts.face_uv[face]) * finer - 0.5
     first = np.floor(place).astype(np.int64)
     (x, y), (s, t) = first.T, (place - first).T[..., None]
-    below, above = ((1 - s) * image[row, x] + s * image[row, x + 1] for row in (y, y + 1))
+    columns, rows = (np.clip([i, i + 1], 0, size - 1) for i, size in ((x, image.shape[1]), (y, image.shape[0])))
+    below, above = ((1 - s) * image[row, columns[0]] + s * image[row, columns[1]] for row in rows)
     return np.asarray((1 - t) * below + t * above)
 
 
