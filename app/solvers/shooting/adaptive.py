@@ -41,7 +41,7 @@ class AdaptiveShooting(Reshooting):
         self._regrowth = Regrowth(gpu, lightmap)
         self._judge = Pass(gpu, "shooting/judge", defines=lightmap.defines("TILE"))
         self._roughness, self._roughness_target = self._slots(gpu, lightmap)
-        self._judged: deque[tuple[int, ReadBack]] = deque()
+        self._judged: deque[tuple[int, ReadBack] | None] = deque()  # one for each of the last looks, None where it made none
         self._look_at = 0
         self._split_at: dict[Tile, int] = {}  # shots in the log when a leaf was split
         self._calm = False  # the last look at the leaves found nothing to do
@@ -85,7 +85,8 @@ class AdaptiveShooting(Reshooting):
             made = super().step(shots)
         if self._redo_under_way is None and (not self._calm or done or self._log.count >= self._look_at):
             self._look(PER_SHOT * min(shots, BATCH))
-            self._look_at = self._log.count + max(LOOK_AFTER, self._log.count // 4)
+            if not self._judged:
+                self._look_at = self._log.count + max(LOOK_AFTER, self._log.count // 4)
         self._all_again &= not self.settled
         return made or shots
 
@@ -113,14 +114,23 @@ class AdaptiveShooting(Reshooting):
     # -- judging and growing -------------------------------------------------------------------------------------------
 
     def _look(self, most: int) -> None:
-        """Judge all leaves; act on the last judgement that has arrived, on so many of them at most."""
-        if len(self._judged) > 1:
-            version, readback = self._judged.popleft()
+        """Judge all leaves, and act two looks later, when the judgement has arrived, on so many of them at most. Leaves that
+        are judged already are not judged again meanwhile."""
+        judged = self._judged.popleft() if len(self._judged) > 1 else None
+        if judged is not None:
+            version, readback = judged
             data = np.frombuffer(readback.take(), np.float32).reshape(-1, 4)
             if version == self.lightmap.version:
                 self._calm = not self._grow(data[: self.lightmap.nodes.tiles].astype(np.float64), most)
-        self._weigh_leaves()
-        self._judged.append((self.lightmap.version, ReadBack(self.gpu, self._roughness_target)))
+            if self._calm:
+                self._drop_judged()
+                return
+        version = self.lightmap.version
+        if any(known is not None and known[0] == version for known in self._judged):
+            self._judged.append(None)
+        else:
+            self._weigh_leaves()
+            self._judged.append((version, ReadBack(self.gpu, self._roughness_target)))
 
     def _weigh_leaves(self) -> None:
         self._judge.draw(
@@ -209,5 +219,7 @@ class AdaptiveShooting(Reshooting):
         self._exchange(gone, came, inherit=change.split)
 
     def _drop_judged(self) -> None:
-        while self._judged:
-            self._judged.popleft()[1].take()
+        for judged in self._judged:
+            if judged is not None:
+                judged[1].take()
+        self._judged.clear()
