@@ -38,6 +38,11 @@ class Leaves:
     def __len__(self) -> int:
         return len(self.level)
 
+    @property
+    def keys(self) -> I64:
+        """(n,) a number for each tile; -1 where there is none."""
+        return (self.level.astype(np.int64) << 48) | (self.y.astype(np.int64) << 24) | self.x
+
     def only(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Leaves:
         """Those of the leaves."""
         return Leaves(self.level[which], self.x[which], self.y[which])

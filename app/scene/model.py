@@ -6,8 +6,8 @@ a diffuse emitter's exitance is πL [W/m²].
 
 from __future__ import annotations
 
-import functools
 import dataclasses
+import functools
 from dataclasses import dataclass, field
 from pathlib import Path
 

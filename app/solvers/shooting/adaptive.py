@@ -41,7 +41,9 @@ class AdaptiveShooting(Reshooting):
         self._regrowth = Regrowth(gpu, lightmap)
         self._judge = Pass(gpu, "shooting/judge", defines=lightmap.defines("TILE"))
         self._roughness, self._roughness_target = self._slots(gpu, lightmap)
-        self._judged: deque[tuple[int, ReadBack] | None] = deque()  # one for each of the last looks, None where it made none
+        self._judged: deque[tuple[int, ReadBack] | None] = (
+            deque()
+        )  # one for each of the last looks, None where it made none
         self._look_at = 0
         self._split_at: dict[Tile, int] = {}  # shots in the log when a leaf was split
         self._calm = False  # the last look at the leaves found nothing to do
