@@ -24,6 +24,7 @@ from app.render.options import DisplayOptions
 from app.solvers import ShootingOptions
 
 DEFAULT_SCENE = "cornell-box"
+ALIKE = 0.75  # share of letters in common that makes a flag a likely slip for another; all begin with the same dashes
 
 
 class Parser(argparse.ArgumentParser):
@@ -36,7 +37,7 @@ class Parser(argparse.ArgumentParser):
         flags, unknown = super().parse_known_args(args, namespace)
         if unknown:
             known = re.findall(r"--[\w-]+", self.format_usage())
-            close = difflib.get_close_matches(unknown[0].split("=")[0], known, n=1)
+            close = difflib.get_close_matches(unknown[0].split("=")[0], known, n=1, cutoff=ALIKE)
             self.error(f"unknown argument {unknown[0]}" + (f"; did you mean {close[0]}?" if close else ""))
         return flags, unknown
 

@@ -90,6 +90,8 @@ def view_or_shot(flags: argparse.Namespace) -> int:
     scene_file(flags.scene)
 
     if reason := no_display():
+        if flags.frames is not None:
+            raise UserError(f"--frames {flags.frames}: no window can be opened here ({reason}), so there are no frames")
         flags.output = Path(f"{Path(flags.scene).stem}.png")
         flags.shots = flags.time = flags.camera = None
         flags.ui, flags.json = True, False
@@ -145,6 +147,8 @@ def session_options(flags: argparse.Namespace) -> dict[str, Any]:
 def picture(session: Session, size: tuple[int, int]) -> np.ndarray:
     """(height, width, 3) u8 sRGB of the session as it is, top row first. Raises UserError for sizes beyond the GPU's."""
     check_size(session.gpu, size)
+    if session.display.false_colour != "off":
+        return ui_image(session.gpu, session, size, panels=False)  # with the legend
     texture = session.gpu.texture(size, 4, "f1")
     target = session.gpu.target(texture)
     try:

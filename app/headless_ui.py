@@ -31,6 +31,7 @@ SCALE_SHARE = 0.05  # of the time may go into finding the false-colour scale
 SCALE_SECONDS = 0.5  # between two searches, at least
 WARM_UP = 4  # frames until docked windows, their contents' heights and scroll bars have settled
 SAMPLES = 2  # per pixel of a headless picture, along each axis: smooth edges
+LEGEND_SIZE = 900  # px: the shorter side of a picture beyond which its legend grows with it
 STEP = 1.0 / 60.0  # s: a headless frame's time, whatever the clock says
 SCREENSHOT = "glowtree-{:04d}.png"
 
@@ -147,18 +148,21 @@ def _legend(kind: str, scale: Scale) -> Legend:
     return Legend(kind.capitalize(), scale.unit, max(scale.low, 0.0), scale.high, scale.low > 0, colours)
 
 
-def ui_image(gpu: Gpu, session: Session, size: tuple[int, int], *, measured: bool = True) -> NDArray[np.uint8]:
+def ui_image(
+    gpu: Gpu, session: Session, size: tuple[int, int], *, measured: bool = True, panels: bool = True
+) -> NDArray[np.uint8]:
     """The viewer's window as it would look, (height, width, 3) u8, top row first, for a ``size`` (width, height) [px].
 
     The session is not stepped. ``measured=False`` leaves out what depends on the machine's speed, so that pictures
-    can be compared.
+    can be compared; ``panels=False`` all but the picture and the legend of its false colour.
     """
     limit = gpu.limits.max_texture
     if not (1 <= min(size) and max(size) <= limit):
         raise UserError(f"a picture of {size[0]}×{size[1]} pixels: each side must be 1 to {limit} on this GPU")
     texture = gpu.texture(size, 4, "f1")
     target = gpu.target(texture)
-    ui = Ui(measured=measured)
+    ui = Ui(measured=measured, live=False, scale=1.0 if panels else max(1.0, min(size) / LEGEND_SIZE))
+    ui.state.show_ui = panels
     frame = UiFrame(gpu, ui, samples=SAMPLES)
     try:
         for _ in range(WARM_UP):

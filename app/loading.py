@@ -27,13 +27,13 @@ class CancelledError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A node set and what of it is uploaded, how it was cut, the exposure to open it with [EV], and how long each stage took
-    [s]."""
+    """A node set and what of it is uploaded, how it was cut, the exposure to open it with [EV] if that was asked for, and how
+    long each stage took [s]."""
 
     nodes: NodeSet
     arrays: dict[str, Array]
     atlas: AtlasOptions
-    exposure: float
+    exposure: float | None
     seconds: dict[str, float]
 
 
@@ -58,15 +58,21 @@ def read_and_unfold(
 
 
 def load(
-    source: str | Path | Scene, atlas: AtlasOptions, *, default_light: bool = False, progress: Progress | None = None
+    source: str | Path | Scene,
+    atlas: AtlasOptions,
+    *,
+    default_light: bool = False,
+    expose: bool = False,
+    progress: Progress | None = None,
 ) -> Loaded:
-    """Read a scene, or take one as it is; unfold it and cut it into texels. Raises UserError (SceneError)."""
+    """Read a scene, or take one as it is; unfold it, cut it into texels, and with ``expose`` find its exposure. Raises UserError
+    (SceneError)."""
     tell: Progress = progress or (lambda stage, share: None)
     scene, charts, seconds = read_and_unfold(source, atlas, default_light, tell)
     start = time.perf_counter()
     tell("cutting into texels", 0.6)
     nodes = quadtree_nodes(scene, charts) if atlas.adaptive else NodeSet(scene, charts)
-    exposure, arrays = first_exposure(nodes), nodes.arrays
+    exposure, arrays = first_exposure(nodes) if expose else None, nodes.arrays
     _ = nodes.emission_weights  # cached here: the window, which reads them next, does not wait
     tell("done", 1.0)
     return Loaded(nodes, arrays, atlas, exposure, seconds | {"texels": time.perf_counter() - start})
@@ -78,13 +84,15 @@ class Loading:
     cancelled: by the user. Whoever waits for the result gives up then; the thread ends at its next stage.
     """
 
-    def __init__(self, source: str | Path | Scene, atlas: AtlasOptions, *, default_light: bool = False) -> None:
+    def __init__(
+        self, source: str | Path | Scene, atlas: AtlasOptions, *, default_light: bool = False, expose: bool = False
+    ) -> None:
         self.source = source
         self.stage, self.fraction = "reading", 0.0
         self.cancelled = False
         self._loaded: Loaded | None = None
         self._error: BaseException | None = None
-        self._thread = threading.Thread(target=self._run, args=(atlas, default_light), daemon=True)
+        self._thread = threading.Thread(target=self._run, args=(atlas, default_light, expose), daemon=True)
         self._thread.start()
 
     @property
@@ -109,9 +117,9 @@ class Loading:
         """Stop; the scene that is open stays."""
         self.cancelled = True
 
-    def _run(self, atlas: AtlasOptions, default_light: bool) -> None:
+    def _run(self, atlas: AtlasOptions, default_light: bool, expose: bool) -> None:
         try:
-            self._loaded = load(self.source, atlas, default_light=default_light, progress=self._progress)
+            self._loaded = load(self.source, atlas, default_light=default_light, expose=expose, progress=self._progress)
         except (UserError, CancelledError, MemoryError) as error:
             self._error = UserError("not enough memory for this scene") if isinstance(error, MemoryError) else error
         except Exception as error:  # shown by the main thread, with its traceback

@@ -38,6 +38,7 @@ class Spec:
     logarithmic: bool = False
     multiple: int = 1
     optional: bool = False
+    zero: str = ""
 
     @property
     def flag(self) -> str:
@@ -92,10 +93,13 @@ def option(
     choices: typing.Iterable[str] | typing.Iterable[int] = (),
     logarithmic: bool = False,
     multiple: int = 1,
+    zero: str = "",
 ) -> Any:
-    """Declare one field of an ``Options`` dataclass."""
+    """Declare one field of an ``Options`` dataclass. zero: what a widget shows instead of 0."""
     meta = {"help": help, "unit": unit, "minimum": minimum, "maximum": maximum, "choices": tuple(choices)}
-    return dataclasses.field(default=default, metadata={**meta, "logarithmic": logarithmic, "multiple": multiple})
+    return dataclasses.field(
+        default=default, metadata={**meta, "logarithmic": logarithmic, "multiple": multiple, "zero": zero}
+    )
 
 
 @dataclass(frozen=True)

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
-from app.render.pick import PickHit
+from app.render.pick import PickHit, with_texel
 from app.scene.model import RGB
+
+if TYPE_CHECKING:
+    from app.session import Session
 
 
 @dataclass(frozen=True)
 class Picked:
     """A picked point. Indices are the scene's and its charts'; texel (column, row) in the node set; patch (column, row) that it
     shoots from, counted in patches of its size, ``patch_edge`` texels along each edge; position [m], area [m²]; B, E, H, r are
-    RGB [W/m²]. A side without texels has chart and facet -1 and area 0: it only emits."""
+    RGB [W/m²]. A side without texels has chart and facet -1 and area 0: it only emits. hit: with which it can be read again."""
 
     triangle: int
     object: str
@@ -35,6 +39,7 @@ class Picked:
     H: RGB
     r: RGB
     albedo: RGB
+    hit: PickHit
 
 
 def picked_from_hit(lightmap: Lightmap, hit: PickHit, patch_edge: Callable[[tuple[int, int]], int]) -> Picked:
@@ -76,7 +81,14 @@ def picked_from_hit(lightmap: Lightmap, hit: PickHit, patch_edge: Callable[[tupl
         H=_rgb(H),
         r=_rgb(r),
         albedo=_rgb(albedo),
+        hit=hit,
     )
+
+
+def read_again(session: Session, picked: Picked) -> Picked:
+    """The same point with its texel and light as they are now."""
+    lightmap = session.lightmap
+    return picked_from_hit(lightmap, with_texel(picked.hit, lightmap), session.solver.patch_edge)
 
 
 @dataclass(frozen=True)

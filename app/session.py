@@ -67,8 +67,7 @@ class Session:
         self.loading: Loading | None = None
         self.load_seconds: dict[str, float] = {}
         self.history = History()
-        self.interrupted = False
-        self.effort = Effort()
+        self.interrupted, self.effort = False, Effort()
         self.seconds, self._pace = 0.0, Pacer(gpu)
         self._books = Books()
         self._settled, self._busy, self._opened = True, False, False
@@ -82,11 +81,12 @@ class Session:
     def open(self, source: str | Path) -> None:
         """Start to load in the background; ``poll`` swaps the scene when it is there."""
         self._stop_loading()
-        self.loading = Loading(source, self.atlas, default_light=self.default_light)
+        self.loading = Loading(source, self.atlas, default_light=self.default_light, expose=self.expose_on_open)
 
     def open_now(self, source: str | Path, progress: Callable[[str, float], None] | None = None) -> None:
         """Load and wait."""
-        for _ in self._swap(load(source, self.atlas, default_light=self.default_light, progress=progress)):
+        light, expose = self.default_light, self.expose_on_open
+        for _ in self._swap(load(source, self.atlas, default_light=light, expose=expose, progress=progress)):
             pass
 
     def set_atlas(self, atlas: AtlasOptions) -> None:
@@ -146,7 +146,7 @@ class Session:
         self.source = self.scene.source or self.scene.name
         if not cut_anew:
             self.look_through(self.scene.cameras[0])
-        if self.expose_on_open and not cut_anew:
+        if loaded.exposure is not None:
             self.display = self.display.replace(exposure=loaded.exposure)
         self.message = None if self.scene.emits else f"{self.scene.name} has no light: try --light for a ceiling light"
         self._opened = True
@@ -195,7 +195,7 @@ class Session:
 
     @property
     def converged(self) -> bool:
-        return self.solver.report.residual <= self.shooting.residual and self.solver.settled
+        return bool(self.solver.report.residual <= self.shooting.residual) and self.solver.settled
 
     @property
     def shooting_goes_on(self) -> bool:

@@ -19,7 +19,8 @@ class Stop:
 
 @dataclass(frozen=True)
 class Stats:
-    """Where the solution stands. residual: unshot share of the emitted power [-]; energies summed over RGB [W]."""
+    """Where the solution stands. residual: unshot share of the emitted power [-]; energies summed over RGB [W];
+    shots_per_second: of late, and of the whole solve once it has converged."""
 
     shots: int
     seconds: float
@@ -45,18 +46,19 @@ class Stats:
 def stats_of(session: Session) -> Stats:
     """Where the solution of an open session stands."""
     book, lightmap = session.books, session.lightmap
+    shots, seconds, done = session.solver.report.shots, session.seconds, session.converged
     return Stats(
-        shots=session.solver.report.shots,
-        seconds=session.seconds,
+        shots=shots,
+        seconds=seconds,
         residual=session.solver.report.residual,
         emitted=float(book.emitted.sum()),
         absorbed=float(book.absorbed.sum()),
         escaped=float(book.escaped.sum()),
         unshot=float(book.unshot.sum()),
         imbalance=book.imbalance_share,
-        shots_per_second=session.history.shots_per_second,
-        converged=session.converged,
-        edit_shots=session.effort.edit_shots(session.solver.report.shots),
+        shots_per_second=shots / seconds if done and seconds > 0 else session.history.shots_per_second,
+        converged=done,
+        edit_shots=session.effort.edit_shots(shots),
         fresh_shots=session.effort.fresh_shots,
         texels=lightmap.texel_count,
         tiles=lightmap.tiles,

@@ -6,6 +6,7 @@ Events go to Dear ImGui through its queue, so that a press shorter than a frame 
 
 from __future__ import annotations
 
+import os
 import string
 import time
 from collections.abc import Callable, Sequence
@@ -128,6 +129,8 @@ def no_display() -> str | None:
 
 def _reason(error: Exception) -> str:
     text = str(error).strip()
+    if type(error).__name__ == "NoSuchDisplayException" and not os.environ.get("DISPLAY"):
+        return "there is no display: DISPLAY is not set"
     return text.splitlines()[0] if text else type(error).__name__
 
 

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from app.atlas.options import AtlasOptions
 from app.bake import json_text, prepare_directory
-from app.bench import measure, published
+from app.bench import equal, measure, published
 from app.bench.report import Column, Row, csv_text, markdown_table
 from app.console import Console, Tell
 from app.errors import UserError
@@ -27,6 +28,7 @@ TRIANGLES = (1_000, 3_000, 10_000, 30_000, 100_000, 300_000)
 TEXELS = (10_000, 30_000, 100_000, 300_000, 1_000_000, 4_000_000)
 AT_TEXELS, AT_TRIANGLES = 100_000, 10_000  # of the sweep over the other
 CONVERGENCE = ("museum", 31_000)
+EQUAL_TEXELS = (8_000, 32_000, 128_000, 256_000)  # uniform ones
 Measure = Callable[[Gpu, float], Row]
 
 
@@ -150,7 +152,7 @@ def write(folder: Path, values: dict[str, Any], tables: Iterable[Table], text: s
 
 
 def all_tables() -> tuple[Table, ...]:
-    return _coombe_1(), _wallner_1(), _scaling(), _convergence(), _wallner_2()
+    return _coombe_1(), _equal(), _wallner_1(), _scaling(), _convergence(), _wallner_2()
 
 
 def table_names(text: str) -> tuple[str, ...]:
@@ -192,6 +194,39 @@ def _coombe_1() -> Table:
         ),
         tuple((row.scene, job(row)) for row in published.COOMBE_TABLE_1),
         Plot("uniform_texels", ("uniform_s", "adaptive_s", "their_uniform_s", "their_adaptive_s"), "", ("texels", "s")),
+    )
+
+
+def _equal() -> Table:
+    def job(texels: int | None) -> tuple[str, Measure]:
+        atlas = AtlasOptions(texels=texels) if texels else AtlasOptions(adaptive=True)
+        return f"{texels:,} uniform texels" if texels else "adaptive", lambda gpu, _: equal.error_row(gpu, atlas)
+
+    return Table(
+        "equal",
+        "Texels and seconds for equal error",
+        "no numbers for this",
+        (
+            f"Cornell box down to {equal.CONVERGED:.1%} unshot, all seconds counted. Error: irradiance at {equal.POINTS} random "
+            f"points against the dense float64 reference of {equal.PATCHES:,} patches.",
+            "Equal: what uniform texels would take for the adaptive ones' RMS, between the measured ones.",
+        ),
+        (
+            Column("subdivision", "subdivision"),
+            Column("texels", "texels", ","),
+            Column("shots", "shots", ","),
+            Column("seconds", "s", ".1f"),
+            Column("rms", "RMS", ".2%"),
+            Column("median", "median", ".2%"),
+            Column("q90", "90 %", ".2%"),
+            Column("equal_texels", "equal texels", ",.0f"),
+            Column("texels_share", "share", ".2f"),
+            Column("equal_seconds", "equal s", ".1f"),
+            Column("seconds_share", "share", ".2f"),
+        ),
+        (*(job(texels) for texels in EQUAL_TEXELS), job(None)),
+        Plot("seconds", ("rms",), "subdivision", ("s", "relative RMS")),
+        equal.compared,
     )
 
 

@@ -13,13 +13,15 @@ import numpy as np
 from app.atlas.lightmap import Lightmap
 from app.render.options import DisplayOptions
 from app.render.sample import sampled_colours, sampled_irradiance, sampled_tiles
-from app.scene.model import F64
+from app.scene.model import F32, F64
 
 WHITE_EFFICACY = 179.0  # lm/W
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec.709 [IEC 61966-2-1]
-BRIGHTEST_SHARE = 99.9  # per cent of the texels that the scale covers
-DECADES = 3.0  # of a logarithmic scale
-NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # tops of a scale, times a power of ten
+# Per cent of the area of what does not emit, between which a scale found from the light runs. A lamp's own luminance, or the
+# illuminance beside it, lies decades above a room's; with them in it all of the room would get one colour.
+SHARES = (1.0, 99.0)
+DECADES = (0.5, 3.0)  # of a logarithmic scale: fewer would be noise, more cannot be told apart
+NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # ends of a scale, times a power of ten
 UNITS = {"illuminance": "lx", "luminance": "cd/m²"}
 LAYER = {"illuminance": "irradiance", "luminance": "combined"}  # the layer whose radiance is measured
 VIRIDIS = np.array(
@@ -49,11 +51,16 @@ def value_per_radiance(kind: str) -> float:
 
 
 def false_colour_scale(display: DisplayOptions, lightmap: Lightmap) -> Scale:
-    """The scale of the display's false colour. With ``false_colour_max`` 0 its top is found from the light: the 99.9th
-    percentile over the texels, lamps left out of luminance, rounded up to a short number. Waits for the GPU."""
-    high = display.false_colour_max or _nice_above(_percentile(display.false_colour, lightmap))
-    low = high / 10**DECADES if display.false_colour_log else 0.0
-    return Scale(low, high, UNITS[display.false_colour])
+    """The scale of the display's false colour, found from the light on what does not emit and rounded to short numbers; only its
+    lower end where ``false_colour_max`` gives the upper one. Waits for the GPU."""
+    kind, high, low = display.false_colour, display.false_colour_max, 0.0
+    if not high or display.false_colour_log:
+        darkest, brightest = _ends(kind, lightmap)
+        high = high or _nice_above(brightest)
+        if display.false_colour_log:
+            fewest, most = DECADES
+            low = _nice_below(min(max(darkest, high / 10**most), high / 10**fewest))
+    return Scale(low, high, UNITS[kind])
 
 
 def colour_map(count: int) -> F64:
@@ -63,20 +70,24 @@ def colour_map(count: int) -> F64:
     return np.asarray(np.clip(powers @ VIRIDIS, 0.0, 1.0))
 
 
-def _percentile(kind: str, lightmap: Lightmap) -> float:
-    """What nearly all illuminance [lx] or, lamps left out, luminance [cd/m²] is below, from an even sample of the tiles."""
-    nodes, irradiance = lightmap.nodes, sampled_irradiance(lightmap)
-    sample = sampled_tiles(nodes)
-    shown = nodes.surfaces.area[sample] > 0
-    radiance = irradiance * np.float32(np.pi)
+def _ends(kind: str, lightmap: Lightmap) -> tuple[float, float]:
+    """Between which the illuminance [lx] or luminance [cd/m²] of nearly all that does not emit lies, from an even sample of the
+    tiles; unlit texels are left out."""
+    nodes, sample = lightmap.nodes, sampled_tiles(lightmap.nodes)
+    materials, area = lightmap.scene.materials, nodes.surfaces.area[sample]
+    emission = sampled_colours(nodes, [m.emission for m in materials], nodes.emission_tiles, sample)
+    light: F32 = sampled_irradiance(lightmap) * np.float32(value_per_radiance(kind) / np.pi)
     if kind == "luminance":
-        emission = sampled_colours(nodes, [m.emission for m in lightmap.scene.materials], nodes.emission_tiles, sample)
-        albedo = sampled_colours(nodes, [m.albedo for m in lightmap.scene.materials], nodes.albedo_tiles, sample)
-        shown &= emission.max(-1) == 0
-        radiance = albedo * irradiance
-    values = radiance[shown] @ LUMINANCE * (WHITE_EFFICACY / np.pi)
-    values = values[np.isfinite(values)]
-    return float(np.percentile(values, BRIGHTEST_SHARE)) if len(values) else 0.0
+        light = light * sampled_colours(nodes, [m.albedo for m in materials], nodes.albedo_tiles, sample)
+    values = light @ LUMINANCE
+    shown = (area > 0) & (emission.max(-1) == 0) & np.isfinite(values) & (values > 0)
+    if not shown.any():
+        return 0.0, 0.0
+    values, area = values[shown], area[shown]
+    order = np.argsort(values)
+    share = np.cumsum(area[order])
+    darkest, brightest = values[order][np.searchsorted(share, np.array(SHARES) / 100 * share[-1])]
+    return float(darkest), float(brightest)
 
 
 def _nice_above(value: float) -> float:
@@ -84,3 +95,8 @@ def _nice_above(value: float) -> float:
         return 1.0
     decade = 10.0 ** np.floor(np.log10(value))
     return float(next(step * decade for step in NICE if value <= step * decade * (1 + 1e-9)))
+
+
+def _nice_below(value: float) -> float:
+    decade = 10.0 ** np.floor(np.log10(value))
+    return float(next(step * decade for step in reversed(NICE) if value >= step * decade * (1 - 1e-9)))

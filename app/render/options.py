@@ -26,5 +26,10 @@ class DisplayOptions(Options):
     false_colour: str = option("off", "false colour with a legend: lux or cd/m²", choices=FALSE_COLOURS)
     false_colour_log: bool = option(True, "logarithmic false-colour scale")
     false_colour_max: float = option(
-        0.0, "top of the false-colour scale; 0 = found from the light", unit="lux or cd/m²", minimum=0, maximum=1e9
+        0.0,
+        "top of the false-colour scale; 0 = found from the light",
+        unit="lux or cd/m²",
+        minimum=0,
+        maximum=1e9,
+        zero="auto",
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -64,7 +64,9 @@ class Picker:
             return None
         x, y, z = lightmap.frame.world_from_local(local[:3].astype(np.float64)).tolist()
         hit = PickHit(int(ids[0]) - 1, bool(ids[1]), int(ids[3]), (x, y, z))
-        return hit if ids[2] == 0 else _with_texel(hit, int(ids[2]) - 1, (float(atlas[0]), float(atlas[1])), lightmap)
+        if ids[2] == 0:
+            return hit
+        return with_texel(replace(hit, facet=int(ids[2]) - 1, atlas_uv=(float(atlas[0]), float(atlas[1]))), lightmap)
 
     def release(self) -> None:
         release_targets(self._gpu, self._target)
@@ -73,12 +75,14 @@ class Picker:
             texture.release()
 
 
-def _with_texel(hit: PickHit, facet: int, uv: tuple[float, float], lightmap: Lightmap) -> PickHit:
-    tile = lightmap.nodes.slot_at(uv)
-    if tile < 0:
-        return hit
+def with_texel(hit: PickHit, lightmap: Lightmap) -> PickHit:
+    """The same point with the texel that it has now: quadtrees change."""
+    uv = hit.atlas_uv
+    tile = -1 if uv is None else lightmap.nodes.slot_at(uv)
+    if uv is None or tile < 0:
+        return replace(hit, texel=None, tile=None, tile_texel=None)
     leaves, edge = lightmap.nodes.leaves, lightmap.nodes.tile
     finer = 2 ** int(leaves.level[tile])
     inside = (int(uv[0] * finer) - int(leaves.x[tile]) * edge, int(uv[1] * finer) - int(leaves.y[tile]) * edge)
     texel = (tile % lightmap.columns * edge + inside[0], tile // lightmap.columns * edge + inside[1])
-    return PickHit(hit.triangle, hit.back, hit.material, hit.position, facet, uv, texel, tile, inside)
+    return replace(hit, texel=texel, tile=tile, tile_texel=inside)

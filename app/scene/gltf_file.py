@@ -70,6 +70,8 @@ class GltfFile:
         try:
             self.document = Document.model_validate_json(text)
         except ValidationError as error:
+            if any(problem["loc"] == ("asset",) and problem["type"] == "missing" for problem in error.errors()):
+                raise self.error('not a glTF file: it has no "asset"') from error
             raise self.error(first_problem(error)) from error
         self._check_versions()
         self._buffers: dict[int, memoryview] = {}

@@ -1,4 +1,4 @@
-"""A cave: an ellipsoid pushed about by value noise, with a levelled floor, stalagmites, a glowing pool and crystals.
+"""A cave: an ellipsoid pushed about by value noise, with a levelled floor, stalagmites, a pool and glowing crystals.
 
 Deterministic: noise and places come from an integer hash (the finaliser of MurmurHash3), never from a random generator,
 so that the same file is the same cave everywhere. Some 35 000 triangles of uneven size, few of them coplanar.

@@ -89,6 +89,8 @@ def with_ceiling_light(scene: Scene) -> Scene:
 def scene_file(source: str | Path) -> Path:
     """The file that ``source`` means; a name of the library wins unless a file of that name exists."""
     path, shown = Path(source).expanduser(), one_line(str(source))[:200]
+    if not str(source).strip():
+        raise SceneError("scene", f"its name is empty; {_allowed()}")
     if str(source) in scene_names() and not path.is_file():
         return scene_path(str(source))
     try:

@@ -24,7 +24,7 @@ class Ui:
 
     scale: size of text and spacing, 1 on an ordinary screen. layout_file: where the places of the panels are kept
     between runs. scenes: names or files offered in the menu. suffixes: of the files that can be opened; none: all
-    files. measured: whether numbers that depend on the machine's speed are shown.
+    files. measured: whether numbers that depend on the machine's speed are shown. live: whether frames follow each other.
     """
 
     def __init__(
@@ -36,6 +36,7 @@ class Ui:
         suffixes: Sequence[str] = (),
         native_dialog: bool | None = None,
         measured: bool = True,
+        live: bool = True,
     ) -> None:
         self._context = imgui.create_context()
         self._plots = implot.create_context()
@@ -45,7 +46,7 @@ class Ui:
         io.config_windows_move_from_title_bar_only = True
         io.set_ini_filename(str(layout_file) if layout_file else None)
         theme.apply(scale)
-        self.state = State(measured=measured, scenes=tuple(scenes))
+        self.state = State(measured=measured, live=live, scenes=tuple(scenes))
         self._dialog = FileDialog(suffixes, native=native_dialog)
 
     def use(self) -> None:

@@ -10,10 +10,11 @@ from typing import Any
 
 from imgui_bundle import imgui, portable_file_dialogs
 
-from app.ui import theme
+from app.ui import theme, widgets
 
 TITLE = "Open a scene"
 HELPERS = ("zenity", "kdialog", "matedialog", "qarma")  # what the system's dialog needs on Linux
+AUTHORED = "The scenes that come along are under File > Scenes."
 SIZE_EM = (36.0, 26.0)
 
 
@@ -79,7 +80,11 @@ class FileDialog:
             0
         ]:
             self._folder = self._folder.parent
-        for entry in readable(self._folder, self._suffixes):
+        entries = readable(self._folder, self._suffixes)
+        if not any(entry.is_file() for entry in entries):
+            wanted = f" ({' '.join(self._suffixes)})" if self._suffixes else ""
+            widgets.wrapped(f"No scene files{wanted} here. {AUTHORED}", theme.DIM)
+        for entry in entries:
             folder = entry.is_dir()
             icon = theme.ICONS.ICON_FA_FOLDER if folder else theme.ICONS.ICON_FA_CUBE
             if imgui.selectable(f"{icon}  {entry.name}", False, imgui.SelectableFlags_.no_auto_close_popups)[0]:

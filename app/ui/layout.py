@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 SIDE_EM = 20.5  # width of the side docks, in font heights: the widest fact fits
 BOTTOM_SHARE = 0.27  # height of the lower dock, of the window
 SCENE_EM, DISPLAY_EM = 28.7, 18.5  # heights that the upper panels need; what is below them gets the rest
+FOLDED_EM = 20.8  # in a low window the Scene panel opens with its last section folded
 HIGHEST_UPPER = 0.54  # of a low window for them
 WIDEST_SIDES = 0.3  # of a narrow window for each side dock
 
@@ -83,7 +84,8 @@ def _build(space: int) -> None:
     _, right, rest = build.dock_builder_split_node_py(rest, imgui.Dir.right, side / (1 - side))
     _, bottom, _ = build.dock_builder_split_node_py(rest, imgui.Dir.down, BOTTOM_SHARE)
     upper_left, upper_right = (
-        min(height * imgui.get_font_size() / area.y, HIGHEST_UPPER) for height in (SCENE_EM, DISPLAY_EM)
+        min(height * imgui.get_font_size() / area.y, HIGHEST_UPPER)
+        for height in (SCENE_EM if scene.has_room() else FOLDED_EM, DISPLAY_EM)
     )
     _, left_top, left = build.dock_builder_split_node_py(left, imgui.Dir.up, upper_left)
     _, right_top, right = build.dock_builder_split_node_py(right, imgui.Dir.up, upper_right)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from imgui_bundle import imgui
 
+from app.picking import read_again
 from app.ui import theme
 from app.ui.state import State
 
@@ -116,28 +117,28 @@ def _advance_flight(session: Session, state: State, seconds: float) -> None:
 
 def _pick(session: Session, state: State, x: float, y: float) -> None:
     """Inspect what is seen at (x, y) [display units from the view's top left]."""
-    state.picked_px = int(x * state.ratio), int(y * state.ratio)
-    _look_again(session, state)
-
-
-def _look_again(session: Session, state: State) -> None:
+    pixel = int(x * state.ratio), int(y * state.ratio)
     state.picked_age = 0.0
-    state.picked_view = session.view.copy()
 
     def look() -> None:
-        state.picked = session.pick(*state.picked_px)
+        state.picked = session.pick(*pixel)
 
     state.act(look)
 
 
 def _refresh(session: Session, state: State, seconds: float) -> None:
-    """While light is being shot and the eye has not moved, what was picked is read again now and then."""
+    """While light is being shot, the point that was picked is read again now and then: the point and not the pixel, which shows
+    another one when the eye moves or the view gets another size."""
     state.picked_age += seconds
-    before, now = state.picked_view, session.view
-    if state.picked is None or before is None or not session.running or state.picked_age < REFRESH_SECONDS:
+    picked = state.picked
+    if picked is None or not session.running or state.picked_age < REFRESH_SECONDS:
         return
-    if before.distance == now.distance and np.array_equal(before.world_from_camera, now.world_from_camera):
-        _look_again(session, state)
+    state.picked_age = 0.0
+
+    def look() -> None:
+        state.picked = read_again(session, picked)
+
+    state.act(look)
 
 
 def _marker(session: Session, state: State) -> None:

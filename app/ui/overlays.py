@@ -109,9 +109,11 @@ def _status(session: Session, state: State) -> list[tuple[str, theme.RGBA]]:
         if session.running
         else ("paused", theme.TEXT)
     )
-    parts = [f"{stats.shots:,} shots", f"residual {widgets.percent(stats.residual)}"]
+    parts = [f"{widgets.percent(stats.residual)} unshot", f"{stats.shots:,} shots"]
     if state.measured:
-        parts += [f"{widgets.number(stats.shots_per_second, 3)} shots/s", f"{state.fps:.0f} fps"]
+        parts += [f"{widgets.number(stats.shots_per_second, 3)} shots/s"]
+    if state.measured and state.live:
+        parts += [f"{state.fps:.0f} fps"]
     return [(session.name, theme.TEXT), (word, colour), *((part, theme.DIM) for part in parts)]
 
 
@@ -119,7 +121,9 @@ def help_overlay(state: State) -> None:
     """All keys, while F1 is on."""
     if not state.show_help:
         return
-    imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
+    left, top, width, height = state.view_px
+    middle = imgui.ImVec2(left + width / 2, top + height / 2)
+    imgui.set_next_window_pos(middle, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
     imgui.begin("##help", None, FLOATING)
     if imgui.begin_table("keys", 2, imgui.TableFlags_.sizing_fixed_fit):
         for label, meaning in (*((s.label, s.help) for s in SHORTCUTS), *POINTER):

@@ -13,7 +13,6 @@ from app.options import Options, option
 if TYPE_CHECKING:
     from app.atlas.options import AtlasOptions
     from app.picking import Picked
-    from app.render.camera import CameraView
     from app.session import Stats
     from app.ui.navigation import Flight
 
@@ -65,12 +64,14 @@ class State:
     """Everything that belongs to the interface and not to the session.
 
     measured: whether numbers that depend on the machine's speed are shown (off for pictures that are compared).
+    live: whether frames follow each other, so that there is a rate of them.
     texture_id: makes a texture of the host drawable; legend: the scale of what is shown now; stats: of the session,
     asked once per frame (None without a scene). atlas: edited, not yet applied. view_px: the 3-D view (left, top,
     width, height) [display units].
     """
 
     measured: bool = True
+    live: bool = True
     scenes: tuple[str, ...] = ()
     texture_id: Callable[[Any], int] | None = None
     legend: Legend | None = None
@@ -87,8 +88,6 @@ class State:
     fps: float = 0.0
     picked: Picked | None = None
     picked_age: float = 0.0
-    picked_px: tuple[int, int] = (0, 0)
-    picked_view: CameraView | None = None
     hemicube: tuple[object, Any, int] | None = None
     hemicube_age: float = 0.0
     inset: tuple[object, Any] | None = None
@@ -98,7 +97,7 @@ class State:
     material: int = 0
     atlas: AtlasOptions | None = None
     emission_colours: dict[int, RGB] = field(default_factory=dict)
-    plot_over_seconds: bool = False
+    plot: str = "shots"
     toasts: list[Toast] = field(default_factory=list)
     last_message: str | None = None
     requests: list[Request] = field(default_factory=list)

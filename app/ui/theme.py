@@ -55,7 +55,7 @@ _COLOURS: dict[imgui.Col_, RGBA] = {
     _C.scrollbar_grab_hovered: _rgba(0x5A5A60),
     _C.scrollbar_grab_active: _rgba(0x6B6B72),
     _C.check_mark: AMBER,
-    _C.slider_grab: _rgba(0x8F6832),
+    _C.slider_grab: _rgba(0x6B4F2A),
     _C.slider_grab_active: AMBER,
     _C.button: _rgba(0x333338),
     _C.button_hovered: _rgba(0x45454B),
@@ -107,7 +107,7 @@ def apply(scale: float = 1.0) -> None:
     style.item_inner_spacing = imgui.ImVec2(6, 4)
     style.cell_padding = imgui.ImVec2(5, 2)
     style.scrollbar_size = 11.0
-    style.grab_min_size = 10.0
+    style.grab_min_size = 7.0
     style.docking_separator_size = 2.0
     style.window_menu_button_position = imgui.Dir.none
     style.scale_all_sizes(scale)
@@ -138,9 +138,10 @@ def _style_plots() -> None:
         implot.Col_.crosshairs: AMBER,
     }.items():
         style.set_color_(index, imgui.ImVec4(*colour))
-    style.plot_padding = imgui.ImVec2(4, 4)
+    style.plot_padding = imgui.ImVec2(16, 4)  # half a label stands out on the right
     style.label_padding = imgui.ImVec2(4, 3)
     style.legend_inner_padding = imgui.ImVec2(6, 4)
+    style.legend_padding = imgui.ImVec2(8, 2)
     style.minor_alpha = 0.35
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,11 +24,18 @@ TOOLTIP_EM = 22.0
 TOOLTIP = int(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)
 
 
-def edit_options(options: OptionsT, *, skip: Iterable[str] = (), starts: Mapping[str, Any] | None = None) -> OptionsT:
+def edit_options(
+    options: OptionsT,
+    *,
+    skip: Iterable[str] = (),
+    starts: Mapping[str, Any] | None = None,
+    units: Mapping[str, str] | None = None,
+) -> OptionsT:
     """One widget per declared option; returns ``options`` itself, or a checked copy where something was changed.
 
     A right-click or double-click puts the default back. Labels of options that are not at their default are bright.
-    ``starts`` are the values that optional ones have while they are not given one, and begin with when they are.
+    ``starts`` are the values that optional ones have while they are not given one, and begin with when they are; ``units`` what
+    is shown instead of the declared unit.
     """
     imgui.push_id(type(options).__name__)
     changes: dict[str, Any] = {}
@@ -35,7 +43,8 @@ def edit_options(options: OptionsT, *, skip: Iterable[str] = (), starts: Mapping
     for spec in _specs(kind):
         if spec.name not in skip:
             value = getattr(options, spec.name)
-            edited = edit_option(spec, value, (starts or {}).get(spec.name))
+            shown_as = dataclasses.replace(spec, unit=units[spec.name]) if units and spec.name in units else spec
+            edited = edit_option(shown_as, value, (starts or {}).get(spec.name))
             if edited != value:
                 changes[spec.name] = edited
     imgui.pop_id()
@@ -106,7 +115,10 @@ def _editor(spec: Spec, value: Any) -> Any:
 def _number(spec: Spec, value: float) -> float:
     """A slider where the range is one that a hand can set, else a drag. What is no number changes nothing."""
     unit = " " + spec.unit.replace("%", "%%") if spec.unit else ""
-    text = ("%d" if spec.type is int else "%.4g") + unit
+    # Dear ImGui shows a format without a number as it stands
+    text = (f"{value:,}" if spec.type is int else "%.4g") + unit
+    if value == 0 and spec.zero:
+        text = spec.zero
     flags = SLIDER
     low, high = spec.minimum, spec.maximum
     if low is not None and high is not None and (spec.logarithmic or high - low <= WIDE_SPAN):
@@ -183,6 +195,18 @@ def section(text: str) -> None:
     imgui.separator_text(text)
 
 
+def fold(text: str, *, opened: bool = True) -> bool:
+    """A headline that folds away what is below it; whether that is shown. opened: at first."""
+    imgui.set_next_item_open(opened, imgui.Cond_.once)
+    clear = imgui.ImVec4(0, 0, 0, 0)
+    imgui.push_style_color(imgui.Col_.header, clear)
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, imgui.ImVec2(0, imgui.get_style().frame_padding.y))
+    shown = imgui.collapsing_header(text)
+    imgui.pop_style_var()
+    imgui.pop_style_color()
+    return shown
+
+
 def number(value: float, digits: int = 4) -> str:
     """``digits`` significant ones, thousands apart, no exponent between 0.001 and a million."""
     if value == 0 or not math.isfinite(value):
@@ -194,15 +218,11 @@ def number(value: float, digits: int = 4) -> str:
 
 
 def percent(fraction: float) -> str:
-    """A fraction as per cent, with more digits the smaller it is."""
+    """A fraction as per cent: one decimal from 10 on, two down to 0.1, then two digits."""
     share = fraction * 100
-    return (
-        f"{share:.1f} %"
-        if abs(share) >= 10
-        else f"{share:.2f} %"
-        if abs(share) >= 0.1 or share == 0
-        else f"{share:.4f} %"
-    )
+    if not math.isfinite(share) or share == 0 or abs(share) >= 0.1:
+        return f"{share:.1f} %" if abs(share) >= 10 else f"{share:.2f} %"
+    return f"{share:.{min(1 - math.floor(math.log10(abs(share))), 9)}f} %"
 
 
 def triple(values: Sequence[float], digits: int = 4) -> str:

@@ -171,10 +171,20 @@ def test_no_display_renders_headless_and_says_where(tmp_path: Path) -> None:
         command, env=environment(None), cwd=tmp_path, capture_output=True, text=True, timeout=2 * PATIENCE
     )
     assert done.returncode == 0, done.stderr
-    assert "cornell-box.png" in done.stdout + done.stderr
+    assert "cornell-box.png" in done.stdout + done.stderr and "there is no display" in done.stderr
     image = np.asarray(Image.open(tmp_path / "cornell-box.png"))
     assert image.shape == (SIZE[1], SIZE[0], 3)
     assert image[:, :280].std() > 10 and image[60:480, 420:860].std() > 20  # panels and a lit box
+
+
+def test_frames_of_a_window_are_not_counted_without_one(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "app", "view", "furnace", "--frames", "3"]
+    done = subprocess.run(
+        command, env=environment(None), cwd=tmp_path, capture_output=True, text=True, timeout=PATIENCE
+    )
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 2 and "--frames 3" in line and "there is no display" in line
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("scene", ["no-such-scene", "no/such/file.glb"])

@@ -17,7 +17,7 @@ from app.gpu import Gpu
 from app.render.camera import CameraView
 from app.render.develop import encode_srgb
 from app.render.exposure import exposure_of
-from app.render.false_colour import LUMINANCE, Scale, colour_map, false_colour_scale
+from app.render.false_colour import LUMINANCE, colour_map, false_colour_scale
 from app.render.frame import FrameRenderer
 from app.render.options import INTERPOLATIONS, LAYERS, TONE_MAPS, DisplayOptions
 from app.render.targets import release_targets
@@ -386,8 +386,10 @@ def test_false_colour_is_the_colour_of_the_value(gpu: Gpu, box: Lightmap, logari
         false_colour="illuminance", false_colour_max=high, false_colour_log=logarithmic, exposure=7
     )
     scale = false_colour_scale(display, box)
-    assert scale == Scale(high / 1000 if logarithmic else 0.0, high, "lx")
-    place = np.log10(max(share, 1e-3)) / 3 + 1 if logarithmic else share
+    assert scale.high == high and scale.unit == "lx"
+    assert (0 < scale.low < high) if logarithmic else scale.low == 0
+    low = scale.low
+    place = np.log(max(share * high, low) / low) / np.log(high / low) if logarithmic else share
     expected = colour_map(1001)[round(place * 1000)]
     x, y = SIZE[0] // 2, SIZE[1] // 3
     # the legend is sampled in steps of 1/1000 here, less than half a step of 8 bits
@@ -398,6 +400,20 @@ def mean_residual(lightmap: Lightmap) -> np.ndarray:
     """r̄ over all texels, RGB [W/m²]."""
     area = lightmap.nodes.surfaces.area
     return np.einsum("tijc,tij->c", lightmap.residual().astype(np.float64), area) / area.sum()
+
+
+def test_a_logarithmic_scale_spans_what_is_lit(box: Lightmap) -> None:
+    """From what is nearly the darkest to nearly the brightest of what does not emit, however bright a lamp is."""
+    rng = np.random.default_rng(7)
+    lux = 10 ** rng.uniform(1, 3, box.nodes.surfaces.area.shape)
+    emits = np.array([m.emits for m in box.scene.materials])
+    face = box.nodes.surfaces.face
+    lamp = emits[box.scene.material_ids[box.charts.face_triangle[face]]] & (face >= 0)
+    assert lamp.any()
+    lux[lamp] = 1e6
+    put(box, "t_irradiance", np.repeat((lux / 179)[..., None], 3, -1))
+    low, high, _ = false_colour_scale(DisplayOptions(false_colour="illuminance"), box)
+    assert 8 <= low <= 12 and 900 <= high <= 1200  # 1 % and 99 % of two decades, rounded outwards to short numbers
 
 
 def test_scale_and_exposure_come_from_the_light(box: Lightmap) -> None:

@@ -19,6 +19,9 @@ from app.atlas.lightmap import STORAGE
 from app.atlas.options import AtlasOptions
 from app.errors import SceneError, UserError
 from app.gpu import Gpu
+from app.headless import picture
+from app.picking import read_again
+from app.render.false_colour import colour_map
 from app.session import Session, Stop
 from app.solvers import ShootingOptions
 from app.solving import share_done
@@ -365,3 +368,33 @@ def test_picking_reads_the_light_and_changes_none(session: Session, storage: str
     np.testing.assert_allclose(picked.B, np.add(picked.E, np.multiply(picked.albedo, picked.H)), rtol=1e-6)
     np.testing.assert_array_equal(session.lightmap.irradiance(), before)
     session.gpu.release_all(target, texture)
+
+
+def test_a_picked_point_is_found_again_in_a_tree_that_grew(gpu: Gpu) -> None:
+    session = Session(gpu, atlas=AtlasOptions(texels=1500, adaptive=True))
+    session.open_now("cornell-box")
+    texture = gpu.texture((64, 48), 4, "f1")
+    target = gpu.target(texture)
+    session.draw(target, (64, 48))
+    first = {at: session.pick(*at) for at in ((10, 24), (32, 40), (40, 44), (40, 12))}
+    session.solve(Stop(shots=300))
+    again = {at: read_again(session, picked) for at, picked in first.items()}
+    assert any(again[at].texel != first[at].texel for at in first), "leaves have split under some of the points"
+    for at, picked in again.items():
+        assert picked.position == first[at].position and picked.triangle == first[at].triangle
+        assert picked.H == session.pick(*at).H != first[at].H, "as if picked now"
+    session.release()
+    gpu.release_all(target, texture)
+
+
+def test_a_false_colour_picture_has_its_legend(session: Session) -> None:
+    session.open_now("cornell-box")
+    session.solve(Stop(shots=30))
+    session.display = session.display.replace(false_colour="illuminance", layer="albedo")
+    image = picture(session, (640, 360)) / 255
+    corner = image[:300, :140]
+    for colour in colour_map(48)[[0, 12, 24, 36, 47]]:
+        assert (np.abs(corner - colour).max(-1) < 1.5 / 255).sum() > 30, "every part of the scale is there"
+    session.display = session.display.replace(false_colour="off")
+    plain = picture(session, (640, 360))[:300, :140] / 255
+    assert (np.abs(plain - colour_map(48)[24]).max(-1) < 1.5 / 255).sum() == 0

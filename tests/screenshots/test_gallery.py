@@ -54,7 +54,7 @@ class Reel:
     adaptive: bool = False
 
 
-CORNELL_EV = 1.0  # one exposure for the whole series, so that it shows the light coming in
+CORNELL_EV = 1.8  # automatic when solved; one for the whole series, so that it shows the light coming in
 REELS = (
     Reel(
         "cornell-box",
@@ -92,15 +92,15 @@ REELS = (
     Reel("textured-room", 60_000, ShootingOptions(level=3, residual=3e-2), (Picture("textured-room"),)),
     Reel(
         "two-rooms",
-        25_000,
+        16_000,
         ShootingOptions(coarsen=False),  # large patches would throw stripes through the door
         (
-            Picture("two-rooms", 2000, exposure=4.0),  # for the dark room; automatic is for both
-            Picture("false-colour-lux", 2000, camera=1, display={"false_colour": "illuminance"}),
+            Picture("two-rooms", 2500, exposure=4.0),  # for the dark room; automatic is for both
+            Picture("false-colour-lux", 2500, camera=1, display={"false_colour": "illuminance"}),
         ),
     ),
     Reel("museum", 80_000, ShootingOptions(level=3), (Picture("museum", 700), Picture("museum-aisle", 700, camera=1))),
-    Reel("grotto", 60_000, ShootingOptions(level=3), (Picture("grotto", 500, exposure=0.0),)),
+    Reel("grotto", 60_000, ShootingOptions(level=3), (Picture("grotto", 400, exposure=1.2),)),
 )
 
 

@@ -21,7 +21,7 @@ from app.session import Session, Stop
 ROOT = Path(__file__).parent.parent.parent
 FAILED = Path(__file__).parent / "failed"
 SIZE = (1280, 720)
-SHOTS = 200
+SHOTS = 1000
 STEP = 8  # of 255: what the last bit of a float does to a pixel after exposure and tone curve
 SHARE = (
     0.005  # of the pixels may differ by more: a digit of a number that stands on the edge of rounding, a line of a plot
@@ -40,10 +40,9 @@ def test_the_viewer_looks_as_it_did(request: pytest.FixtureRequest, name: str) -
     golden = ROOT / "screenshots" / f"{name}.png"
     atlas, display = GOLDENS[name]
     with gpu_context() as gpu:
-        session = Session(gpu, atlas=atlas, display=display)
+        session = Session(gpu, atlas=atlas, display=display, expose_on_open=True)
         session.open_now("cornell-box")
         session.solve(Stop(shots=SHOTS))
-        session.expose()
         image = ui_image(gpu, session, SIZE, measured=False)
         session.release()
         software = gpu.software

@@ -115,6 +115,7 @@ BAD = [
     (SHOT + "--density 10 --texels 100", "only one of the two"),
     # flags that do not exist
     (SHOT + "--bogus", "unknown argument --bogus"),
+    (SHOT + "--nonsense", "unknown argument --nonsense (see"),
     (SHOT + "--shot 3", "did you mean --shots?"),
     (SHOT + "--resolutoin=256", "did you mean --resolution?"),
     (SHOT + "extra", "unknown argument extra"),

@@ -170,6 +170,7 @@ NOT_GLTF = {
     "list": b"[]",
     "open": b"{",
     "number": b'{"asset": 3}',
+    "other json": b'{"a": 1}',
     "nan": b'{"asset": {"version": "2.0"}, "nodes": [{"scale": [NaN, 1, 1]}]}',
     "huge int": b'{"asset": {"version": "2.0"}, "scene": ' + b"9" * 400 + b"}",
     "deep": b'{"asset": ' + b"[" * 100_000,

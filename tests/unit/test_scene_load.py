@@ -42,6 +42,7 @@ REFUSED = {
     "furnace.tom": "there is no such file or scene",
     "castle.glb": "allowed are files .glb .gltf .obj .ply .stl .toml and the scenes cornell-box",
     ".": "is a folder",
+    "": "scene: its name is empty",
     "notes.txt": "unknown format '.txt'",
     "bare": "unknown format ''",
     "a\0b\nc": "a b c: ",

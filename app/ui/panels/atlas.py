@@ -46,7 +46,6 @@ class Place:
 
 def draw(session: Session, state: State) -> None:
     """The picture as large as the panel has room for; made only while it is in sight."""
-    widgets.section("Atlas")
     place = _place(session.charts.size, state.ratio)
     image = _image(session, state, place) if imgui.is_rect_visible(place.size) else None
     if image is None or state.texture_id is None:

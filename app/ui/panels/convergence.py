@@ -15,47 +15,72 @@ if TYPE_CHECKING:
 
 MOST_POINTS = 400  # per curve: more cannot be told apart in a panel
 SMALLEST = 1e-6  # of the power emitted, for the logarithmic axis
-LEGEND_EM = 20.0  # a narrower plot has no legend: the colours are those of the Solver panel
+PLOT_EM = 20.0  # width of a plot with its legend
 TIMINGS_EM = 19.0  # width of the table of passes: the longest name and its bar
+AXES = ("shots", "seconds")
 AXIS = int(implot.AxisFlags_.auto_fit | implot.AxisFlags_.no_highlight)
-NO_LEGEND = int(implot.Flags_.no_legend)
+LEGEND = int(implot.LegendFlags_.no_menus | implot.LegendFlags_.outside | implot.LegendFlags_.horizontal)
 PLOT = int(implot.Flags_.no_mouse_text | implot.Flags_.no_menus | implot.Flags_.no_box_select)
 
 
 def draw(session: Session, state: State) -> None:
-    """The whole panel: two plots side by side, and the passes to the right."""
+    """The whole panel: what is shown, two plots side by side, and where there is room the passes to the right."""
+    em, gap = imgui.get_font_size(), imgui.get_style().item_spacing.x
+    passes = bool(session.timings) and state.measured
+    beside = passes and imgui.get_content_region_avail().x > (2 * PLOT_EM + TIMINGS_EM) * em
+    choices = (*AXES, "passes") if passes and not beside else AXES
+    shown = state.plot if state.measured and state.plot in choices else "shots"
+    if state.measured:
+        _choice(state, shown, choices)
+    area = imgui.get_content_region_avail()
+    if shown == "passes":
+        _passes(session, imgui.ImVec2(area.x, area.y))
+        return
+    table = TIMINGS_EM * em if beside else 0.0
+    _plots(
+        session,
+        imgui.ImVec2((area.x - (table + gap if table else 0.0) - gap) / 2, area.y),
+        shown,
+        named=not state.measured,
+    )
+    if table:
+        imgui.same_line()
+        _passes(session, imgui.ImVec2(table, area.y))
+
+
+def _choice(state: State, shown: str, choices: tuple[str, ...]) -> None:
+    """One line: what is plotted over, or the passes; and how fast it goes."""
+    assert state.stats is not None
+    for choice in choices:
+        if imgui.radio_button(choice, shown == choice):
+            state.plot = choice
+        imgui.same_line()
+    widgets.dim(f"{widgets.number(state.stats.shots_per_second, 3)} shots/s")
+
+
+def _plots(session: Session, size: imgui.ImVec2, label: str, *, named: bool) -> None:
+    """Over a column of the history; ``named`` writes which below."""
     history = session.history
     rows = np.flatnonzero(np.isfinite(history.column("residual")) & np.isfinite(history.column("absorbed")))
     chosen = rows[np.unique(np.linspace(0, max(len(rows) - 1, 0), min(len(rows), MOST_POINTS)).astype(int))]
-    over_seconds = state.plot_over_seconds and state.measured
-    x = history.column("seconds" if over_seconds else "shots")[chosen]
+    x = history.column(label)[chosen]
     curves = {n: history.column(n)[chosen] for n in ("residual", "absorbed", "escaped")}
-    area = imgui.get_content_region_avail()
-    table = imgui.get_font_size() * TIMINGS_EM if session.timings and state.measured else 0.0
-    gap = imgui.get_style().item_spacing.x
-    size = imgui.ImVec2((area.x - (table + gap if table else 0.0) - gap) / 2, area.y)
-    label = "seconds" if over_seconds else "shots"
-    _residual(size, x, curves["residual"], label)
+    _residual(size, x, curves["residual"], label if named else None)
     imgui.same_line()
-    _energy(size, x, curves, label)
-    if table:
-        imgui.same_line()
-        imgui.begin_child("passes", imgui.ImVec2(table, area.y))
-        _passes(session, state)
-        imgui.end_child()
+    _energy(size, x, curves, label if named else None)
 
 
-def _begin(name: str, size: imgui.ImVec2, label: str) -> bool:
-    flags = PLOT if size.x > LEGEND_EM * imgui.get_font_size() else PLOT | NO_LEGEND
-    if not implot.begin_plot(name, size, flags):
+def _begin(name: str, size: imgui.ImVec2, label: str | None) -> bool:
+    """The legend stands above the plot, in place of a title."""
+    if not implot.begin_plot(f"##{name}", size, PLOT):
         return False
     implot.setup_axis(implot.ImAxis_.x1, label, AXIS)
-    implot.setup_legend(implot.Location_.south_east, int(implot.LegendFlags_.no_menus))
+    implot.setup_legend(implot.Location_.north, LEGEND)
     return True
 
 
-def _residual(size: imgui.ImVec2, x: np.ndarray, residual: np.ndarray, label: str) -> None:
-    if _begin("Residual / emitted", size, label):
+def _residual(size: imgui.ImVec2, x: np.ndarray, residual: np.ndarray, label: str | None) -> None:
+    if _begin("residual", size, label):
         lowest = max(float(residual.min(initial=1.0)), SMALLEST)
         decade = 10.0 ** min(np.floor(np.log10(lowest)), -1.0)  # whole decades, at least one
         implot.setup_axis(implot.ImAxis_.y1, None, int(implot.AxisFlags_.no_highlight))
@@ -63,13 +88,13 @@ def _residual(size: imgui.ImVec2, x: np.ndarray, residual: np.ndarray, label: st
         implot.setup_axis_limits(implot.ImAxis_.y1, decade, 1.0, implot.Cond_.always)
         if len(x):
             line = implot.Spec(line_color=imgui.ImVec4(*theme.AMBER), line_weight=2.0)
-            implot.plot_line("residual", x, np.maximum(residual, SMALLEST), line)
+            implot.plot_line("residual / emitted", x, np.maximum(residual, SMALLEST), line)
         implot.end_plot()
 
 
-def _energy(size: imgui.ImVec2, x: np.ndarray, curves: dict[str, np.ndarray], label: str) -> None:
+def _energy(size: imgui.ImVec2, x: np.ndarray, curves: dict[str, np.ndarray], label: str | None) -> None:
     """Where the emitted power is, stacked: absorbed, escaped, residual [fraction]."""
-    if _begin("Energy / emitted", size, label):
+    if _begin("energy", size, label):
         implot.setup_axis(implot.ImAxis_.y1, None, int(implot.AxisFlags_.no_highlight))
         implot.setup_axis_limits(implot.ImAxis_.y1, 0.0, 1.0, implot.Cond_.always)
         names = (("absorbed", theme.ABSORBED), ("escaped", theme.ESCAPED), ("residual", theme.UNSHOT))
@@ -82,25 +107,25 @@ def _energy(size: imgui.ImVec2, x: np.ndarray, curves: dict[str, np.ndarray], la
         implot.end_plot()
 
 
-def _passes(session: Session, state: State) -> None:
-    over = state.plot_over_seconds
-    if imgui.radio_button("shots", not over):
-        state.plot_over_seconds = False
-    imgui.same_line()
-    if imgui.radio_button("seconds", over):
-        state.plot_over_seconds = True
-    imgui.same_line()
-    widgets.dim(f"{widgets.number(session.history.shots_per_second, 3)} shots/s")
-    if not imgui.begin_table("timings", 2, imgui.TableFlags_.sizing_stretch_prop | imgui.TableFlags_.row_bg):
+def _passes(session: Session, size: imgui.ImVec2) -> None:
+    """Milliseconds of each pass, in as many columns as there is room for; whole rows only."""
+    timings = list(session.timings.items())
+    columns = max(int(size.x // (TIMINGS_EM * imgui.get_font_size())), 1)
+    row = imgui.get_text_line_height() + 2 * imgui.get_style().cell_padding.y
+    height = max(size.y // row, 1) * row
+    flags = imgui.TableFlags_.sizing_stretch_prop | imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y
+    if not imgui.begin_table("timings", 2 * columns, flags, imgui.ImVec2(size.x, height)):
         return
-    imgui.table_setup_column("pass", imgui.TableColumnFlags_.width_fixed)
-    imgui.table_setup_column("ms", imgui.TableColumnFlags_.width_stretch)
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, imgui.ImVec2(0, 0))  # a bar would push the next label down
+    for column in range(columns):
+        imgui.table_setup_column(f"pass {column}", imgui.TableColumnFlags_.width_fixed)
+        imgui.table_setup_column(f"ms {column}", imgui.TableColumnFlags_.width_stretch)
     longest = max(session.timings.values())
-    for label, ms in session.timings.items():
-        imgui.table_next_row()
+    for label, ms in timings:
         imgui.table_next_column()
         imgui.text_unformatted(label)
         imgui.table_next_column()
-        height = imgui.get_text_line_height()
-        imgui.progress_bar(ms / longest if longest > 0 else 0.0, imgui.ImVec2(-1, height), f"{ms:.2f} ms")
+        line = imgui.ImVec2(-1, imgui.get_text_line_height())
+        imgui.progress_bar(ms / longest if longest > 0 else 0.0, line, f"{ms:.2f} ms")
+    imgui.pop_style_var()
     imgui.end_table()

@@ -23,23 +23,31 @@ def draw(session: Session, state: State) -> None:
     if state.picked is None:
         widgets.wrapped("Click a surface to read its texel.", theme.DIM)
     else:
-        _picked(session, state.picked)
+        if widgets.fold("Surface"):
+            _surface(session, state.picked)
+        if widgets.fold("Light [W/m²]"):
+            _light(state.picked)
+    if widgets.fold("What the last shooter saw"):
+        _shooter(session, state)
+    if widgets.fold("Atlas"):
+        atlas.draw(session, state)
+
+
+def _shooter(session: Session, state: State) -> None:
     image, vanished = _hemicube(session, state)
-    if image is not None and state.texture_id is not None:
-        widgets.section("What the last shooter saw")
-        width = widgets.steady_width()
-        reference = imgui.ImTextureRef(state.texture_id(image))
-        imgui.image(
-            reference,
-            imgui.ImVec2(width, width * image.size[1] / image.size[0]),
-            imgui.ImVec2(0, 1),
-            imgui.ImVec2(1, 0),
-        )
-        widgets.tooltip(f"What the patch that shot last sees, one colour per surface: {session.shooting.projection}")
-        if vanished:
-            widgets.facts("small", [("Smaller than a sample", f"{vanished:,} triangles")])
-            widgets.tooltip("They lie between the samples of this map, and are drawn as one sample each")
-    atlas.draw(session, state)
+    if image is None or state.texture_id is None:
+        return
+    width = widgets.steady_width()
+    imgui.image(
+        imgui.ImTextureRef(state.texture_id(image)),
+        imgui.ImVec2(width, width * image.size[1] / image.size[0]),
+        imgui.ImVec2(0, 1),
+        imgui.ImVec2(1, 0),
+    )
+    widgets.tooltip(f"What the patch that shot last sees, one colour per surface: {session.shooting.projection}")
+    if vanished:
+        widgets.facts("small", [("Smaller than a sample", f"{vanished:,} triangles")])
+        widgets.tooltip("They lie between the samples of this map, and are drawn as one sample each")
 
 
 def _hemicube(session: Session, state: State) -> tuple[Any, int]:
@@ -54,7 +62,7 @@ def _hemicube(session: Session, state: State) -> tuple[Any, int]:
     return state.hemicube[1:]
 
 
-def _picked(session: Session, picked: Picked) -> None:
+def _surface(session: Session, picked: Picked) -> None:
     materials = session.scene.materials
     material = materials[picked.material].name if picked.material < len(materials) else str(picked.material)
     widgets.facts(
@@ -62,17 +70,14 @@ def _picked(session: Session, picked: Picked) -> None:
         [
             ("Object", str(picked.object)),
             ("Material", material),
-            ("Triangle", f"{picked.triangle}{' (back)' if picked.back else ''}"),
-            ("Chart, facet", f"{picked.chart}, {picked.facet}"),
-            ("Texel", f"{picked.texel[0]}, {picked.texel[1]}"),
+            ("Triangle", f"{picked.triangle}{' (back)' if picked.back else ''}, chart {picked.chart}"),
+            ("Texel", f"{picked.texel[0]}, {picked.texel[1]} of facet {picked.facet}"),
             ("Patch", f"{picked.patch[0]}, {picked.patch[1]} of {picked.patch_edge}×{picked.patch_edge} texels"),
             ("Position [m]", widgets.triple(picked.position, 3)),
             ("Normal", widgets.triple(picked.normal, 3)),
             ("Area [m²]", widgets.number(picked.area)),
         ],
     )
-    widgets.section("Light [W/m²]")
-    _light(picked)
 
 
 def _light(picked: Picked) -> None:

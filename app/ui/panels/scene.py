@@ -16,6 +16,7 @@ from app.ui.state import RGB, State
 if TYPE_CHECKING:
     from app.session import Session
 
+TALL_EM = 53.0  # a window in which the whole panel has room
 ROWS_SHOWN = 5  # of the material list before it scrolls
 SWATCH = int(imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop | imgui.ColorEditFlags_.no_border)
 PICKER = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label)
@@ -29,8 +30,13 @@ def draw(session: Session, state: State) -> None:
     _list(session, state)
     if state.material < len(session.scene.materials):
         _editor(session, state, session.scene.materials[state.material])
-    widgets.section("Texels")
-    _atlas(session, state)
+    if widgets.fold("Texels", opened=has_room()):
+        _atlas(session, state)
+
+
+def has_room() -> bool:
+    """Whether the window is so high that all of the panel can be shown."""
+    return imgui.get_main_viewport().size.y > TALL_EM * imgui.get_font_size()
 
 
 def _statistics(session: Session, state: State) -> None:
@@ -76,9 +82,7 @@ def _atlas(session: Session, state: State) -> None:
 
 def _list(session: Session, state: State) -> None:
     materials = session.scene.materials
-    height = (
-        min(len(materials), ROWS_SHOWN) * imgui.get_text_line_height_with_spacing() + imgui.get_style().item_spacing.y
-    )
+    height = min(len(materials), ROWS_SHOWN) * imgui.get_text_line_height_with_spacing()
     imgui.begin_child("materials", imgui.ImVec2(0, height))
     clipper = imgui.ListClipper()
     clipper.begin(len(materials))

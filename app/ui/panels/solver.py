@@ -20,7 +20,8 @@ BAR_EM = 0.5  # height of the bars
 
 def draw(session: Session, state: State) -> None:
     """The whole panel."""
-    _buttons(session, state)
+    assert state.stats is not None
+    _buttons(session, state, done=state.stats.converged)
     _progress(state)
     edited = session.shooting
     if session.atlas.adaptive:
@@ -53,14 +54,16 @@ def _leaves(session: Session, state: State) -> None:
         widgets.wrapped(session.solver.note, theme.AMBER)
 
 
-def _buttons(session: Session, state: State) -> None:
+def _buttons(session: Session, state: State, *, done: bool) -> None:
     spacing = imgui.get_style().item_spacing.x
     width = (imgui.get_content_region_avail().x - 2 * spacing) / 3
     size = imgui.ImVec2(width, 0)
     text = f"{ICONS.ICON_FA_PAUSE} Pause" if session.running else f"{ICONS.ICON_FA_PLAY} Run"
-    if imgui.button(f"{text}###run", size):
+    imgui.begin_disabled(done)
+    if imgui.button("Converged###run" if done else f"{text}###run", size):
         toggle(session)
-    widgets.tooltip("Space")
+    imgui.end_disabled()
+    widgets.tooltip("As little is left to shoot as Residual asks for, below" if done else "Space")
     imgui.same_line()
     if imgui.button("One shot", size):
         session.running = False
@@ -83,8 +86,8 @@ def _progress(state: State) -> None:
     share = min(max(0.0, 1.0 - stats.residual), 1.0)  # 0 where the residual is no number
     imgui.progress_bar(share, imgui.ImVec2(-1, imgui.get_font_size() * BAR_EM), "")
     widgets.tooltip("Power that has been shot, of the power emitted")
-    left = "converged" if stats.converged else "still to shoot"
-    imgui.text_unformatted(f"{widgets.percent(stats.residual)} {left}")
+    left = widgets.percent(stats.residual)
+    imgui.text_unformatted(f"converged, {left} unshot" if stats.converged else f"{left} still to shoot")
     rate = f", {widgets.number(stats.shots_per_second, 3)}/s" if state.measured and not stats.converged else ""
     imgui.same_line()
     right(f"{stats.shots:,} shots{rate}", theme.DIM)

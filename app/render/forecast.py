@@ -1,0 +1,114 @@
+"""The light to come, before the first shot and without a GPU: radiosity H = F (E + ρ H) between some hundred points.
+
+Points lie on texels drawn by area, and on lamps drawn by power; F_ij = cos_i cos_j A_j / (π d² + A_j / 4) is the form factor of a
+small patch, kept finite where points nearly touch, with sums of at most 1. What stands between two points is looked up in a
+grid of cells that surfaces lie in, so that the cost does not depend on the number of triangles. Coarse, but it knows where
+light escapes, and which rooms it hardly reaches.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.texels import TexelSurfaces
+from app.scene.model import F64
+
+POINTS, LAMP_POINTS = 384, 64  # on all surfaces, and on lamps besides
+CELLS = 48  # along the scene's longest edge, at most
+TEXELS_PER_CELL = 1.5  # edges: a surface's cells have no holes
+NEAR = 2.5  # cells around both points that hide nothing
+PLANE = 1.25  # cells above a point's plane, up to which lie those of its own surface
+BOUNCES = 50
+SEED = 2
+
+
+class Forecast(NamedTuple):
+    """Points, each for an ``area`` (n,) [m²] of surface around it: albedo and H to come, (n, 3) [W/m²]."""
+
+    area: F64
+    albedo: F64
+    irradiance: F64
+
+
+def forecast(surfaces: TexelSurfaces, albedo: NDArray[np.floating], exitance: NDArray[np.floating]) -> Forecast:
+    """albedo, exitance E [W/m²]: of each texel (tiles, t, t, 3)."""
+    at, area = _points(surfaces.area.ravel(), exitance.max(-1).ravel())
+    rho, E = (texels.reshape(-1, 3)[at].astype(np.float64) for texels in (albedo, exitance))
+    if not E.any():
+        return Forecast(area, rho, np.zeros_like(E))
+    F = _form_factors(surfaces, at, area)
+    H = direct = F @ E
+    for _ in range(BOUNCES):
+        H = direct + F @ (rho * H)
+    return Forecast(area, rho, H)
+
+
+def _points(area: F64, exitance: NDArray[np.floating]) -> tuple[NDArray[np.int64], F64]:
+    """Texels, and the area that each stands for: by area of what is dark, by power of what emits."""
+    rng = np.random.default_rng(SEED)
+    dark, lamps = np.flatnonzero((area > 0) & (exitance <= 0)), np.flatnonzero(area * exitance > 0)
+    share = float(area[lamps].sum() / max(area.sum(), 1e-30))
+    points, areas = [], []
+    for texels, count, density in (
+        (dark, round(POINTS * (1 - share)), np.ones(len(dark))),
+        (lamps, LAMP_POINTS + round(POINTS * share), exitance[lamps].astype(np.float64)),
+    ):
+        if len(texels) and count:
+            total = np.cumsum(area[texels] * density)
+            place = (np.arange(count) + rng.random(count)) / count * total[-1]
+            chosen = np.minimum(np.searchsorted(total, place), len(texels) - 1)
+            points.append(texels[chosen])
+            areas.append(total[-1] / count / density[chosen])
+    return (np.concatenate(points), np.concatenate(areas)) if points else (np.zeros(0, np.int64), np.zeros(0))
+
+
+def _form_factors(surfaces: TexelSurfaces, at: NDArray[np.int64], area: F64) -> F64:
+    """(n, n) from each point to the disc around each other one."""
+    p, n = surfaces.position.reshape(-1, 3)[at], surfaces.normal.reshape(-1, 3)[at].astype(np.float64)
+    way = p[None] - p[:, None]
+    squared = np.maximum((way**2).sum(-1), 1e-30)
+    leaves, arrives = np.einsum("ijk,ik->ij", way, n), -np.einsum("ijk,jk->ij", way, n)
+    F = np.maximum(leaves, 0) * np.maximum(arrives, 0) / squared * area / (np.pi * squared + area / 4)
+    i, j = np.nonzero(np.triu(F))
+    grid = _Grid(surfaces)
+    free = np.zeros(F.shape, bool)
+    free[i, j] = free[j, i] = grid.free(p[i], n[i], p[j], n[j])
+    F *= free
+    total = np.maximum(F.sum(1), 1.0)
+    return np.asarray(F / np.maximum(total[:, None], total))  # A_i F_ij = A_j F_ji stays true
+
+
+class _Grid:
+    """Cells that surfaces lie in; ``cell`` [m] is their edge."""
+
+    def __init__(self, surfaces: TexelSurfaces) -> None:
+        covered = surfaces.area > 0
+        points = surfaces.position[covered]
+        self._low = points.min(0)
+        texel = float(np.sqrt(np.quantile(surfaces.area[covered], 0.9)))  # small charts' texels are covered in part
+        self.cell = max(float(np.ptp(points, axis=0).max()) / CELLS, TEXELS_PER_CELL * texel)
+        index = np.floor((points - self._low) / self.cell).astype(np.int64)
+        self._filled = np.zeros(index.max(0) + 1, bool)
+        self._filled[tuple(index.T)] = True
+
+    def free(self, start: F64, start_normal: F64, end: F64, end_normal: F64) -> NDArray[np.bool_]:
+        """Whether nothing lies between the points of each pair, (n, 3) each; looked up cell by cell. What lies in the plane of
+        either point is its own surface."""
+        way = (end - start) / self.cell
+        length = np.maximum(np.linalg.norm(way, axis=1), 1e-30)
+        start, way = (start - self._low) / self.cell, way / length[:, None]
+        rise, fall = np.einsum("ij,ij->i", way, start_normal), -np.einsum("ij,ij->i", way, end_normal)
+        free, along = np.ones(len(start), bool), np.arange(len(start))
+        distance = NEAR
+        while len(along := along[distance < length[along] - NEAR]):
+            index = np.floor(start[along] + distance * way[along]).astype(np.int64)
+            above = (distance * rise[along] > PLANE) & ((length[along] - distance) * fall[along] > PLANE)
+            inside = above & ((index >= 0) & (index < self._filled.shape)).all(1)
+            hit = inside.copy()
+            hit[inside] = self._filled[tuple(index[inside].T)]
+            free[along[hit]] = False
+            along, distance = along[~hit], distance + 1
+        return free
