@@ -119,7 +119,7 @@ def build_parser() -> Parser:
         "--only",
         type=_table_names,
         metavar="A,B",
-        help="coombe1, wallner1, scaling, convergence, wallner2 (default all)",
+        help="coombe1, equal, wallner1, scaling, convergence, wallner2 (default all)",
     )
     tables.add_argument(
         "--seconds",
