@@ -140,7 +140,7 @@ class DisplayTexels:
         )
         rects.release()
         self._edges.follow(touched)
-        self._stale = np.union1d(self._stale, touched)
+        self._stale = np.union1d(self._stale, changed)
 
     def _leaf_keys(self) -> NDArray[np.int64]:
         """The tile in each slot, and of those that the last row lacks."""
