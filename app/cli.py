@@ -108,6 +108,7 @@ def build_parser() -> Parser:
     shots.set_defaults(command=_bench_shots)
     frames = benches.add_parser("frames", help="milliseconds per frame of the viewer, by part")
     frames.add_argument("scene", nargs="?", default=DEFAULT_SCENE, help=f"a file or a name (default {DEFAULT_SCENE})")
+    frames.add_argument("--drag", action="store_true", help="drag the sliders of the quadtrees (with --adaptive)")
     _json_flag(frames)
     add_flags(frames, AtlasOptions)
     add_flags(frames, ShootingOptions)

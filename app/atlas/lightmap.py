@@ -169,8 +169,8 @@ class Lightmap:
             texture = self._textures[name]
             for slot, tile in zip(slots.tolist(), tiles, strict=True):
                 texture.write(np.ascontiguousarray(tile).tobytes(), viewport=(*self.nodes.corner(slot), edge, edge))
-        for name, table in self.nodes.slot_tables.items():
-            self._textures[name].write(table.tobytes())
+        self._textures["t_leaves"].write(self.nodes.slot_tables["t_leaves"].tobytes())
+        self._textures["t_pages"] = write_pages(self.gpu, self._textures["t_pages"], self.nodes, slots)
         self.gpu.release_all(*self.receivers.values())
         self.receivers = receiver_meshes(self.gpu, self.nodes.flat_spans, self.nodes.shaped_tiles)
         self.version += 1
@@ -178,10 +178,10 @@ class Lightmap:
     def enlarge(self) -> None:
         """Take over a node set that has got more rows. The light stays."""
         old = {name: self._textures[name] for name in LIGHT}
-        arrays = self.nodes.arrays
-        self.gpu.release_all(*(self._textures.pop(name) for name in arrays))
-        self._textures |= {name: upload(self.gpu, array) for name, array in arrays.items()}
-        self._textures["t_materials"].write(self.nodes.material_table(self.scene).tobytes())  # as edited
+        for name in self.nodes.tile_arrays(np.empty(0, np.int64)):
+            self._textures[name] = self._longer(self._textures[name])
+        self.gpu.release_all(self._textures["t_leaves"])
+        self._textures["t_leaves"] = upload(self.gpu, self.nodes.slot_tables["t_leaves"])
         self.gpu.release_all(*self._targets)
         self._make_light()
         for name, target in zip(LIGHT, (self.gpu.target(self._textures[n]) for n in LIGHT), strict=True):
@@ -194,6 +194,14 @@ class Lightmap:
             )
             self.gpu.release_all(target, old[name])
         self.version += 1
+
+    def _longer(self, texture: Texture) -> Texture:
+        """With as many rows as the node set, the new ones empty, in place of the texture."""
+        (width, height), texel = self.size, texture.components * _BYTES[texture.dtype]
+        held = texture.read(alignment=1).ljust(width * height * texel, b"\0")
+        longer = self.gpu.texture(self.size, texture.components, texture.dtype, held)
+        self.gpu.release_all(texture)
+        return longer
 
     @property
     def columns(self) -> int:
@@ -285,6 +293,17 @@ def upload(gpu: Gpu, array: Array) -> Texture:
     height, width, components = array.shape
     dtype = {"float32": "f4", "float16": "f2", "uint32": "u4"}[array.dtype.name]
     return gpu.texture((width, height), components, dtype, np.ascontiguousarray(array).tobytes())
+
+
+def write_pages(gpu: Gpu, texture: Texture, nodes: NodeSet, slots: NDArray[np.int64]) -> Texture:
+    """The page table after leaves came into these slots: the same texture, or another where pages are of another level now."""
+    pages = nodes.slot_tables["t_pages"]
+    if texture.size != pages.shape[1::-1]:
+        gpu.release_all(texture)
+        return upload(gpu, pages)
+    for rect, block in nodes.page_blocks(slots):
+        texture.write(block.tobytes(), viewport=rect)
+    return texture
 
 
 def receiver_meshes(gpu: Gpu, flat_spans: F32, shaped_tiles: F32) -> dict[bool, Mesh]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -47,18 +48,18 @@ class Frame:
 class NodeSet:
     """Leaf tiles side by side in one rectangle of ``columns``×``rows`` slots, and the tables that go with them.
 
-    tile: edge of a leaf [texels], t below; tiles: number of slots; used (tiles,) bool: those that hold a leaf; depth: finest
-    level of leaves, in which pages are counted.
+    tile: edge of a leaf [texels], t below; tiles: number of slots; used (tiles,) bool: those that hold a leaf; adaptive: whether
+    leaves may be of several levels; depth: the level in which pages are counted, that of the finest leaf or one more.
     leaves, surfaces, albedo_tiles, emission_tiles: of every slot, empty where it is not used.
     occluders: of the visibility map; vertices: the triangles' vertex buffer; flat_spans, shaped_tiles: the receivers.
     Raises UserError where facets and materials do not fit the 32 bits of a texel's ids.
     """
 
     def __init__(
-        self, scene: Scene, charts: Charts, leaves: Leaves | None = None, *, depth: int = 0, slots: int = 0
+        self, scene: Scene, charts: Charts, leaves: Leaves | None = None, *, adaptive: bool = False, slots: int = 0
     ) -> None:
         """leaves: by default all of level 0; slots: room for so many, at least."""
-        self.scene, self.charts, self.depth, self.tile = scene, charts, depth, charts.tile
+        self.scene, self.charts, self.adaptive, self.tile = scene, charts, adaptive, charts.tile
         self.frame = Frame.of(scene)
         self.material_bits = max(1, (len(scene.materials) - 1).bit_length())
         if charts.facet_count > min(MAX_FACETS, (1 << (32 - self.material_bits)) - 2):
@@ -83,6 +84,8 @@ class NodeSet:
         self.emission_tiles = None if cut.emission is None else colours
         self._kinds, self.used = np.zeros(0, KIND), np.zeros(0, bool)
         self._texels = np.zeros(0, np.int64)  # of each slot, that cover a surface
+        self.depth = 0
+        self._pages = np.zeros([side // self.tile for side in self.charts.size[::-1]], np.uint32)
         self.enlarge(slots)
 
     def enlarge(self, slots: int) -> None:
@@ -99,7 +102,7 @@ class NodeSet:
         self._texels = _stretched(self._texels, more, 0)
         self.tiles, self.rows = slots, max(1, -(-slots // self.columns))
         self.size = (self.columns * self.tile, self.rows * self.tile)
-        self.__dict__.pop("slot_tables", None)
+        self.__dict__.pop("_leaf_table", None)
 
     # -- leaves that come and go ---------------------------------------------------------------------------------------
 
@@ -114,7 +117,8 @@ class NodeSet:
         self._texels[slots] = (tiles.surfaces.face >= 0).sum((1, 2))
         self._kinds[slots] = tile_kinds(self._tile_texels(tiles), self._facet_material)
         self.used[slots] = True
-        self.__dict__.pop("slot_tables", None)
+        self._fit_pages()
+        self._turn_pages(slots, slots + 1)
         if self.emission_tiles is not None:  # finer texels hold other shares of an image
             self.__dict__.pop("emission_weights", None)
         self.flat_spans, self.shaped_tiles = self.receivers_of(np.flatnonzero(self.used))
@@ -126,10 +130,40 @@ class NodeSet:
     def free(self, slots: NDArray[np.int64]) -> None:
         """Let these slots hold nothing. The receivers follow with the next ``put``."""
         self.used[slots] = False
-        self.__dict__.pop("slot_tables", None)
+        self._turn_pages(slots, np.zeros_like(slots))
         self.leaves.level[slots] = self.leaves.x[slots] = self.leaves.y[slots] = -1
         self.surfaces.face[slots] = -1
         self.surfaces.area[slots] = 0.0
+
+    def _fit_pages(self) -> None:
+        """Count pages in the level of the finest leaf; in finer ones too, until they are two levels finer."""
+        finest = int(self.leaves.level.max(initial=0))
+        if finest > self.depth:
+            times = 1 << (finest - self.depth)
+            self._pages = self._pages.repeat(times, 0).repeat(times, 1)
+        elif finest < self.depth - 1:
+            step = 1 << (self.depth - finest)
+            self._pages = np.ascontiguousarray(self._pages[::step, ::step])
+        else:
+            return
+        self.depth = finest
+
+    def _turn_pages(self, slots: NDArray[np.int64], numbers: NDArray[np.int64]) -> None:
+        """Write these numbers where the leaves of these slots are."""
+        self.__dict__.pop("_leaf_table", None)
+        height, width = self._pages.shape
+        for level in np.unique(self.leaves.level[slots]).tolist():
+            mine = self.leaves.level[slots] == level
+            side = 1 << (self.depth - level)
+            cells = self._pages.reshape(height // side, side, width // side, side).swapaxes(1, 2)
+            cells[self.leaves.y[slots[mine]], self.leaves.x[slots[mine]]] = numbers[mine, None, None]
+
+    def page_blocks(self, slots: NDArray[np.int64]) -> Iterator[tuple[tuple[int, int, int, int], Array]]:
+        """The rectangle (x, y, width, height) of pages of each tile of level 0 where these slots hold leaves, and the pages."""
+        leaves, side = self.leaves.only(slots[self.used[slots]]), 1 << self.depth
+        for x, y in np.unique(np.stack([leaves.x >> leaves.level, leaves.y >> leaves.level], 1), axis=0).tolist():
+            rows, columns = slice(y * side, (y + 1) * side), slice(x * side, (x + 1) * side)
+            yield (x * side, y * side, side, side), np.ascontiguousarray(self._pages[rows, columns])
 
     @functools.cached_property
     def emission_weights(self) -> F64:
@@ -224,22 +258,19 @@ class NodeSet:
                 out[name] = np.concatenate([tiles[slots], np.ones_like(tiles[slots][..., :1])], -1).astype(np.float16)
         return out
 
-    @functools.cached_property
+    @property
     def slot_tables(self) -> dict[str, Array]:
-        """Tables that follow the leaves, made once for each change. t_pages (H, W, 1) u32: the slot, from 1, of each cell of
-        t×t texels of the finest level; t_leaves (rows, columns, 4) f32: x, y [tiles of its level] and size of a texel [texels
-        of level 0] of each slot, 0 where it is free."""
-        width, height = ((side << self.depth) // self.tile for side in self.charts.size)
-        pages = np.zeros((height, width, 1), np.uint32)
-        for level in range(self.depth + 1):
-            mine = np.flatnonzero(self.leaves.level == level)
-            side = 1 << (self.depth - level)
-            cells = pages.reshape(height // side, side, width // side, side).swapaxes(1, 2)
-            cells[self.leaves.y[mine], self.leaves.x[mine]] = (mine + 1).astype(np.uint32)[:, None, None]
+        """Tables that follow the leaves. t_pages (H, W, 1) u32: the slot, from 1, of each cell of t×t texels of level ``depth``;
+        t_leaves (rows, columns, 4) f32: x, y [tiles of its level] and size of a texel [texels of level 0] of each slot, 0
+        where it is free."""
+        return {"t_pages": self._pages[..., None], "t_leaves": self._leaf_table}
+
+    @functools.cached_property
+    def _leaf_table(self) -> F32:
         leaves = np.zeros((self.rows * self.columns, 4), np.float32)
         size = np.where(self.used, 0.5**self.leaves.level, 0.0)
         leaves[: self.tiles, :3] = np.column_stack([self.leaves.x, self.leaves.y, size])
-        return {"t_pages": pages, "t_leaves": leaves.reshape(self.rows, self.columns, 4)}
+        return leaves.reshape(self.rows, self.columns, 4)
 
     def _tables(self) -> dict[str, Array]:
         return self.slot_tables | {"t_facets": self._facet_table(), "t_materials": self.material_table(self.scene)}

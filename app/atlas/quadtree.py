@@ -217,7 +217,7 @@ class Quadtree:
 def quadtree_nodes(scene: Scene, charts: Charts) -> NodeSet:
     """The node set to begin with: few leaves, and room for as many again."""
     leaves = first_leaves(scene, charts, MAX_DEPTH)
-    nodes = NodeSet(scene, charts, leaves, depth=MAX_DEPTH, slots=max(FIRST_ROOM // charts.tile**2, 2 * len(leaves)))
+    nodes = NodeSet(scene, charts, leaves, adaptive=True, slots=max(FIRST_ROOM // charts.tile**2, 2 * len(leaves)))
     tree = Quadtree(nodes)
     while slots := tree.uneven():
         if tree.room < 4 * len(slots):

@@ -38,6 +38,11 @@ class Leaves:
     def __len__(self) -> int:
         return len(self.level)
 
+    @property
+    def keys(self) -> I64:
+        """(n,) a number for each tile; -1 where there is none."""
+        return (self.level.astype(np.int64) << 48) | (self.y.astype(np.int64) << 24) | self.x
+
     def only(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Leaves:
         """Those of the leaves."""
         return Leaves(self.level[which], self.x[which], self.y[which])
@@ -162,23 +167,47 @@ def _windows(uv: F64, leaves: Leaves, level: int, tile: int) -> _Windows:
     order = np.argsort(keys)
     keys, mine = keys[order], mine[order]
     faces, places, fulls = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty(0, bool)]
-    for part in _fragments(uv / tile):
-        wanted = (part.y << 32) | part.x
-        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        hit = keys[place] == wanted
-        faces.append(part.pair[hit])
-        places.append(mine[place[hit]])
-        fulls.append(part.share[hit] == 1.0)
+    few = _cells_of_few(uv / tile, leaves, mine)
+    if few is not None:
+        for part in _fragments(uv / tile, few):
+            faces.append(few.face[part.pair])
+            places.append(few.leaf[part.pair])
+            fulls.append(part.share == 1.0)
+    else:
+        for part in _fragments(uv / tile):
+            wanted = (part.y << 32) | part.x
+            place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+            hit = keys[place] == wanted
+            faces.append(part.pair[hit])
+            places.append(mine[place[hit]])
+            fulls.append(part.share[hit] == 1.0)
     leaf = np.concatenate(places)
     left, bottom = (corner[leaf].astype(np.int64) * tile for corner in (leaves.x, leaves.y))
     return _Windows(np.concatenate(faces), leaf, np.concatenate(fulls), left, bottom, tile)
 
 
+def _cells_of_few(uv: F64, leaves: Leaves, mine: I64) -> _Windows | None:
+    """Where leaves are few, as when some split: those that each face's bounds meet, as windows of one cell, in the order of the
+    faces' cells; None where it takes less to cut the faces by the whole grid. uv: in leaves; mine: row by row."""
+    low, high = _bounds(uv)
+    if len(mine) * len(uv) > (high - low).prod(axis=1).sum():
+        return None
+    x, y = leaves.x[mine].astype(np.int64), leaves.y[mine].astype(np.int64)
+    across, up = ((low[:, k, None] <= at) & (at < high[:, k, None]) for k, at in enumerate((x, y)))
+    face, nth = np.nonzero(across & up)
+    return _Windows(face, mine[nth], np.zeros(len(face), bool), x[nth], y[nth], tile=1)
+
+
+def _bounds(uv: F64) -> tuple[I64, I64]:
+    """(f, 2) each: the first cell of each triangle's box, and the one beyond the last."""
+    low = np.floor(uv.min(axis=1)).astype(np.int64)
+    return low, np.maximum(np.ceil(uv.max(axis=1)).astype(np.int64), low + 1)
+
+
 def _fragments(uv: F64, windows: _Windows | None = None) -> Iterator[_Fragments]:
     """Cut triangles uv (f, 3, 2) by the unit grid, in blocks; with windows, each pair only inside its leaf."""
     face = np.arange(len(uv)) if windows is None else windows.face
-    low = np.floor(uv.min(axis=1)).astype(np.int64)[face]
-    high = np.maximum(np.ceil(uv.max(axis=1)).astype(np.int64)[face], low + 1)
+    low, high = (cells[face] for cells in _bounds(uv))
     single = (high - low == 1).all(axis=1)
     if windows is not None:
         corner = np.stack([windows.left, windows.bottom], axis=1)

@@ -197,7 +197,9 @@ def first_below(curve: list[tuple[int, float]], level: float) -> int | None:
 
 
 def rms_row(gpu: Gpu, seconds: float, theirs: RmsRow) -> Row:
-    """RMS of the picture against the hemicube's for both hemispheres, at the same residual; none where time ran out."""
+    """RMS and FLIP of the picture against the hemicube's for both hemispheres, at the same residual; none where time ran out."""
+    from app.bench.flip import flip
+
     roots = round(ROOT_TEXELS * theirs.size**2) if theirs.level else round(ROOT_TEXELS * theirs.size**2 / 4)
     adaptive = theirs.subdivision == "adaptive"
     atlas = AtlasOptions(texels=roots if adaptive else roots << 2 * theirs.level, adaptive=adaptive)
@@ -218,7 +220,9 @@ def rms_row(gpu: Gpu, seconds: float, theirs: RmsRow) -> Row:
     finally:
         session.release()
     if converged:  # else the pictures differ by their shots
-        row |= {f"{name}_rms": rms(pictures[name] - pictures["hemicube"]) for name in ("stereographic", "nonlinear")}
+        for name in ("stereographic", "nonlinear"):
+            row[f"{name}_rms"] = rms(pictures[name] - pictures["hemicube"])
+            row[f"{name}_flip"] = flip(pictures["hemicube"], pictures[name])
     return row | {"their_stereographic": theirs.stereographic, "their_nonlinear": theirs.nonlinear}
 
 

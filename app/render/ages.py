@@ -8,18 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.node_set import NodeSet
+from app.atlas.texels import Leaves
 from app.scene.model import F32
 
 NEVER, LATER = -1e6, 1e6  # s
 
 
 class LeafAges:
-    """Follows the leaves of one node set, by the pages that they cover: slots are used again, places are not."""
+    """Follows the leaves of one node set, by the places that they cover: slots are used again, places are not."""
 
     def __init__(self, nodes: NodeSet) -> None:
         self._start = time.perf_counter()
-        self._levels = _levels(nodes)
-        self._born = np.full(self._levels.shape, NEVER, np.float32)
+        self._keys = nodes.leaves.keys
+        self._born = np.full(len(self._keys), NEVER, np.float32)
 
     @property
     def now(self) -> float:
@@ -27,15 +28,18 @@ class LeafAges:
         return time.perf_counter() - self._start
 
     def born(self, nodes: NodeSet) -> F32:
-        """(H, W) f32, for each page: when its leaf was first seen in place of a coarser one [s], else NEVER."""
-        levels = _levels(nodes)
-        self._born[(levels > self._levels) & (self._levels >= 0)] = self.now
-        self._born[levels < self._levels] = NEVER
-        self._levels = levels
-        return self._born
+        """(slots,) f32: when each leaf was first seen in place of a coarser one [s], else NEVER."""
+        keys, order = nodes.leaves.keys, np.argsort(self._keys)
+        at = order[np.minimum(np.searchsorted(self._keys[order], keys), len(order) - 1)]
+        born = np.where((keys >= 0) & (self._keys[at] == keys), self._born[at], np.float32(NEVER))
+        fresh = np.flatnonzero((keys >= 0) & (self._keys[at] != keys))
+        born[fresh[self._was_coarser(nodes.leaves.only(fresh))]] = self.now
+        self._keys, self._born = keys, born
+        return born
 
-
-def _levels(nodes: NodeSet) -> NDArray[np.int8]:
-    """(H, W) the level of each page's leaf; -1 where there is none."""
-    pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64)
-    return np.where(pages > 0, nodes.leaves.level[pages - 1], -1).astype(np.int8)
+    def _was_coarser(self, leaves: Leaves) -> NDArray[np.bool_]:
+        """Whether each of these lies in a leaf that was there before."""
+        found = np.zeros(len(leaves), bool)
+        for k in range(1, int(leaves.level.max(initial=0)) + 1):
+            found |= np.isin(Leaves(leaves.level - k, leaves.x >> k, leaves.y >> k).keys, self._keys)
+        return found

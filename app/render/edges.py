@@ -3,46 +3,72 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.node_set import NodeSet
 from app.atlas.quadtree import SIDES
-from app.scene.model import F32
+from app.scene.model import F64
 
-EDGE_FORMAT = {"in_rect": "4f", "in_outward": "2f"}
 CORNERS = ((-1, -1), (1, -1), (-1, 1), (1, 1))
 Ints = NDArray[np.int64]
 
 
-def unequal_edges(nodes: NodeSet, border: int) -> dict[bool, F32]:
-    """(n, 6) f32 instances of EDGE_FORMAT, by whether they follow: half edges beside a coarser leaf; half edges beside a finer
-    one, and corners. They are rectangles of display texels, whose tiles have a border of so many texels."""
-    if nodes.depth == 0:
-        return {}
-    slots = np.flatnonzero(nodes.used)
+class Kind(NamedTuple):
+    """Of border texels that are made alike. follows: they are half an edge beside a coarser leaf; else they are half of one
+    beside a finer leaf, or a corner beside a leaf of another level."""
+
+    follows: bool
+    corner: bool
+
+    def along(self, tile: int, border: int) -> int:
+        """Texels in a row of one instance, which has ``border`` rows along the edge."""
+        return border if self.corner else tile // 2
+
+
+KINDS = Kind(False, False), Kind(False, True), Kind(True, False)
+
+
+def unequal_edges(nodes: NodeSet, border: int, slots: Ints) -> dict[Kind, F64]:
+    """(n, 5) instances of each of KINDS in the leaves of these slots: the slot; their lower corner [display texels, of tiles that
+    have a border of so many texels]; towards the neighbour, -1, 0 or 1 along u and v."""
+    slots = slots[nodes.used[slots]]
     level = nodes.leaves.level[slots]
-    pages = np.pad(nodes.slot_tables["t_pages"][..., 0].astype(np.int64), 1)
     side = 1 << (nodes.depth - level.astype(np.int64))  # pages along an edge of each leaf
-    left, bottom = nodes.leaves.x[slots] * side + 1, nodes.leaves.y[slots] * side + 1
+    left, bottom = nodes.leaves.x[slots] * side, nodes.leaves.y[slots] * side
     corner = np.stack([slots % nodes.columns, slots // nodes.columns], 1) * (nodes.tile + 2 * border)
-    found: dict[bool, list[NDArray[np.float64]]] = {False: [], True: []}
+    found: dict[Kind, list[F64]] = {kind: [np.empty((0, 5))] for kind in KINDS}
     for outward, half in _parts():
-        x, y = (_page(d, h, side) for d, h in zip(outward, half, strict=True))
-        near = pages[bottom + y, left + x] - 1
+        near = _slots_at(nodes, *(p + _page(d, h, side) for p, d, h in zip((left, bottom), outward, half, strict=True)))
         finer = np.where(near >= 0, nodes.leaves.level[near] - level, 0)
-        (place_x, width), (place_y, height) = (
-            _span(d, h, nodes.tile, border) for d, h in zip(outward, half, strict=True)
-        )
-        for follows in (False, True):
-            unequal = finer != 0 if all(outward) else finer < 0 if follows else finer > 0
-            which = np.flatnonzero(unequal & (not (follows and all(outward))))
-            rest = np.tile([width, height, *outward], (len(which), 1))
-            found[follows].append(np.column_stack([corner[which] + (place_x, place_y), rest]))
-    return {
-        follows: np.concatenate(parts).astype(np.float32) for follows, parts in found.items() if sum(map(len, parts))
-    }
+        place = [_first(d, h, nodes.tile, border) for d, h in zip(outward, half, strict=True)]
+        if all(outward):
+            parts = {Kind(False, True): finer != 0}
+        else:
+            parts = {Kind(False, False): finer > 0, Kind(True, False): finer < 0}
+        for kind, unequal in parts.items():
+            which = np.flatnonzero(unequal)
+            rest = np.tile(np.array(outward, np.float64), (len(which), 1))
+            found[kind].append(np.column_stack([slots[which], corner[which] + place, rest]))
+    return {kind: np.concatenate(parts) for kind, parts in found.items()}
+
+
+def reached_from(nodes: NodeSet, slots: Ints, texels: int) -> Ints:
+    """These slots, and those of leaves that reach or touch the leaves in them within so many of their own texels."""
+    used = np.flatnonzero(nodes.used)
+    leaves, size = nodes.leaves.only(used), 0.5 ** nodes.leaves.level[used]
+    margin = size * texels / nodes.tile
+    low, high = (np.stack([leaves.x + k, leaves.y + k]) * size + (2 * k - 1) * margin for k in (0, 1))
+    parents = nodes.leaves.only(slots[nodes.used[slots]])  # of leaves that came together there is one
+    up = np.minimum(parents.level, 1)
+    found = np.zeros(len(used), bool)
+    for level, x, y in np.unique(np.stack([parents.level - up, parents.x >> up, parents.y >> up], 1), axis=0).tolist():
+        edge = 0.5**level
+        beside = [(low[k] <= (at + 1) * edge) & (high[k] >= at * edge) for k, at in enumerate((x, y))]
+        found |= beside[0] & beside[1]
+    return np.union1d(slots, used[found])
 
 
 def _parts() -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
@@ -54,6 +80,15 @@ def _parts() -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
         yield outward, (0, 0)
 
 
+def _slots_at(nodes: NodeSet, x: Ints, y: Ints) -> Ints:
+    """The slots of these pages; -1 where no leaf is."""
+    pages = nodes.slot_tables["t_pages"][..., 0]
+    height, width = pages.shape
+    inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+    found = pages[np.where(inside, y, 0), np.where(inside, x, 0)].astype(np.int64) - 1
+    return np.where(inside, found, -1)
+
+
 def _page(outward: int, half: int, side: Ints) -> Ints:
     """Along one axis, the page beyond each leaf, or the one in the middle of a half of it; from its first page on."""
     if outward:
@@ -61,8 +96,8 @@ def _page(outward: int, half: int, side: Ints) -> Ints:
     return side // 4 + half * (side // 2)
 
 
-def _span(outward: int, half: int, tile: int, border: int) -> tuple[int, int]:
-    """Along one axis, first and number of the display texels of a tile."""
+def _first(outward: int, half: int, tile: int, border: int) -> int:
+    """Along one axis, the first display texel in a tile."""
     if outward:
-        return (border + tile if outward > 0 else 0), border
-    return border + half * (tile // 2), tile // 2
+        return border + tile if outward > 0 else 0
+    return border + half * (tile // 2)

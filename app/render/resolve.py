@@ -6,16 +6,21 @@ rasteriser. A texel that covers nothing copies a neighbour, so that no gutter or
 
 from __future__ import annotations
 
-from typing import TypeVar
+from collections.abc import Mapping
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from app.atlas.lightmap import Lightmap
+from app.atlas.lightmap import Lightmap, upload, write_pages
 from app.atlas.node_set import TABLE_WIDTH
-from app.gpu import Gpu, Mesh, Pass, Texture
+from app.atlas.regrow import QUAD_FORMAT, quads
+from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
+from app.gpu.shader import FULLSCREEN
 from app.render.ages import LeafAges
 from app.render.develop import curve
-from app.render.edges import EDGE_FORMAT, unequal_edges
+from app.render.edge_texels import Batch, EdgeTexels, Scissor
+from app.render.edges import Kind, reached_from
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS, Layer
 from app.render.options import DisplayOptions
@@ -25,6 +30,8 @@ from app.scene.model import RGB
 # Texels around each tile: as many as interpolation at its edge reaches beyond it
 BORDER = {"nearest": 1, "bilinear": 1, "bicubic": 2}
 TEXELS_PER_FRAME = 1 << 17  # that are brought up to date in one frame, where not all must be
+LAYER_TABLES = ("t_normal_ids", "t_materials", "t_albedo", "t_emission", "t_facets", "t_leaves")
+PLACES_WIDTH = 256  # see app/shaders/render/places.glsl
 T = TypeVar("T")
 
 
@@ -40,16 +47,20 @@ class DisplayTexels:
         sides = np.array([m.double_sided for m in lightmap.scene.materials], np.uint32)
         self._unlit = gpu.texture((len(sides), 2), 4, "f1")
         self._unlit_target = gpu.target(self._unlit)
+        self._version, self._keys = lightmap.version, self._leaf_keys()
         self._tables = {
             "t_sides": gpu.texture((len(sides), 1), 1, "u4", sides.tobytes()),
             "t_charts": self._chart_table(),
-            "t_places": self._place_table(),
+            "t_shown_pages": upload(gpu, lightmap.nodes.slot_tables["t_pages"]),
+            "t_places": gpu.texture((PLACES_WIDTH, len(self._keys) // PLACES_WIDTH + 1), 4, "f4"),
             "t_source": gpu.texture(self.size, 1, "u4"),
         }
-        self._version = lightmap.version
-        self._edges: dict[bool, Mesh] = {}
-        self._find_edges()
-        self._find_sources = Pass(gpu, "render/source", defines=lightmap.defines("TILE") | {"BORDER": border})
+        self._write_places()
+        self._edges = EdgeTexels(gpu, lightmap, border)
+        self._stale = np.empty(0, np.int64)  # slots whose display texels are of other leaves
+        defines = lightmap.defines("TILE") | {"BORDER": border}
+        self._find_sources = Pass(gpu, "render/source", defines=defines)
+        self._find_some = Pass(gpu, "render/source", defines=defines, vertex="common/rects")
         self._source_target = gpu.target(self._tables["t_source"])
         self._sourced_rows = 0
         self._passes: dict[tuple[object, ...], Pass] = {}
@@ -64,7 +75,7 @@ class DisplayTexels:
     ) -> dict[str, Texture]:
         """Bring the display texels up to date; the textures that surfaces bind.
 
-        If not ``whole``, TEXELS_PER_FRAME of them, in turn.
+        If not ``whole``, those of leaves that have changed, and TEXELS_PER_FRAME others, in turn.
         """
         layer, lightmap = LAYER_SHADERS[layer_name], self._lightmap
         if self._version != lightmap.version:
@@ -76,42 +87,77 @@ class DisplayTexels:
             "u_ambient": ambient,
             "u_target_texel": 1.0 / (lightmap.charts.density * lightmap.frame.scale),
         }
-        names = ("t_normal_ids", "t_materials", "t_albedo", "t_emission", "t_facets", "t_leaves")
-        textures = self._tables | lightmap.textures(*names)
+        textures = self._tables | lightmap.textures(*LAYER_TABLES)
         textures |= {"t_light": lightmap.texture(layer.light)} if layer.light else {}
-        for name, target, viewport in (
-            ("unlit", self._unlit_target, (0, 0, *self._unlit.size)),
-            ("resolve", self._target, (0, first, self.size[0], rows)),
-        ):
-            resolve = self._pass(name, layer, shader)
-            bound, values = declared(resolve, textures), declared(resolve, uniforms)
-            resolve.draw(target, textures=bound, uniforms=values, viewport=viewport)
-        uniforms |= {"u_size": self.size, "u_pages": self._pages, "u_border": self._border}
+        uniforms |= {"u_size": self.size, "u_pages": self._pages}
         textures |= lightmap.textures("t_pages", "t_position_area")
-        for follows, mesh in self._edges.items():
-            edges = self._pass("edges", layer, shader, FOLLOWS=follows)
-            bound, values = declared(edges, textures), declared(edges, uniforms)
-            edges.draw(self._target, textures=bound, uniforms=values, mesh=mesh, scissor=(0, first, self.size[0], rows))
+
+        def draw(name: str, target: Framebuffer, *, rects: bool = False, **more: Any) -> None:
+            program = self._pass(name, layer, shader, rects, **more.pop("defines", {}))
+            bound, values = textures | more.pop("textures", {}), uniforms | more.pop("uniforms", {})
+            program.draw(target, textures=declared(program, bound), uniforms=declared(program, values), **more)
+
+        def make_edges(
+            kind: Kind, target: Framebuffer, values: Mapping[str, object], own: Mapping[str, Texture]
+        ) -> None:
+            draw("edges", target, uniforms=values, textures=own, defines={"FOLLOWS": kind.follows})
+
+        draw("unlit", self._unlit_target)
+        band = 0, first, self.size[0], rows
+        draw("resolve", self._target, viewport=band)
+        edges: list[tuple[list[Batch], Scissor | None]] = [(self._edges.of_rows(first, first + rows), band)]
+        late = []
+        if len(self._stale) and rows < self.size[1]:
+            rects, late = self._quads(self._stale), self._edges.of_slots(self._stale)
+            draw("resolve", self._target, rects=True, mesh=rects)
+            rects.release()
+            edges.append((late, None))
+        self._edges.draw(self._target, make_edges, edges)
+        for batch in late:
+            batch.release()
+        self._stale = self._stale[:0]
         smooth = layer.smooth and display.interpolation != "nearest"
         filtering = self._gpu.ctx.LINEAR if smooth else self._gpu.ctx.NEAREST
         self._colour.filter = (filtering, filtering)
-        return {"t_display": self._colour, "t_unlit": self._unlit, "t_places": self._tables["t_places"]}
+        names = ("t_shown_pages", "t_places")
+        return {"t_display": self._colour, "t_unlit": self._unlit} | {name: self._tables[name] for name in names}
 
     def _follow_leaves(self) -> None:
-        """The leaves have changed: find everything anew, all at once, or a band would show texels of others."""
-        self._version = self._lightmap.version
-        self._tables.pop("t_places").release()
-        self._tables["t_places"] = self._place_table()
-        self._find_rows(0, self.size[1])
-        self._find_edges()
+        """The leaves have changed: find anew what the display texels of the new ones copy, and of those around them."""
+        nodes, keys = self._lightmap.nodes, self._leaf_keys()
+        changed = np.flatnonzero(keys != self._keys)
+        self._version, self._keys = self._lightmap.version, keys
+        changed = changed[changed < nodes.tiles]
+        self._tables["t_shown_pages"] = write_pages(self._gpu, self._tables["t_shown_pages"], nodes, changed)
+        self._write_places()
+        touched = reached_from(nodes, changed, 2 * self._border)
+        rects = self._quads(touched)
+        self._find_some.draw(
+            self._source_target,
+            uniforms={"u_pages": self._pages, "u_size": self.size},
+            mesh=rects,
+            textures=self._source_tables,
+        )
+        rects.release()
+        self._edges.follow(touched)
+        self._stale = np.union1d(self._stale, changed)
 
-    def _find_edges(self) -> None:
-        """Where leaves meet those of another level."""
-        self._gpu.release_all(*self._edges.values())
-        edges = unequal_edges(self._lightmap.nodes, self._border)
-        self._edges = {
-            follows: Mesh(self._gpu, some.tobytes(), EDGE_FORMAT, per_instance=True) for follows, some in edges.items()
-        }
+    def _leaf_keys(self) -> NDArray[np.int64]:
+        """The tile in each slot, and of those that the last row lacks."""
+        nodes = self._lightmap.nodes
+        keys = np.full(nodes.columns * nodes.rows, -1)
+        keys[: nodes.tiles] = nodes.leaves.keys
+        return keys
+
+    def _quads(self, slots: NDArray[np.int64]) -> Mesh:
+        """The display texels of these slots."""
+        bordered = self._lightmap.nodes.tile + 2 * self._border
+        corner = np.stack([slots % self._lightmap.columns, slots // self._lightmap.columns], 1) * bordered
+        return Mesh(self._gpu, quads(corner, bordered, corner).tobytes(), QUAD_FORMAT, per_instance=True)
+
+    @property
+    def _source_tables(self) -> dict[str, Texture]:
+        return self._lightmap.textures("t_pages", "t_leaves", "t_position_area")
 
     @property
     def _pages(self) -> tuple[float, float]:
@@ -119,7 +165,7 @@ class DisplayTexels:
 
     def release(self) -> None:
         release_targets(self._gpu, self._target, self._unlit_target, self._source_target)
-        self._gpu.release_all(*self._edges.values())
+        self._edges.release()
         for texture in (self._colour, self._unlit, *self._tables.values()):
             texture.release()
 
@@ -139,19 +185,22 @@ class DisplayTexels:
         """The sources of these rows of display texels."""
         self._find_sources.draw(
             self._source_target,
-            textures=self._lightmap.textures("t_pages", "t_leaves", "t_position_area"),
             uniforms={"u_pages": self._pages},
             viewport=(0, first, self.size[0], end - first),
+            textures=self._source_tables,
         )
         self._sourced_rows = end
 
-    def _pass(self, name: str, layer: Layer, shader: str, **more: bool) -> Pass:
-        key = name, layer, shader, *more.values()
+    def _pass(self, name: str, layer: Layer, shader: str, rects: bool, **more: bool) -> Pass:
+        key = name, layer, shader, rects, *more.values()
         if key not in self._passes:
             own = ("TILE",) if name == "edges" else ()
             defines = self._lightmap.defines(*layer.defines, *own) | more
             slots = {"layer": f"render/layers/{layer.shader}.glsl", "curve": f"render/{shader}.glsl"}
-            self._passes[key] = Pass(self._gpu, f"render/{name}", defines=defines, slots=slots, label=name)
+            vertex = "common/rects" if rects else FULLSCREEN
+            self._passes[key] = Pass(
+                self._gpu, f"render/{name}", defines=defines, slots=slots, label=name, vertex=vertex
+            )
         return self._passes[key]
 
     def _chart_table(self) -> Texture:
@@ -162,21 +211,19 @@ class DisplayTexels:
         chart_of_facet[charts.face_facet + 1] = charts.face_chart
         return self._gpu.texture((TABLE_WIDTH, rows), 1, "u4", chart_of_facet.tobytes())
 
-    def _place_table(self) -> Texture:
-        """For each page of the atlas, the display texel of a place uv [texels of level 0]: z·uv + (x, y), z 0 where no leaf is;
-        and when its leaf was split off, see LeafAges. RGBA32F."""
-        nodes = self._lightmap.nodes
-        pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64)
-        slot = np.maximum(pages - 1, 0)
-        first = (
-            np.stack([slot % nodes.columns, slot // nodes.columns], -1) * (nodes.tile + 2 * self._border) + self._border
-        )
-        tile = np.stack([nodes.leaves.x[slot], nodes.leaves.y[slot]], -1)
-        places = np.zeros((*pages.shape, 4), np.float32)
-        places[..., :2] = first - tile * nodes.tile
-        places[..., 2] = np.where(pages > 0, 2.0 ** nodes.leaves.level[slot], 0.0)
-        places[..., 3] = self._ages.born(nodes)
-        return self._gpu.texture(pages.shape[::-1], 4, "f4", places.tobytes())
+    def _write_places(self) -> None:
+        """For each slot, from 1, the display texel of a place uv [texels of level 0]: z·uv + (x, y), z 0 where no leaf is; and
+        when its leaf was split off, see LeafAges. RGBA32F, PLACES_WIDTH wide."""
+        nodes, table = self._lightmap.nodes, self._tables["t_places"]
+        leaves, slot = nodes.leaves, np.arange(nodes.tiles)
+        bordered = nodes.tile + 2 * self._border
+        places = np.zeros((table.width * table.height, 4), np.float32)
+        mine = places[1 : 1 + nodes.tiles]
+        mine[:, 0] = slot % nodes.columns * bordered + self._border - leaves.x * nodes.tile
+        mine[:, 1] = slot // nodes.columns * bordered + self._border - leaves.y * nodes.tile
+        mine[:, 2] = np.where(nodes.used, 2.0**leaves.level, 0.0)
+        mine[:, 3] = self._ages.born(nodes)
+        table.write(places.tobytes())
 
 
 def display_size(lightmap: Lightmap, border: int) -> tuple[int, int]:

@@ -74,7 +74,9 @@ class Surfaces:
             "u_turned": float(turned),
         }
         program.draw(
-            target, textures={n: self._shown[n] for n in ("t_display", "t_places")}, uniforms=uniforms | self._of_leaves
+            target,
+            textures={n: self._shown[n] for n in ("t_display", "t_shown_pages", "t_places")},
+            uniforms=uniforms | self._of_leaves,
         )
 
     @property
@@ -86,13 +88,13 @@ class Surfaces:
     def _of_leaves(self) -> dict[str, object]:
         """What overlays show leaves by. In a picture that stands for itself none is new, whenever the last one was drawn."""
         nodes, now = self.lightmap.nodes, self._ages.now if self._live else LATER
-        return {"u_leaves": float(nodes.depth > 0), "u_tile": float(nodes.tile), "u_now": now}
+        return {"u_leaves": float(nodes.adaptive), "u_tile": float(nodes.tile), "u_now": now}
 
     @property
     def _texel(self) -> tuple[float, float, float]:
         """Size of a display texel as the sampler counts, and pages per texel of level 0."""
         width, height = self._texels.size
-        return 1.0 / width, 1.0 / height, self.lightmap.nodes.pages_per_texel
+        return 1.0 / width, 1.0 / height, self._shown["t_shown_pages"].width / self.lightmap.charts.size[0]
 
     def _pass(self, overlay: bool, bicubic: bool) -> Pass:
         return Pass(self._gpu, "render/surfaces", defines={"OVERLAY": overlay, "BICUBIC": bicubic}, label="surfaces")

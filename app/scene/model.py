@@ -7,6 +7,7 @@ a diffuse emitter's exitance is πL [W/m²].
 from __future__ import annotations
 
 import dataclasses
+import functools
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -86,12 +87,12 @@ class Scene:
     warnings: tuple[str, ...] = ()
     source: Path | None = None
 
-    @property
+    @functools.cached_property
     def corners(self) -> F64:
         """(m, 3, 3) f64: the corner positions of each triangle."""
         return self.positions[self.triangles]
 
-    @property
+    @functools.cached_property
     def normals_areas(self) -> tuple[F64, F64]:
         """Unit geometric normals (m, 3) and areas (m,) [m²] of the triangles."""
         a, b, c = np.moveaxis(self.corners, 1, 0)

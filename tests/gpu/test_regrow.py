@@ -13,9 +13,10 @@ from test_session import forgotten, held
 from app.atlas.charts import DEFAULT_TILE, TILES
 from app.atlas.lightmap import LIGHT, STORAGE, Lightmap
 from app.atlas.parametrize import parametrize
-from app.atlas.quadtree import Quadtree, quadtree_nodes
+from app.atlas.quadtree import MAX_DEPTH, Quadtree, quadtree_nodes
 from app.atlas.regrow import Regrowth
 from app.gpu import Gpu
+from app.render import resolve
 from app.render.ages import LeafAges
 from app.render.options import INTERPOLATIONS, DisplayOptions
 from app.render.resolve import BORDER, DisplayTexels
@@ -320,15 +321,15 @@ def sampled(display: NDArray[np.float64], nodes: object, interpolation: str, slo
 
 
 def edge_points(nodes: object) -> list[tuple[int, int, F64]]:
-    """Places where two leaves of different level meet, at four places along each cell of the page table."""
+    """Places where two leaves of different level meet, four along the edge of a leaf of MAX_DEPTH."""
     pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64) - 1  # type: ignore[attr-defined]
     level, cell = nodes.leaves.level, 1 / nodes.pages_per_texel  # type: ignore[attr-defined]
-    found = []
+    found, count = [], 4 << (MAX_DEPTH - nodes.depth)  # type: ignore[attr-defined]
     for step, along in (((0, 1), (0, 1)), ((1, 0), (1, 0))):
         a, b = pages[: len(pages) - step[0], : pages.shape[1] - step[1]], pages[step[0] :, step[1] :]
         met = (a >= 0) & (b >= 0) & (level[a] != level[b])
         for y, x in np.argwhere(met):
-            for t in (0.125, 0.375, 0.625, 0.875):
+            for t in (np.arange(count) + 0.5) / count:
                 uv = np.array([x + along[1] + t * (1 - along[1]), y + along[0] + t * (1 - along[0])]) * cell
                 found.append((int(a[y, x]), int(b[y, x]), uv))
     return found
@@ -396,3 +397,73 @@ def test_curved_light_has_no_step_where_levels_meet(gpu: Gpu, uneven: Forest, in
         assert max(steps) < 1.25 * 5 / 32 * second_difference + 2 * ROUNDING, (direction, np.array(steps).max() * 255)
         # the ends are half of the edge of a small leaf
         assert np.mean(steps) < (1.0 if nodes.tile == 8 else 0.6) * ROUNDING
+
+
+# -- what follows the leaves ---------------------------------------------------------------------------------------------
+
+
+def tables(display: DisplayTexels) -> dict[str, NDArray[np.generic]]:
+    """What is shown where, without the ages of leaves."""
+    nodes, bordered = display._lightmap.nodes, display._lightmap.nodes.tile + 2 * display._border
+    raw = {name: np.frombuffer(display._tables[name].read(), np.uint32) for name in ("t_source", "t_shown_pages")}
+    places = np.frombuffer(display._tables["t_places"].read(), np.float32).reshape(-1, 4)[:, :3]
+    cells = raw["t_source"].reshape(nodes.rows, bordered, nodes.columns, bordered).swapaxes(1, 2)
+    colours = np.frombuffer(display._colour.read(), np.uint32).reshape(cells.swapaxes(1, 2).shape).swapaxes(1, 2)
+    used = nodes.used
+    tiles = {"source": cells, "colours": colours}
+    shown = {name: image.reshape(-1, bordered, bordered)[: nodes.tiles][used] for name, image in tiles.items()}
+    return shown | {"pages": raw["t_shown_pages"], "places": places[1 : 1 + nodes.tiles][used]}
+
+
+@pytest.mark.parametrize("interpolation", SMOOTH)
+@pytest.mark.parametrize("name", SCENES)
+def test_display_texels_follow_the_leaves(
+    gpu: Gpu, forest: Callable[..., Forest], rng: np.random.Generator, name: str, interpolation: str
+) -> None:
+    """A frame that brings only those of changed leaves up to date shows what one does that begins anew."""
+    trees = forest(SCENES[name](), texels=12000)
+    trees.tree.enlarge(3000)
+    trees.lightmap.enlarge()
+    options = DisplayOptions(layer="irradiance", tone_map="clamp", interpolation=interpolation)
+    known = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.nodes), BORDER[interpolation])
+    depths = set()
+    for change in ("none", "grow", "grow", "both", "shrink", "grow", "shrink", "shrink", "shrink", "shrink"):
+        if change in ("grow", "both"):
+            trees.grow(0.3, rng)
+        if change in ("shrink", "both") and trees.tree.merges(np.flatnonzero(trees.nodes.used)):
+            trees.shrink()
+        depths.add(trees.nodes.depth)
+        trees.write_noise(np.random.default_rng(len(depths)))
+        known.resolve("irradiance", options, scale=None, ambient=(0, 0, 0), whole=change == "none")
+        for _ in range(-(-known.size[1] * known.size[0] // resolve.TEXELS_PER_FRAME)):
+            known.resolve("irradiance", options, scale=None, ambient=(0, 0, 0), whole=False)
+        fresh = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.nodes), BORDER[interpolation])
+        fresh.resolve("irradiance", options, scale=None, ambient=(0, 0, 0), whole=True)
+        for what, expected in tables(fresh).items():
+            np.testing.assert_array_equal(tables(known)[what], expected, err_msg=f"{what} after {change}")
+        fresh.release()
+    assert known.fits(BORDER[interpolation]), "or it would have begun anew"
+    known.release()
+    assert len(depths) > 1, "the page table has been both coarser and finer"
+
+
+def test_pages_follow_the_finest_leaf(forest: Callable[..., Forest]) -> None:
+    """The table of a tree that has grown and shrunk is that of one made at once, and no finer than it must be."""
+    trees = forest(table_room(), texels=12000)
+    first = trees.nodes.depth
+    for _ in range(DEPTH):
+        trees.grow()
+    assert trees.nodes.depth == DEPTH == trees.nodes.leaves.level.max() > first
+    height, width = trees.nodes.slot_tables["t_pages"].shape[:2]
+    assert (width, height) == tuple(side << DEPTH for side in np.array(trees.nodes.charts.size) // trees.nodes.tile)
+    while trees.tree.merges(np.flatnonzero(trees.nodes.used)):
+        trees.shrink()
+    assert trees.nodes.depth <= trees.nodes.leaves.level.max() + 1 < DEPTH
+    pages = trees.lightmap.texture("t_pages")
+    held = np.frombuffer(pages.read(), np.uint32).reshape(pages.height, pages.width, 1)
+    np.testing.assert_array_equal(held, trees.nodes.slot_tables["t_pages"])
+    for slot in np.flatnonzero(trees.nodes.used):
+        k = 1 << (trees.nodes.depth - trees.nodes.leaves.level[slot])
+        x, y = trees.nodes.leaves.x[slot] * k, trees.nodes.leaves.y[slot] * k
+        assert (held[y : y + k, x : x + k] == slot + 1).all()
+    assert len(np.unique(held)) == trees.nodes.used.sum() + (held == 0).any()

@@ -96,12 +96,13 @@ def test_published_numbers_give_the_speeds_of_the_text() -> None:
     ("arguments", "says"),
     [
         ("", "-o/--output"),
-        ("-o out --only bogus", "bogus: must be one of coombe1, equal"),
+        ("-o out --only bogus", "bogus: must be one of coombe1, equal, wallner1"),
         ("-o out --only coombe1,,scaling", "must be one of"),
         ("-o out --seconds 0", "0: must be a number above 0"),
         ("-o out --seconds nan", "nan: must be a number above 0"),
-        ("-o file", "file: cannot write here"),
-        ("-o out --plots", "needs matplotlib: pip install 'glowtree[bench]'"),
+        ("-o file --only coombe1", "file: cannot write here"),
+        ("-o out --only coombe1 --plots", "--plots needs matplotlib: pip install 'glowtree[bench]'"),
+        ("-o out --only wallner2", "table wallner2 needs flip-evaluator: pip install 'glowtree[bench]'"),
     ],
 )
 def test_bad_input_is_one_line(
@@ -155,6 +156,16 @@ def test_only_the_tables_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(tables, "all_tables", lambda: named)
     assert run(["bench", "tables", "-o", str(tmp_path), "--only", "a,c", "--json"]) == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "c.csv", "tables.json", "tables.md"]
+
+
+def test_flip_sees_what_has_changed(rng: np.random.Generator) -> None:
+    flip = pytest.importorskip("app.bench.flip", reason="of the extra bench", exc_type=ImportError).flip
+    picture = rng.uniform(0.2, 0.8, (24, 32, 3))
+    assert flip(picture, picture) == 0.0
+    slightly, clearly = picture.copy(), picture.copy()
+    slightly[8:16, 8:16] *= 0.9
+    clearly[8:16, 8:16] = 1.0
+    assert 0.0 < flip(picture, slightly) < flip(picture, clearly) < 1.0
 
 
 def test_curve_is_of_the_state_after_its_shots(gpu: Gpu) -> None:

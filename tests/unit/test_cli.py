@@ -46,6 +46,8 @@ BAD = [
     ("info", "scene"),
     ("bench", "what"),
     ("bench bogus", "invalid choice: 'bogus'"),
+    ("bench frames nowhere", "the scenes cornell-box, furnace"),
+    ("bench frames --drag", "--drag: only --adaptive has the sliders that it moves"),
     ("doctor extra", "unknown argument extra"),
     ("view nothing.glb", "no such file or scene"),
     ("view --size 640", "640: must be WIDTHxHEIGHT"),
@@ -159,7 +161,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(
 
 
 def test_every_command_explains_itself(capsys: pytest.CaptureFixture[str]) -> None:
-    for line in ("", "view", "shot", "bake", "info", "doctor", "bench", "bench shots"):
+    for line in ("", "view", "shot", "bake", "info", "doctor", "bench", "bench shots", "bench frames"):
         assert code_of(f"{line} --help") == 0
         assert "usage: glowtree" in capsys.readouterr().out
 

@@ -299,7 +299,7 @@ def test_lamps_and_small_charts_begin_with_enough_texels(tile: int) -> None:
     scene = small_lamp_room()
     charts = parametrize(scene, density=10, tile=tile)
     leaves = first_leaves(scene, charts, 6)
-    nodes = NodeSet(scene, charts, leaves, depth=6)
+    nodes = NodeSet(scene, charts, leaves, adaptive=True)
     longer = charts.chart_rects[:, 2:].max(1)
     assert longer.min() < SMALLEST
     chart_of = {scene.object_ids[t]: c for t, c in zip(charts.face_triangle, charts.face_chart, strict=True)}

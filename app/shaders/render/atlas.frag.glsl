@@ -1,8 +1,8 @@
 // The virtual atlas as a picture: the display texels of its leaves. Those of a quadtree are framed in the colour of their level,
 // tinted with it where they are too small for a frame, and shine when they are new.
 #include "render/shine.glsl"
+#include "render/places.glsl"
 uniform sampler2D t_display;   // developed for the screen
-uniform sampler2D t_places;    // per page of the atlas: display texel = z · uv + xy; w: when its leaf was split off [s]
 uniform vec3 u_texel;          // size of a display texel; pages per texel of level 0
 uniform vec2 u_atlas_per_px;   // texels of level 0
 uniform float u_leaves;        // 1 for a quadtree
@@ -17,7 +17,7 @@ layout(location = 0) out vec4 out_colour;
 // [texels of level 0]
 vec2 uv_at(vec2 px) { return mix(px, px.yx, u_turned) * u_atlas_per_px; }
 
-vec4 place_at(vec2 uv) { return texelFetch(t_places, ivec2(uv * u_texel.z), 0); }
+vec4 place_at(vec2 uv) { return place_of(ivec2(uv * u_texel.z)); }
 
 void main() {
     vec3 colour = vec3(0.0);

@@ -3,8 +3,9 @@
 #define BICUBIC 0
 
 uniform sampler2D t_display;  // developed for the screen
-uniform sampler2D t_places;   // per page of the atlas: display texel = z · uv + xy; w: when its leaf was split off [s]
 uniform vec3 u_texel;         // size of a display texel; pages per texel of level 0
+
+#include "render/places.glsl"
 
 in vec4 v_uv;
 flat in vec3 v_unlit_front;
@@ -21,7 +22,7 @@ layout(location = 0) out vec4 out_colour;
 
 void main() {
     vec2 uv = gl_FrontFacing ? v_uv.xy : v_uv.zw;
-    vec4 place = texelFetch(t_places, max(ivec2(uv * u_texel.z), 0), 0);
+    vec4 place = place_of(max(ivec2(uv * u_texel.z), 0));
     vec2 texel = uv * place.z + place.xy;
 #if BICUBIC
     vec3 colour = bicubic(t_display, texel, u_texel.xy);

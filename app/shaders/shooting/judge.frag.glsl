@@ -16,6 +16,9 @@ const float IN_LIGHT = 0.5;  // a texel that sees more than half of the light th
 void main() {
     ivec2 corner_px = ivec2(gl_FragCoord.xy) * TILE;
     float roughest = 0.0, light = 0.0, area = 0.0, covered = 0.0, lit = 0.0;
+    float below[TILE], under[TILE];  // H of the two rows below
+    int column[TILE];                // covered texels below, without a gap
+    for (int i = 0; i < TILE; ++i) column[i] = 0;
     for (int j = 0; j < TILE; ++j) {
         float before = 0.0, last = 0.0;   // H of the two texels to the left
         int run = 0;                      // covered texels to the left, without a gap
@@ -29,13 +32,10 @@ void main() {
             run = here ? run + 1 : 0;
             before = last;
             last = H;
-            if (here && j >= 2) {
-                ivec2 below = px - ivec2(0, 1), under = px - ivec2(0, 2);
-                if (texelFetch(t_position_area, below, 0).w > 0.0 && texelFetch(t_position_area, under, 0).w > 0.0) {
-                    vec3 bend = texelFetch(t_irradiance, under, 0).rgb - 2.0 * texelFetch(t_irradiance, below, 0).rgb + h.rgb;
-                    roughest = max(roughest, abs(dot(bend, vec3(1.0 / 3.0))));
-                }
-            }
+            if (here && column[i] >= 2) roughest = max(roughest, abs(under[i] - 2.0 * below[i] + H));
+            column[i] = here ? column[i] + 1 : 0;
+            under[i] = below[i];
+            below[i] = H;
             light += H * A;
             area += A;
             covered += here ? 1.0 : 0.0;

@@ -8,7 +8,6 @@ A leaf that came late inherited interpolated light from earlier shots: reshootin
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -41,7 +40,7 @@ class AdaptiveShooting(Reshooting):
         self._regrowth = Regrowth(gpu, lightmap)
         self._judge = Pass(gpu, "shooting/judge", defines=lightmap.defines("TILE"))
         self._roughness, self._roughness_target = self._slots(gpu, lightmap)
-        self._judged: deque[tuple[int, ReadBack]] = deque()
+        self._judged: tuple[int, ReadBack] | None = None  # on its way, and the version of the leaves that it is of
         self._look_at = 0
         self._split_at: dict[Tile, int] = {}  # shots in the log when a leaf was split
         self._calm = False  # the last look at the leaves found nothing to do
@@ -85,7 +84,8 @@ class AdaptiveShooting(Reshooting):
             made = super().step(shots)
         if self._redo_under_way is None and (not self._calm or done or self._log.count >= self._look_at):
             self._look(PER_SHOT * min(shots, BATCH))
-            self._look_at = self._log.count + max(LOOK_AFTER, self._log.count // 4)
+            if self._judged is None:
+                self._look_at = self._log.count + max(LOOK_AFTER, self._log.count // 4)
         self._all_again &= not self.settled
         return made or shots
 
@@ -113,14 +113,16 @@ class AdaptiveShooting(Reshooting):
     # -- judging and growing -------------------------------------------------------------------------------------------
 
     def _look(self, most: int) -> None:
-        """Judge all leaves; act on the last judgement that has arrived, on so many of them at most."""
-        if len(self._judged) > 1:
-            version, readback = self._judged.popleft()
-            data = np.frombuffer(readback.take(), np.float32).reshape(-1, 4)
-            if version == self.lightmap.version:
-                self._calm = not self._grow(data[: self.lightmap.nodes.tiles].astype(np.float64), most)
-        self._weigh_leaves()
-        self._judged.append((self.lightmap.version, ReadBack(self.gpu, self._roughness_target)))
+        """Judge all leaves; at the next look act on the judgement, which has arrived, on so many of them at most. One look does
+        one of both: a frame has time for either."""
+        if self._judged is None:
+            self._weigh_leaves()
+            self._judged = self.lightmap.version, ReadBack(self.gpu, self._roughness_target)
+            return
+        (version, readback), self._judged = self._judged, None
+        data = np.frombuffer(readback.take(), np.float32).reshape(-1, 4)
+        if version == self.lightmap.version:
+            self._calm = not self._grow(data[: self.lightmap.nodes.tiles].astype(np.float64), most)
 
     def _weigh_leaves(self) -> None:
         self._judge.draw(
@@ -209,5 +211,6 @@ class AdaptiveShooting(Reshooting):
         self._exchange(gone, came, inherit=change.split)
 
     def _drop_judged(self) -> None:
-        while self._judged:
-            self._judged.popleft()[1].take()
+        if self._judged is not None:
+            self._judged[1].take()
+            self._judged = None

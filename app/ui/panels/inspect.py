@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
 
+from app.solvers import TREE
 from app.ui import theme, widgets
 from app.ui.panels import atlas
 from app.ui.state import State
@@ -53,7 +54,8 @@ def _hemicube(session: Session, state: State) -> tuple[Any, int]:
     """The picture of the last shot and the triangles that vanish in it, made anew a few times a second, and whenever the
     textures behind it may be others.
     """
-    source = session.lightmap, session.shooting
+    shooting = session.shooting.as_dict().items()
+    source = session.lightmap, [value for name, value in shooting if name not in TREE]
     state.hemicube_age += imgui.get_io().delta_time
     if state.hemicube is None or state.hemicube[0] != source or state.hemicube_age >= REFRESH_SECONDS:
         state.hemicube, state.hemicube_age = (source, session.hemicube_image(), session.vanished()), 0.0

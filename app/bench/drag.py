@@ -1,0 +1,27 @@
+"""``glowtree bench frames --drag``: the sliders of the quadtrees, dragged back and forth as a hand does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from app.options import specs
+from app.solvers import ShootingOptions
+
+SWEEP = 75  # frames from one end of a slider to the other
+SWEEPS = 4
+DECADES = 1.5  # that the gradient goes down from where it is
+DEPTHS = (6, 2)
+DRAGGED = ("gradient", "depth")
+
+
+def drag(name: str, start: ShootingOptions) -> Iterator[ShootingOptions]:
+    """What the panel hands over, frame by frame, while the slider of one of DRAGGED is moved from ``start`` to its other end
+    and back."""
+    least = {spec.name: spec.minimum or 0.0 for spec in specs(ShootingOptions)}["gradient"]
+    for nth in range(1, SWEEPS * SWEEP + 1):
+        sweep, step = divmod(nth, SWEEP)
+        place = (step if sweep % 2 == 0 else SWEEP - step) / SWEEP
+        if name == "gradient":
+            yield start.replace(gradient=max(start.gradient * 10.0 ** (-DECADES * place), least))
+        else:
+            yield start.replace(depth=round(DEPTHS[0] + (DEPTHS[1] - DEPTHS[0]) * place))

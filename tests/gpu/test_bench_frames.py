@@ -1,0 +1,43 @@
+"""``glowtree bench frames``: what a hand does to the sliders, and what is printed of it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from app.bench import drag as drags
+from app.bench import frames
+from app.bench.drag import DECADES, DEPTHS, DRAGGED, SWEEP, SWEEPS, drag
+from app.cli import run
+from app.solvers import ShootingOptions
+
+
+def test_a_hand_goes_there_and_back_in_small_steps() -> None:
+    start = ShootingOptions(depth=6)
+    gradients = np.log10([o.gradient for o in drag("gradient", start)])
+    assert len(gradients) == SWEEP * SWEEPS
+    assert np.isclose(gradients[-1], np.log10(start.gradient)), "back where it was"
+    assert np.isclose(np.ptp(gradients), DECADES)
+    np.testing.assert_allclose(np.abs(np.diff(gradients)), DECADES / SWEEP)
+    depths = np.array([o.depth for o in drag("depth", start)])
+    assert (depths.max(), depths.min(), depths[-1]) == (*DEPTHS, DEPTHS[0])
+    assert np.abs(np.diff(depths)).max() == 1
+    assert min(o.gradient for o in drag("gradient", start.replace(gradient=2e-4))) == 1e-4, "the slider's end"
+
+
+def test_drags_are_measured(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(drags, "SWEEP", 4)
+    monkeypatch.setattr(frames, "WARM_UP", 2)
+    command = ["bench", "frames", "cornell-box", "--adaptive", "--drag", "--texels", "2000", "--depth", "3"]
+    assert run([*command, "--json"]) == 0
+    values = json.loads(capfd.readouterr().out)
+    assert values["leaves_after_1_s"] > values["leaves_opened"] > 0
+    assert set(values["drags"]) == set(DRAGGED)
+    for row in values["drags"].values():
+        assert row["frames"] == 4 * SWEEPS and row["leaves"] > 0
+        assert 0 < row["median_ms"] <= row["p99_ms"] <= row["worst_ms"]
+        assert 0 <= row["slow_frames"] <= row["frames"]
+    text = frames._drag_table(values)
+    assert "dragging gradient, 16 frames" in text and "dragging depth, 16 frames" in text
