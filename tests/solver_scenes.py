@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from app.atlas.charts import DEFAULT_TILE
@@ -14,6 +16,7 @@ from app.atlas.node_set import NodeSet
 from app.atlas.parametrize import parametrize
 from app.atlas.quadtree import quadtree_nodes
 from app.gpu import Gpu
+from app.projections import PROJECTIONS
 from app.scene.model import F32, F64, Material, Scene
 from app.solvers import SOLVERS, EnergyBook, ShootingOptions, UniformShooting
 from app.solvers.shooting.options import MAX_LEVEL
@@ -69,6 +72,9 @@ def table_room() -> Scene:
         grey(0.5, double_sided=True),
     )
     return quads_scene([*room((4.0, 3.0, 4.0)), lamp, table], materials, [0, 0, 1, 0, 0, 0, 2, 3])
+
+
+EVERY_WAY = pytest.mark.parametrize(("solver", "projection"), list(itertools.product(SOLVERS, PROJECTIONS)))
 
 
 @dataclass

@@ -28,7 +28,7 @@ TRIANGLES = (1_000, 3_000, 10_000, 30_000, 100_000, 300_000)
 TEXELS = (10_000, 30_000, 100_000, 300_000, 1_000_000, 4_000_000)
 AT_TEXELS, AT_TRIANGLES = 100_000, 10_000  # of the sweep over the other
 CONVERGENCE = ("museum", 31_000)
-EQUAL_TEXELS = (8_000, 32_000, 128_000, 256_000)  # uniform ones
+EQUAL_TEXELS, EQUAL_TILES = (8_000, 32_000, 128_000, 256_000), (16, 8)  # uniform texels; adaptive leaves
 Measure = Callable[[Gpu, float], Row]
 
 
@@ -205,9 +205,8 @@ def _coombe_1() -> Table:
 
 
 def _equal() -> Table:
-    def job(texels: int | None) -> tuple[str, Measure]:
-        atlas = AtlasOptions(texels=texels) if texels else AtlasOptions(adaptive=True)
-        return f"{texels:,} uniform texels" if texels else "adaptive", lambda gpu, _: equal.error_row(gpu, atlas)
+    def job(label: str, atlas: AtlasOptions) -> tuple[str, Measure]:
+        return label, lambda gpu, _: equal.error_row(gpu, atlas)
 
     return Table(
         "equal",
@@ -220,6 +219,7 @@ def _equal() -> Table:
         ),
         (
             Column("subdivision", "subdivision"),
+            Column("tile", "tile"),
             Column("texels", "texels", ","),
             Column("shots", "shots", ","),
             Column("seconds", "s", ".1f"),
@@ -231,7 +231,10 @@ def _equal() -> Table:
             Column("equal_seconds", "equal s", ".1f"),
             Column("seconds_share", "share", ".2f"),
         ),
-        (*(job(texels) for texels in EQUAL_TEXELS), job(None)),
+        (
+            *(job(f"{texels:,} uniform texels", AtlasOptions(texels=texels)) for texels in EQUAL_TEXELS),
+            *(job(f"leaves of {tile}", AtlasOptions(adaptive=True, tile=tile)) for tile in EQUAL_TILES),
+        ),
         Plot("seconds", ("rms",), "subdivision", ("s", "relative RMS")),
         equal.compared,
     )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from solver_scenes import UNIT_SQUARE, Solution, begin, grey, quads_scene, room, solve, table_room
+from solver_scenes import EVERY_WAY, UNIT_SQUARE, Solution, begin, grey, quads_scene, room, solve, table_room
 
 from app.gpu import Gpu
 from app.reference.form_factors import point_to_polygon
@@ -19,6 +19,8 @@ from app.solvers.shooting.options import FORM_FACTORS, VISIBILITIES
 from app.solvers.shooting.stages import BATCH
 
 EVERY_SOLVER = pytest.mark.parametrize("solver", SOLVERS)
+# Of the hemisphere, what is open at the rim of a map of 256 px that is drawn in straight pieces: a sample or two, (1/R)² each
+SAGITTA = {"hemicube": 0.0, "stereographic": 2 / 256**2, "nonlinear": 0.0}
 
 
 def shares(solution: Solution) -> dict[str, float]:
@@ -31,15 +33,16 @@ def shares(solution: Solution) -> dict[str, float]:
 # -- Σ A_j F_ij / A_i = 1 ----------------------------------------------------------------------------------------------
 
 
-@EVERY_SOLVER
-def test_every_shooter_of_the_empty_box_hands_out_all_of_it(gpu: Gpu, solver: str) -> None:
+@EVERY_WAY
+def test_every_shooter_of_the_empty_box_hands_out_all_of_it(gpu: Gpu, solver: str, projection: str) -> None:
     """Within 0.5 %: texels near a shooter are sampled at their centroid only, and an edge may take one map sample for the
-    other wall's."""
-    box = begin(gpu, load_scene("furnace"), texels=2400, solver=solver)
+    other wall's. Nothing leaves a closed box but what SAGITTA says."""
+    box = begin(gpu, load_scene("furnace"), texels=2400, solver=solver, projection=projection)
     audits = box.audits()
     assert len(audits) == 150
     np.testing.assert_allclose([a.received for a in audits], 1.0, atol=0.005)
-    assert all(a.open == 0 and a.black == 0 for a in audits)  # nothing leaves a closed box
+    assert max(a.open for a in audits) <= SAGITTA[projection]
+    assert all(a.black == 0 for a in audits)
     assert sum(a.shot.area for a in audits) == pytest.approx(6, rel=1e-5)  # they tile it, in single precision
     box.release()
 
@@ -109,9 +112,9 @@ def test_book_counts_what_leaves_and_what_black_sides_take(gpu: Gpu, half_open: 
 # -- furnaces ----------------------------------------------------------------------------------------------------------
 
 
-@EVERY_SOLVER
+@EVERY_WAY
 @pytest.mark.parametrize("rho", [0.3, 0.5, 0.9])
-def test_furnace(gpu: Gpu, rho: float, solver: str) -> None:
+def test_furnace(gpu: Gpu, rho: float, solver: str, projection: str) -> None:
     """In a closed box of one albedo and emission, B = E / (1 - ρ) everywhere.
 
     What is still unshot is missing, at most 1e-3 of the emitted power times the bounces it would still make, 1 / (1 - ρ), over
@@ -119,12 +122,12 @@ def test_furnace(gpu: Gpu, rho: float, solver: str) -> None:
     0.5 % a bounce; without ``coarsen``, since larger patches that take over shoot the mean of unequal ones."""
     exitance = 2.0
     scene = quads_scene(room(), [grey(rho, exitance)])
-    furnace = solve(gpu, scene, texels=384, level=3, coarsen=False, solver=solver)
+    furnace = solve(gpu, scene, texels=384, level=3, coarsen=False, solver=solver, projection=projection)
     B = furnace.B[:, 1] * (1 - rho) / exitance
     assert np.average(B, weights=furnace.area) == pytest.approx(1, abs=0.01)
     assert np.abs(B - 1).max() < 0.01
     assert abs(shares(furnace)["imbalance"]) < 1e-3
-    assert shares(furnace)["escaped"] == 0
+    assert shares(furnace)["escaped"] <= SAGITTA[projection] / (1 - rho)  # at every bounce
     furnace.release()
 
 
@@ -141,8 +144,8 @@ def test_furnace_while_patches_coarsen(gpu: Gpu, solver: str) -> None:
     furnace.release()
 
 
-@EVERY_SOLVER
-def test_furnace_with_a_ball(gpu: Gpu, solver: str) -> None:
+@EVERY_WAY
+def test_furnace_with_a_ball(gpu: Gpu, solver: str, projection: str) -> None:
     """A ball of 1280 triangles in the room, under texels as large as 20 of them: they must neither hide in the ball nor look
     into it. Of the light, 1 % is still unshot, at most 2 % of B here; texels of several planes shoot and receive as if they were
     one, which loses another 1 %."""
@@ -156,7 +159,7 @@ def test_furnace_with_a_ball(gpu: Gpu, solver: str) -> None:
         object_ids=np.concatenate([walls.object_ids, np.full(len(ball.triangles), 6)]).astype(np.int32),
         objects=(*walls.objects, "ball"),
     )
-    furnace = solve(gpu, scene, texels=1000, residual=0.01, solver=solver)
+    furnace = solve(gpu, scene, texels=1000, residual=0.01, solver=solver, projection=projection)
     B = furnace.means(furnace.B)[:, 0] / 2
     np.testing.assert_allclose(B, 1.0, atol=0.04)
     assert abs(shares(furnace)["imbalance"]) < 0.015
@@ -201,11 +204,11 @@ def test_a_lone_emitter_sends_everything_away(gpu: Gpu) -> None:
     lamp.release()
 
 
-@EVERY_SOLVER
-def test_cornell_box_with_an_audit_per_shot(gpu: Gpu, solver: str) -> None:
+@EVERY_WAY
+def test_cornell_box_with_an_audit_per_shot(gpu: Gpu, solver: str, projection: str) -> None:
     """The open box with two blocks and a lamp 0.1 mm under the ceiling. What each shot hands out, shot by shot as the solve
     chooses them: within 1 % in the mean. A patch that a block stands on or cuts is off by more, and shoots less."""
-    box = begin(gpu, load_scene("cornell-box"), texels=4000, solver=solver, coarsen=False)
+    box = begin(gpu, load_scene("cornell-box"), texels=4000, solver=solver, projection=projection, coarsen=False)
     audits = []
     for _ in range(60):
         box.solver.step(1)
@@ -221,11 +224,11 @@ def test_cornell_box_with_an_audit_per_shot(gpu: Gpu, solver: str) -> None:
     box.release()
 
 
-@EVERY_SOLVER
-def test_cornell_box_book(gpu: Gpu, solver: str) -> None:
+@EVERY_WAY
+def test_cornell_box_book(gpu: Gpu, solver: str, projection: str) -> None:
     """At 4000 texels a block's foot is a texel wide (2 cm), and a patch whose middle lies close to it sees too much or too
     little: the solve loses 1 % of the light, 1.5 % is allowed. The open front is a sixth of the box."""
-    box = solve(gpu, load_scene("cornell-box"), texels=4000, residual=5e-3, solver=solver)
+    box = solve(gpu, load_scene("cornell-box"), texels=4000, residual=5e-3, solver=solver, projection=projection)
     s = shares(box)
     assert abs(s["imbalance"]) < 0.015
     assert 0.2 < s["escaped"] < 0.4

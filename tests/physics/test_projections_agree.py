@@ -15,17 +15,6 @@ EVERY_PROJECTION = pytest.mark.parametrize("projection", PROJECTIONS)
 
 
 @EVERY_PROJECTION
-def test_every_shooter_of_the_empty_box_hands_out_all_of_it(gpu: Gpu, projection: str) -> None:
-    """Within 0.5 %, as in test_energy.py. Nothing may leave, not even at the rim; but drawn
-    in straight pieces, this is open by their sagittas: (1/R)² of the hemisphere at most."""
-    box = begin(gpu, load_scene("furnace"), texels=860, projection=projection)
-    audits = box.audits()
-    np.testing.assert_allclose([a.received for a in audits], 1.0, atol=0.005)
-    assert max(a.open for a in audits) <= (1 / 256**2 if projection == "stereographic" else 0)
-    box.release()
-
-
-@EVERY_PROJECTION
 def test_cornell_box_audits(gpu: Gpu, projection: str) -> None:
     """Open front, blocks, a lamp 0.1 mm under the ceiling: within 1 % in the mean over all patches, weighted by area. Where a
     block stands on a patch or cuts it, the patch's middle is a poor judge."""
@@ -55,7 +44,7 @@ def test_solutions_agree(gpu: Gpu) -> None:
     nothing in the mean over an object."""
     H = {}
     for projection in PROJECTIONS:
-        mine = solve(gpu, table_room(), density=8, residual=0.02, resolution=128, projection=projection)
+        mine = solve(gpu, table_room(), density=5, residual=0.02, resolution=128, projection=projection)
         H[projection] = mine.H, mine.means(mine.H)
         mine.release()
     for texels, means in H.values():

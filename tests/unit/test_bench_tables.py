@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from app.atlas.options import AtlasOptions
-from app.bench import measure, published, tables
+from app.bench import equal, measure, published, tables
 from app.bench.report import Column, csv_text, markdown_table
 from app.bench.rooms import FEWEST, room_of
 from app.cli import run
@@ -196,3 +196,34 @@ def test_uniform_and_adaptive_are_measured(gpu: Gpu) -> None:
     assert 3_000 < row["uniform_texels"] < 5_000 and 0 < row["adaptive_texels"] < 2 * row["uniform_texels"]
     assert row["uniform_shots"] > 0 and row["uniform_s"] > 0 and row["adaptive_s"] > 0
     assert row["their_uniform_s"] == 0.25
+
+
+def test_equal_error_is_read_between_uniform_rows() -> None:
+    """Halfway in the logarithm of the error is halfway in those of texels and seconds; beyond the uniform errors is nothing."""
+    uniform = [(1e3, 1.0, 0.04), (1e5, 100.0, 0.01)]
+    rows: list[dict[str, Any]] = [
+        {"subdivision": "uniform", "texels": texels, "seconds": s, "rms": rms} for texels, s, rms in uniform
+    ]
+    rows += [{"subdivision": "adaptive", "texels": 2e3, "seconds": 2.0, "rms": rms} for rms in (0.02, 0.005)]
+    equal.compared(rows)
+    assert rows[2]["equal_texels"] == pytest.approx(1e4) and rows[2]["texels_share"] == pytest.approx(0.2)
+    assert rows[2]["equal_seconds"] == pytest.approx(10) and rows[2]["seconds_share"] == pytest.approx(0.2)
+    assert "equal_texels" not in rows[3] and "equal_texels" not in rows[0]
+
+
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_a_lightmap_is_read_where_its_points_are(gpu: Gpu, adaptive: bool) -> None:
+    """E = a position's height above the floor, exact where bilinear: inside of faces; texels at their edges hold the mean of
+    what they cover, half a texel in."""
+    with measure.opened(gpu, "furnace", AtlasOptions(texels=4_000, adaptive=adaptive), ShootingOptions()) as (
+        lightmap,
+        _,
+    ):
+        scene, nodes = lightmap.scene, lightmap.nodes
+        height = nodes.image_from_tiles(nodes.surfaces.position[..., 1:2].astype(np.float32))
+        lightmap.texture("t_irradiance").write(np.ascontiguousarray(height.repeat(4, -1) / lightmap.unit).tobytes())
+        points = equal.random_points(scene, lightmap.charts, 300, 3)
+        read, position = equal.irradiance_of(lightmap, points)[:, 0], points.positions_normals(scene)[0][:, 1]
+        texel = 1 / lightmap.charts.density
+    assert np.abs(read - position).max() < 0.51 * texel
+    assert np.median(np.abs(read - position)) < 1e-4

@@ -49,13 +49,13 @@ class ShootingOptions(Options):
         multiple=64,
     )
     depth: int = option(
-        4, "finest level of quadtree leaves, each half the texel of the one above", minimum=0, maximum=MAX_DEPTH
+        3, "finest level of quadtree leaves, each half the texel of the one above", minimum=0, maximum=MAX_DEPTH
     )
     criterion: str = option(
         "gradient", "a leaf splits where the light's gradient jumps, or where light and shadow mix", choices=CRITERIA
     )
     gradient: float = option(
-        0.8,
+        0.5,
         "jump of irradiance between texels that splits a leaf, over the scene's mean",
         minimum=1e-4,
         maximum=10,
