@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from app.render.edges import KINDS, Kind, unequal_edges
 from app.scene.model import F64
 
 Make = Callable[[Kind, Framebuffer, Mapping[str, object], Mapping[str, Texture]], None]
-Scissor = tuple[int, int, int, int]
 BORDER_FORMAT = {"in_rect": "4f", "in_from": "3f"}
 IN_A_ROW = 16  # instances whose texels are made side by side
 
@@ -24,7 +23,7 @@ class EdgeTexels:
     def __init__(self, gpu: Gpu, lightmap: Lightmap, border: int) -> None:
         self._gpu, self._lightmap, self._border = gpu, lightmap, border
         self._found = unequal_edges(lightmap.nodes, border, np.flatnonzero(lightmap.nodes.used))
-        self._of_rows: dict[tuple[int, int], list[Batch]] = {}
+        self._of_rows: dict[tuple[int, int], list[_Batch]] = {}
         self._place = Pass(gpu, "render/border", label="edges")
 
     def follow(self, slots: NDArray[np.int64]) -> None:
@@ -34,35 +33,21 @@ class EdgeTexels:
             known = self._found[kind]
             self._found[kind] = np.concatenate([known[~np.isin(known[:, 0], slots)], some])
 
-    def of_rows(self, first: int, end: int) -> list[Batch]:
-        """Those that reach into these rows of display texels. Kept until leaves change."""
-        key = first, end
-        if key not in self._of_rows:
-            bordered = self._lightmap.nodes.tile + 2 * self._border
-            self._of_rows[key] = self._batches(
-                lambda found: (found[:, 2] < end) & (found[:, 2] + bordered > first)  # more than any is high
-            )
-        return self._of_rows[key]
-
-    def of_slots(self, slots: NDArray[np.int64]) -> list[Batch]:
-        """Those of these slots. Whoever asks releases them."""
-        return self._batches(lambda found: np.isin(found[:, 0], slots))
-
-    def draw(self, target: Framebuffer, make: Make, some: Iterable[tuple[list[Batch], Scissor | None]]) -> None:
-        """Let ``make`` draw the texels of these batches, given what to bind besides light, and then bring them to their places in
-        ``target``, inside of the scissor: one target after another, since a change of it makes a rasteriser wait."""
+    def draw(self, target: Framebuffer, first: int, end: int, make: Make) -> None:
+        """Those in some rows of ``target``, the display texels: let ``make`` draw them, given what to bind besides light, and
+        then bring them to their places. One target after the other, since a change of it makes a rasteriser wait."""
         along = {kind: kind.along(self._lightmap.nodes.tile, self._border) for kind in KINDS}
-        placed = [(batch, scissor) for batches, scissor in some for batch in batches]
-        for batch, _ in placed:
+        batches = self._batches(first, end)
+        for batch in batches:
             values = {"u_along": along[batch.kind], "u_border": self._border}
             make(batch.kind, batch.target, values, {"t_edges": batch.edges})
-        for batch, scissor in placed:
+        for batch in batches:
             self._place.draw(
                 target,
                 textures={"t_made": batch.made},
                 uniforms={"u_size": target.size, "u_along": along[batch.kind]},
                 mesh=batch.mesh,
-                scissor=scissor,
+                scissor=(0, first, target.size[0], end - first),
             )
 
     def release(self) -> None:
@@ -74,13 +59,19 @@ class EdgeTexels:
                 batch.release()
         self._of_rows.clear()
 
-    def _batches(self, which: Callable[[F64], NDArray[np.bool_]]) -> list[Batch]:
-        some = [(kind, self._found[kind][which(self._found[kind])]) for kind in KINDS]
-        tile, border = self._lightmap.nodes.tile, self._border
-        return [Batch(self._gpu, kind, found, kind.along(tile, border), border) for kind, found in some if len(found)]
+    def _batches(self, first: int, end: int) -> list[_Batch]:
+        """Those that reach into these rows. Kept until leaves change."""
+        key, tile, border = (first, end), self._lightmap.nodes.tile, self._border
+        if key not in self._of_rows:
+            self._of_rows[key] = batches = []
+            for kind, found in self._found.items():
+                some = found[(found[:, 2] < end) & (found[:, 2] + tile > first)]  # none is as high as a tile
+                if len(some):
+                    batches.append(_Batch(self._gpu, kind, some, kind.along(tile, border), border))
+        return self._of_rows[key]
 
 
-class Batch:
+class _Batch:
     """Border texels of one kind: their instances, a texture in which they are made side by side, and their places."""
 
     def __init__(self, gpu: Gpu, kind: Kind, found: F64, along: int, border: int) -> None:

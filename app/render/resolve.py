@@ -19,7 +19,7 @@ from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.gpu.shader import FULLSCREEN
 from app.render.ages import LeafAges
 from app.render.develop import curve
-from app.render.edge_texels import Batch, EdgeTexels, Scissor
+from app.render.edge_texels import EdgeTexels
 from app.render.edges import Kind, reached_from
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS, Layer
@@ -104,17 +104,12 @@ class DisplayTexels:
 
         draw("unlit", self._unlit_target)
         band = 0, first, self.size[0], rows
-        draw("resolve", self._target, viewport=band)
-        edges: list[tuple[list[Batch], Scissor | None]] = [(self._edges.of_rows(first, first + rows), band)]
-        late = []
-        if len(self._stale) and rows < self.size[1]:
-            rects, late = self._quads(self._stale), self._edges.of_slots(self._stale)
+        if len(self._stale) and rows < self.size[1]:  # their borders between levels come with their band
+            rects = self._quads(self._stale)
             draw("resolve", self._target, rects=True, mesh=rects)
             rects.release()
-            edges.append((late, None))
-        self._edges.draw(self._target, make_edges, edges)
-        for batch in late:
-            batch.release()
+        draw("resolve", self._target, viewport=band)
+        self._edges.draw(self._target, first, first + rows, make_edges)
         self._stale = self._stale[:0]
         smooth = layer.smooth and display.interpolation != "nearest"
         filtering = self._gpu.ctx.LINEAR if smooth else self._gpu.ctx.NEAREST
