@@ -15,8 +15,8 @@ DRAGGED = ("gradient", "depth")
 
 
 def drag(name: str, start: ShootingOptions) -> Iterator[ShootingOptions]:
-    """What the panel hands over, frame by frame, while the slider of one of DRAGGED is moved from ``start`` to its other end
-    and back."""
+    """What the panel hands over, frame by frame, while the slider of one of DRAGGED is moved: the gradient down from where it
+    is, the depth between DEPTHS, and back."""
     least = {spec.name: spec.minimum or 0.0 for spec in specs(ShootingOptions)}["gradient"]
     for nth in range(1, SWEEPS * SWEEP + 1):
         sweep, step = divmod(nth, SWEEP)

@@ -78,7 +78,7 @@ def _form_factors(surfaces: TexelSurfaces, at: NDArray[np.int64], area: F64) -> 
     free[i, j] = free[j, i] = grid.free(p[i], n[i], p[j], n[j])
     F *= free
     total = np.maximum(F.sum(1), 1.0)
-    return np.asarray(F / np.maximum(total[:, None], total))  # A_i F_ij = A_j F_ji stays true
+    return np.asarray(F / np.maximum(total[:, None], total))
 
 
 class _Grid:

@@ -1,7 +1,8 @@
 """Progressive radiosity on texture quadtrees: leaves split where the light bends, merge where it does not [Coombe03, 4].
 
-After each batch every leaf is judged on the GPU, and the host hears of it one step later: how much the gradient of H jumps in it,
-or how many of its texels lie in shadow [Wallner10, 5]. Light is pushed down to children and pulled up to parents.
+Every leaf is judged on the GPU, and the host hears of it one step later: how much the gradient of H jumps in it, or how many of
+its texels lie in shadow [Wallner10, 5]. Light is pushed down to children and pulled up to parents. While leaves change they are
+judged at every second step, else when a quarter more shots have been made, and at the end.
 
 A leaf that came late inherited interpolated light from earlier shots: reshooting.py makes them again into fresh leaves.
 """
@@ -43,34 +44,39 @@ class AdaptiveShooting(Reshooting):
         self._judged: tuple[int, ReadBack] | None = None  # on its way, and the version of the leaves that it is of
         self._look_at = 0
         self._split_at: dict[Tile, int] = {}  # shots in the log when a leaf was split
-        self._calm = False  # the last look at the leaves found nothing to do
+        self._calm, self._calm_at = (
+            False,
+            0,
+        )  # whether the last look at the leaves found nothing to do; shots in the log then
         super().__init__(gpu, lightmap, options)
 
     # -- the solver's interface ----------------------------------------------------------------------------------------
 
     def reset(self) -> None:
         """Forget all light. The leaves stay: those that are not needed merge."""
-        self._drop_judged()
-        self._calm, self._look_at = False, 0
-        self._split_at.clear()
+        self._look_anew()
         super().reset()
 
     def set_options(self, options: ShootingOptions) -> None:
         self._calm = False
-        if options.replace(**{name: getattr(self.options, name) for name in TREE}) == self.options:
-            self.options, self._all_again = options, True
+        rest = options.replace(**{name: getattr(self.options, name) for name in TREE})  # but for the tree as it is
+        if rest != options:
+            self._all_again = bool(self._log.count)
             self._split_at.clear()
-        else:
+        if rest != self.options:
             super().set_options(options)
+        self.options = options
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
-        self._calm = False
+        self._look_anew()
         super().set_materials(materials)
 
     @property
     def settled(self) -> bool:
         """Whether the tree has stopped growing and all its leaves hold what the shots gave them."""
-        return self._calm and not self._fresh and self._redo_under_way is None
+        done = self.report.residual <= self.options.residual
+        judged = self._calm and not (done and self._calm_at < self._log.count)  # once more at the end
+        return judged and not self._fresh and self._redo_under_way is None
 
     def step(self, shots: int) -> int:
         """First what there is to do for fresh leaves, a batch of earlier shots at a time, then shots while light is left."""
@@ -78,6 +84,9 @@ class AdaptiveShooting(Reshooting):
         done = bool(self._log.count) and self.report.residual <= self.options.residual
         if self._redo_under_way is not None:
             made = self._redo()
+            if self._redo_under_way is None:
+                self._drop_judged()  # by the light that leaves had inherited
+                self._calm = False
         elif self._fresh and (self._calm if done or self._all_again else self._redo_pays):
             made = self._begin_redo()
         elif not done:
@@ -123,6 +132,13 @@ class AdaptiveShooting(Reshooting):
         data = np.frombuffer(readback.take(), np.float32).reshape(-1, 4)
         if version == self.lightmap.version:
             self._calm = not self._grow(data[: self.lightmap.nodes.tiles].astype(np.float64), most)
+            self._calm_at = self._log.count
+
+    def _look_anew(self) -> None:
+        """What is known of the leaves is of another light."""
+        self._drop_judged()
+        self._calm, self._look_at = False, 0
+        self._split_at.clear()
 
     def _weigh_leaves(self) -> None:
         self._judge.draw(
@@ -145,7 +161,10 @@ class AdaptiveShooting(Reshooting):
         self.note = None
         splits = self.tree.splits(grows.tolist(), options.depth)[:most]
         self._make_room(4 * len(splits))
-        splits = splits[: self.tree.room // 4]
+        within_budget = max(options.budget // nodes.tile**2 - len(self.tree), 0) // 3  # four leaves for one
+        if len(splits) > min(self.tree.room // 4, within_budget):
+            self.note = f"leaves stop growing: the budget of {options.budget:,} texels is reached"
+            splits = splits[: min(self.tree.room // 4, within_budget)]
         if splits:
             self._split_at |= {self.tree.tile(slot): self._log.count for slot in splits}
             self._apply(self.tree.split(splits))
@@ -165,7 +184,7 @@ class AdaptiveShooting(Reshooting):
         return level > self.options.depth or since is None or self._log.count >= MERGE_AFTER * since
 
     def _make_room(self, slots: int) -> None:
-        """Have so many free slots, if the budget allows; else say so."""
+        """Have so many free slots, if the budget allows."""
         nodes = self.lightmap.nodes
         if self.tree.room >= slots:
             return
@@ -173,8 +192,8 @@ class AdaptiveShooting(Reshooting):
         most = min(self.options.budget // nodes.tile**2, nodes.columns * longest)
         wanted = max(nodes.tiles * 3 // 2, nodes.tiles + slots)
         if min(wanted, most) > nodes.tiles:
-            self._end_redo()
             self.poll(wait=True)
+            choice, audits = self.stages.choices.index(self._choice), self._audits
             self.tree.enlarge(min(wanted, most))
             self.lightmap.enlarge()
             self._enlarged()
@@ -182,8 +201,7 @@ class AdaptiveShooting(Reshooting):
             self._roughness, self._roughness_target = self._slots(self.gpu, self.lightmap)
             self.buffers = self.buffers.enlarged(self.lightmap)
             self._remake_stages(self.options)
-        if self.tree.room < slots:
-            self.note = f"leaves stop growing: the budget of {self.options.budget:,} texels is reached"
+            self._choice, self._audits = self.stages.choices[choice], audits
 
     @staticmethod
     def _slots(gpu: Gpu, lightmap: Lightmap) -> tuple[Texture, Framebuffer]:
@@ -203,7 +221,6 @@ class AdaptiveShooting(Reshooting):
         return jump > options.gradient, jump < MERGE * options.gradient
 
     def _apply(self, change: Change) -> None:
-        self._end_redo()
         self._regrowth.apply(change, self._carried)
         self._emitted = self.lightmap.emitted
         gone, came = (change.parents, change.children) if change.split else (change.children, change.parents)

@@ -32,8 +32,9 @@ from app.solvers.shooting.uniform import UniformShooting
 
 # Once the strongest shot left holds less of the emitted power, light is so even that interpolation serves: the Cornell box errs
 # by 1.7 % where 100 of 2200 shots count as strong, as where all do, and by 2.5 % where the first 60 do.
-STRONG = 2.0**-10
-REDO_AFTER = 3  # new shots for each that was made again the last time: redoing is at most a quarter of all shots
+# Where a lamp is cut into many patches, direct light is made of faint shots: half of all light is to be shot as well.
+STRONG, MOSTLY_SHOT = 2.0**-10, 0.5
+REDO_AFTER = 3  # new shots for each that was made again the last time, until some are made again once more
 
 
 class Reshooting(UniformShooting):
@@ -69,8 +70,14 @@ class Reshooting(UniformShooting):
         self._forget_strong()
         self._fresh.clear()
         self._redone_at = self._redone = 0
+        self._all_again = False
         super().reset()
         self._weak = False
+
+    def set_options(self, options: ShootingOptions) -> None:
+        """As of any solver; a redo begins again, all with the same options."""
+        self._end_redo()
+        super().set_options(options)
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """As of any solver; shots of the difference may be strong again."""
@@ -100,7 +107,7 @@ class Reshooting(UniformShooting):
     def _hear(self, choice: ChoiceStages, report: F64) -> None:
         super()._hear(choice, report)
         power = float(powers_of(report[None, REPORT_HEAD:])[0]) * self._watt
-        self._weak = self._weak or power < STRONG * self._emitted.sum()
+        self._weak = self._weak or (power < STRONG * self._emitted.sum() and self.report.residual < MOSTLY_SHOT)
 
     def _book(self, shots: int) -> None:
         super()._book(shots)
