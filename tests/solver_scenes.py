@@ -74,7 +74,13 @@ def table_room() -> Scene:
     return quads_scene([*room((4.0, 3.0, 4.0)), lamp, table], materials, [0, 0, 1, 0, 0, 0, 2, 3])
 
 
-EVERY_WAY = pytest.mark.parametrize(("solver", "projection"), list(itertools.product(SOLVERS, PROJECTIONS)))
+EVERY_WAY = pytest.mark.parametrize(
+    ("solver", "projection"),
+    [
+        pytest.param(*way, marks=() if way[1] == "hemicube" else pytest.mark.long)
+        for way in itertools.product(SOLVERS, PROJECTIONS)
+    ],
+)
 
 
 @dataclass
