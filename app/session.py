@@ -207,13 +207,13 @@ class Session:
         """Whether nothing changes by itself: neither light nor numbers, and no scene is on its way."""
         return self.loading is None and not self.shooting_goes_on and self._settled
 
-    def advance(self, *, budget_ms: float, shots: int = 1) -> int:
+    def advance(self, *, budget_ms: float, shots: int = 1, brisk: bool = False) -> int:
         """Make up to ``shots`` shots within ``budget_ms``; returns how many. None when paused or converged, nor in a frame that
-        has already done something long."""
+        has already done something long. brisk: a hand is at the controls, see ``Pacer.advance``."""
         if not self._opened or self._busy or not self.shooting_goes_on:
             return 0
         self._settled = False
-        made = self._pace.advance(self.solver, budget_ms, shots)
+        made = self._pace.advance(self.solver, budget_ms, shots, brisk=brisk)
         self.seconds += self._pace.lap()
         return made
 

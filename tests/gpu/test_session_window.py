@@ -14,12 +14,12 @@ from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
 from app.headless_ui import UiFrame
 from app.loading import load
+from app.pacing import FAST_FRAME, SLOW_FRAME, Turns
 from app.render.exposure import first_exposure
 from app.render.options import DisplayOptions
 from app.session import Session
 from app.solvers import ShootingOptions
 from app.ui.app import Ui
-from app.window import FAST_FRAME, SLOW_FRAME, Turns
 
 SMALL = AtlasOptions(texels=4000)
 PATIENCE = 60.0  # s

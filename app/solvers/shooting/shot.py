@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -27,6 +28,9 @@ from app.solvers.shooting.stages import BATCH, BLOCK_BYTES, OPEN, SHOOTER_ROWS, 
 # lose more than this share of its own, its patch is split. Most light is shot by few patches: a hall under skylights in coffers
 # gains 5.8 % without.
 AUDITED, SOUND = 0.02, 0.02
+
+
+ResultT = TypeVar("ResultT")
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,22 @@ def powers_of(rows: F64) -> F64:
     return np.asarray(rows[:, 0, 3] * np.abs(rows[:, 5, :3]).sum(-1))
 
 
+def rows_of(size: tuple[int, int], band: int, bands: int) -> tuple[int, int, int, int] | None:
+    """One of so many bands of a target of this size as a scissor (x, y, width, height) [px]; None for all of it."""
+    width, height = size
+    lower, upper = (height * nth // bands for nth in (band, band + 1))
+    return None if bands == 1 else (0, lower, width, upper - lower)
+
+
+def whole(parts: Generator[None, None, ResultT]) -> ResultT:
+    """Do all parts of something; what it returns."""
+    while True:
+        try:
+            next(parts)
+        except StopIteration as end:
+            return end.value  # type: ignore[no-any-return]  # StopIteration does not know it
+
+
 class ShotPasses:
     """What a shot is made of. Whoever shoots owns the lightmap's light, sets these and says when."""
 
@@ -94,14 +114,18 @@ class ShotPasses:
         for first, some in self.stages.groups(shots):
             part(first, some)
 
-    def _choose(self, shots: int) -> Iterator[None]:
+    def _choose(self, shots: int, bands: int) -> Iterator[None]:
         """The strongest patches, those that fail their audit split; in parts. [Coombe03, 3.4]"""
-        self._pick(shots)
+        yield from self._pick(shots, bands)
         while self._audits and (yield from self._fails(shots)):
-            self._pick(shots)
+            yield from self._pick(shots, bands)
 
-    def _pick(self, shots: int) -> None:
-        self._weigh(self._choice)
+    def _pick(self, shots: int, bands: int = 1) -> Generator[None, None, None]:
+        """The strongest patches, all texels read in so many bands."""
+        for band in range(bands):
+            self._add_patches(self._choice, band, bands)
+            yield
+        self._add_runs(self._choice)
         self._describe(self._choice, shots)
 
     def _zero(self, shots: int) -> None:
@@ -152,10 +176,17 @@ class ShotPasses:
         rows = np.frombuffer(self.buffers.shooters.read(), np.float32).reshape(BATCH, -1, 4)
         return rows[:shots, :SHOOTER_ROWS].astype(np.float64)
 
-    def _weigh(self, choice: ChoiceStages) -> None:
-        """Residual power of every patch of this level, and the strongest of each run of slots."""
+    def _add_patches(self, choice: ChoiceStages, band: int = 0, bands: int = 1) -> None:
+        """Residual power of every patch of this level, or of those in one of so many bands."""
         textures = self.lightmap.textures("t_position_area", "t_residual", "t_leaves")
-        choice.add_patches.draw(choice.patch_target, textures=textures | {"t_finer": self.buffers.finer})
+        choice.add_patches.draw(
+            choice.patch_target,
+            textures=textures | {"t_finer": self.buffers.finer},
+            scissor=rows_of(choice.patch_size, band, bands),
+        )
+
+    def _add_runs(self, choice: ChoiceStages) -> None:
+        """The strongest patch of each run of slots, and the power of all."""
         choice.add_runs.draw(
             self.buffers.run_target,
             textures={"t_patches": choice.patches},
@@ -201,11 +232,9 @@ class ShotPasses:
             depth=True,
         )
 
-    def _light(self, first: int, shots: int, start: float = 0.0, end: float = 1.0) -> None:
-        """Receive into the lightmap, in the rows between two shares of its height."""
-        width, height = self.lightmap.size
-        lower, upper = round(start * height), round(end * height)
-        rows = None if upper - lower == height else (0, lower, width, upper - lower)
+    def _light(self, first: int, shots: int, band: int = 0, bands: int = 1) -> None:
+        """Receive into the lightmap, or into one of so many bands."""
+        rows = rows_of(self.lightmap.size, band, bands)
         self._receive(self.lightmap.light_target, first, shots, blend="add", rows=rows)
 
     def _receive(
