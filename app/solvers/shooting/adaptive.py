@@ -81,7 +81,8 @@ class AdaptiveShooting(Reshooting):
         return judged and not self._fresh and self._redo_under_way is None
 
     def _parts(self, shots: int, bands: int) -> Generator[None, None, int]:
-        """First what there is to do for fresh leaves, a batch of earlier shots at a time, then shots while light is left."""
+        """First what there is to do for fresh leaves, a batch of earlier shots at a time, then shots while light is left; not
+        until the leaves have followed a slider that was moved."""
         made = 0
         done = bool(self._log.count) and self.report.residual <= self.options.residual
         if self._redo_under_way is not None:
@@ -91,7 +92,7 @@ class AdaptiveShooting(Reshooting):
                 self._calm = False
         elif self._fresh and (self._calm if done or self._all_again else self._redo_pays):
             self._begin_redo()
-        elif not done:
+        elif not done and (self._calm or not self._all_again):
             made = yield from super()._parts(shots, bands)
         if self._redo_under_way is None and (not self._calm or done or self._log.count >= self._look_at):
             yield
