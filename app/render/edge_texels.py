@@ -66,8 +66,10 @@ class EdgeTexels:
             self._of_rows[key] = batches = []
             for kind, found in self._found.items():
                 some = found[(found[:, 2] < end) & (found[:, 2] + tile > first)]  # none is as high as a tile
-                if len(some):
-                    batches.append(_Batch(self._gpu, kind, some, kind.along(tile, border), border))
+                most = IN_A_ROW * self._gpu.limits.max_texture
+                for start in range(0, len(some), most):
+                    part = some[start : start + most]
+                    batches.append(_Batch(self._gpu, kind, part, kind.along(tile, border), border))
         return self._of_rows[key]
 
 
