@@ -19,7 +19,6 @@ from app.gpu.shader import SHADERS, Source
 from app.render.camera import CameraView
 from app.render.options import LAYERS, DisplayOptions
 from app.render.resolve import PLACES_WIDTH
-from app.render.targets import release_targets
 from app.scene.load import load_scene
 from app.session import Session, Stop
 from app.solvers import SOLVERS, ShootingOptions
@@ -53,8 +52,7 @@ def test_every_program_that_asks_for_the_tile_is_told(gpu: Gpu, monkeypatch: pyt
     assert {"render/source", "render/resolve", "render/edges", "lightmap/push"} <= set(asked)
     assert {"shooting/choose", "shooting/patches", "shooting/books", "shooting/judge"} <= set(asked)
     session.release()
-    release_targets(gpu, target)
-    texture.release()
+    gpu.release_all(target, texture)
     library.release()
 
 
@@ -71,7 +69,6 @@ def pictures(gpu: Gpu, display: DisplayOptions, light: float) -> list[NDArray[np
         camera = scene.cameras[0]
         distance = float(np.linalg.norm(camera.world_from_camera[:3, 3] - lightmap.frame.centre))
         made.append(render_image(gpu, lightmap, CameraView.from_camera(camera, distance), display, SIZE))
-        release_targets(gpu)
         lightmap.release()
     return made
 
