@@ -17,7 +17,7 @@ import numpy as np
 from app.atlas.lightmap import Lightmap
 from app.atlas.options import AtlasOptions
 from app.bench.published import CoombeRow, RmsRow, WallnerRow
-from app.bench.report import Row
+from app.bench.report import FLIP, Row, missing
 from app.bench.rooms import room_of
 from app.bench.shots import ms_per_shot, passes_ms
 from app.gpu import Gpu
@@ -197,9 +197,8 @@ def first_below(curve: list[tuple[int, float]], level: float) -> int | None:
 
 
 def rms_row(gpu: Gpu, seconds: float, theirs: RmsRow) -> Row:
-    """RMS and FLIP of the picture against the hemicube's for both hemispheres, at the same residual; none where time ran out."""
-    from app.bench.flip import flip
-
+    """RMS and FLIP of the picture against the hemicube's for both hemispheres, at the same residual; none where time ran out, and
+    no FLIP where it is not installed."""
     roots = round(ROOT_TEXELS * theirs.size**2) if theirs.level else round(ROOT_TEXELS * theirs.size**2 / 4)
     adaptive = theirs.subdivision == "adaptive"
     atlas = AtlasOptions(texels=roots if adaptive else roots << 2 * theirs.level, adaptive=adaptive)
@@ -222,7 +221,10 @@ def rms_row(gpu: Gpu, seconds: float, theirs: RmsRow) -> Row:
     if converged:  # else the pictures differ by their shots
         for name in ("stereographic", "nonlinear"):
             row[f"{name}_rms"] = rms(pictures[name] - pictures["hemicube"])
-            row[f"{name}_flip"] = flip(pictures["hemicube"], pictures[name])
+            if not missing(FLIP):
+                from app.bench.flip import flip
+
+                row[f"{name}_flip"] = flip(pictures["hemicube"], pictures[name])
     return row | {"their_stereographic": theirs.stereographic, "their_nonlinear": theirs.nonlinear}
 
 

@@ -12,7 +12,6 @@ from app.render.false_colour import LAYER, Scale, false_colour_scale
 from app.render.options import DisplayOptions
 from app.render.pick import Picker, PickHit
 from app.render.surfaces import Rect, Surfaces
-from app.render.targets import release_targets
 from app.scene.model import RGB
 
 GL_DEPTH_CLAMP = 0x864F  # OpenGL 3.2: what lies before the near plane is drawn at it instead of being cut away
@@ -151,7 +150,4 @@ class _Picture:
         self.target = gpu.target(self.colour, depth=self.depth)
 
     def release(self) -> None:
-        release_targets(self._gpu, self.target)
-        self.depth.release()
-        if self.own:
-            self.colour.release()
+        self._gpu.release_all(self.target, self.depth, *([self.colour] if self.own else []))

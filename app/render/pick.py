@@ -9,7 +9,6 @@ import numpy as np
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, Pass
 from app.render.surfaces import uniform_matrix
-from app.render.targets import release_targets
 from app.scene.model import F64
 
 
@@ -37,7 +36,6 @@ class Picker:
     """Owns the one-pixel target. Whoever makes it releases it."""
 
     def __init__(self, gpu: Gpu) -> None:
-
         self._textures = [gpu.texture((1, 1), 4, "u4"), gpu.texture((1, 1), 4, "f4"), gpu.texture((1, 1), 4, "f4")]
         self._gpu, self._pass = gpu, Pass(gpu, "render/pick")
         self._depth = gpu.depth_texture((1, 1))
@@ -69,10 +67,7 @@ class Picker:
         return with_texel(replace(hit, facet=int(ids[2]) - 1, atlas_uv=(float(atlas[0]), float(atlas[1]))), lightmap)
 
     def release(self) -> None:
-        release_targets(self._gpu, self._target)
-        self._depth.release()
-        for texture in self._textures:
-            texture.release()
+        self._gpu.release_all(self._target, self._depth, *self._textures)
 
 
 def with_texel(hit: PickHit, lightmap: Lightmap) -> PickHit:

@@ -8,7 +8,7 @@ from app.render.ages import LATER, LeafAges
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
-from app.render.resolve import BORDER, DisplayTexels
+from app.render.resolve import BORDER, PLACES_WIDTH, DisplayTexels
 from app.scene.model import F64, RGB
 
 Rect = tuple[float, float, float, float]
@@ -97,7 +97,8 @@ class Surfaces:
         return 1.0 / width, 1.0 / height, self._shown["t_shown_pages"].width / self.lightmap.charts.size[0]
 
     def _pass(self, overlay: bool, bicubic: bool) -> Pass:
-        return Pass(self._gpu, "render/surfaces", defines={"OVERLAY": overlay, "BICUBIC": bicubic}, label="surfaces")
+        defines = {"OVERLAY": overlay, "BICUBIC": bicubic, "PLACES_WIDTH": PLACES_WIDTH}
+        return Pass(self._gpu, "render/surfaces", defines=defines, label="surfaces")
 
     def release(self) -> None:
         self._texels.release()

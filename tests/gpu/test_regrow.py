@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -16,8 +17,9 @@ from app.atlas.parametrize import parametrize
 from app.atlas.quadtree import MAX_DEPTH, Quadtree, quadtree_nodes
 from app.atlas.regrow import Regrowth
 from app.gpu import Gpu
-from app.render import resolve
+from app.render import edge_texels, resolve
 from app.render.ages import LeafAges
+from app.render.edges import unequal_edges
 from app.render.options import INTERPOLATIONS, DisplayOptions
 from app.render.resolve import BORDER, DisplayTexels
 from app.scene.load import load_scene
@@ -397,6 +399,23 @@ def test_curved_light_has_no_step_where_levels_meet(gpu: Gpu, uneven: Forest, in
         assert max(steps) < 1.25 * 5 / 32 * second_difference + 2 * ROUNDING, (direction, np.array(steps).max() * 255)
         # the ends are half of the edge of a small leaf
         assert np.mean(steps) < (1.0 if nodes.tile == 8 else 0.6) * ROUNDING
+
+
+def test_edges_that_one_texture_cannot_hold(
+    gpu: Gpu, forest: Callable[..., Forest], rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Many small leaves have more of them than a texture has rows: their border texels are made in several."""
+    trees = forest(quads_scene([room((4.0, 4.0, 4.0))[0]], [grey(0.5, 1.0)]), texels=160 * 160, tile=8)
+    trees.grow(0.3, rng)
+    light = 0.5 + 0.25 * np.sin(places(trees).sum(-1))
+    whole = shown(gpu, trees, "bicubic", light)
+    longest = max(whole.shape)  # as short as the display texels allow
+    monkeypatch.setattr(resolve, "TABLE_WIDTH", longest)
+    monkeypatch.setattr(edge_texels, "IN_A_ROW", 1)
+    monkeypatch.setattr(gpu, "limits", dataclasses.replace(gpu.limits, max_texture=longest))
+    found = unequal_edges(trees.nodes, BORDER["bicubic"], np.flatnonzero(trees.nodes.used))
+    assert max(len(some) for some in found.values()) > longest
+    np.testing.assert_array_equal(shown(gpu, trees, "bicubic", light), whole)
 
 
 # -- what follows the leaves ---------------------------------------------------------------------------------------------

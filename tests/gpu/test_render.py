@@ -20,7 +20,6 @@ from app.render.exposure import exposure_of
 from app.render.false_colour import LUMINANCE, colour_map, false_colour_scale
 from app.render.frame import FrameRenderer
 from app.render.options import INTERPOLATIONS, LAYERS, TONE_MAPS, DisplayOptions
-from app.render.targets import release_targets
 from app.scene.load import load_scene
 from app.scene.model import F64, Material, Scene
 
@@ -39,7 +38,6 @@ def cornell() -> Scene:
 def box(gpu: Gpu, cornell: Scene) -> Iterator[Lightmap]:
     lightmap = Lightmap.of(gpu, cornell, parametrize(cornell, texels=4000))
     yield lightmap
-    release_targets(gpu)
     lightmap.release()
 
 
@@ -140,7 +138,7 @@ def test_pixels_show_their_texel(gpu: Gpu, box: Lightmap, rng: np.random.Generat
         compared += 1
     assert compared > 20
     renderer.release()
-    release_targets(gpu, target)
+    gpu.release_all(target)
 
 
 @pytest.mark.parametrize("interpolation", INTERPOLATIONS)
@@ -206,7 +204,7 @@ def test_bicubic_is_the_cubic_b_spline(gpu: Gpu, box: Lightmap, rng: np.random.G
     assert compared > 30
     assert crossing > 5
     renderer.release()
-    release_targets(gpu, target)
+    gpu.release_all(target)
 
 
 def test_right_way_up_and_round(gpu: Gpu, box: Lightmap) -> None:
@@ -266,8 +264,7 @@ def test_sides_without_texels_show_what_they_are(gpu: Gpu, layer: str, double_si
         assert hit.back == back
         assert (hit.texel is not None) == (back and double_sided)
     renderer.release()
-    release_targets(gpu, target)
-    colour.release()
+    gpu.release_all(target, colour)
     lightmap.release()
 
 
@@ -328,7 +325,7 @@ def test_pick_agrees_with_a_ray(gpu: Gpu, box: Lightmap, rng: np.random.Generato
     assert (triangle >= 0).any()
     assert (triangle < 0).any()
     renderer.release()
-    release_targets(gpu, target)
+    gpu.release_all(target)
 
 
 # -- overlays ----------------------------------------------------------------------------------------------------------
@@ -356,7 +353,7 @@ def test_the_shooter_is_marked_where_it_is(gpu: Gpu, box: Lightmap, rng: np.rand
         assert rect[0] - 2 <= under.atlas_uv[0] <= rect[2] + 2
         assert rect[1] - 2 <= under.atlas_uv[1] <= rect[3] + 2
     renderer.release()
-    release_targets(gpu, target)
+    gpu.release_all(target)
 
 
 @pytest.mark.parametrize("display", [PLAIN.replace(grid=True), PLAIN.replace(layer="charts")])
@@ -466,8 +463,7 @@ def test_any_target_gets_the_same_picture(gpu: Gpu, box: Lightmap) -> None:
         renderer.render(target, SIZE, box, view_of(box), PLAIN)
         pixels = np.frombuffer(target.read((0, 0, *SIZE), 3), np.uint8).reshape(SIZE[1], SIZE[0], 3)[::-1]
         assert (pixels == expected).all()
-        release_targets(gpu, target)
-        colour.release()
+        gpu.release_all(target, colour)
     renderer.release()
 
 
@@ -495,8 +491,7 @@ def test_large_lightmaps_are_brought_up_to_date_in_turn(
         display = PLAIN.replace(interpolation=interpolation)
         assert (frame(display) == picture(gpu, box, display)).all()
     renderer.release()
-    release_targets(gpu, target)
-    colour.release()
+    gpu.release_all(target, colour)
 
 
 def test_a_frame_follows_storage_and_materials(gpu: Gpu, box: Lightmap) -> None:
@@ -514,5 +509,4 @@ def test_a_frame_follows_storage_and_materials(gpu: Gpu, box: Lightmap) -> None:
     assert brightest == pytest.approx(encode_srgb(np.array([0.17, 0.12, 0.04])), abs=0.15)
     assert brightest[0] == pytest.approx(encode_srgb(np.array(0.17)), abs=STEP)
     renderer.release()
-    release_targets(gpu, target)
-    colour.release()
+    gpu.release_all(target, colour)

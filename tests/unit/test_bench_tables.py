@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -147,6 +148,7 @@ def test_ctrl_c_keeps_finished_rows(
     assert (tmp_path / "out/tables.md").read_text() == out
     assert "Nothing was measured." in out
     values = json.loads((tmp_path / "out/tables.json").read_text())
+    assert len(values["warnings"]) == 2 and "job 1: left out" in values["warnings"][0]
     assert values["interrupted"] and values["renderer"] and values["machine"]
     assert values["tables"] == {"coombe1": [{"scene": "a", "n": 7, "ms": 0.5}], "wallner1": []}
 
@@ -156,6 +158,29 @@ def test_only_the_tables_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(tables, "all_tables", lambda: named)
     assert run(["bench", "tables", "-o", str(tmp_path), "--only", "a,c", "--json"]) == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "c.csv", "tables.json", "tables.md"]
+
+
+def test_without_an_extra_all_but_its_columns_is_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    two = (table("plain", lambda gpu, seconds: {"n": 1}), table("wallner2", lambda gpu, seconds: {"n": 2}))
+    flip = tuple(c for t in tables.all_tables() for c in t.columns if c.needs)
+    assert [c.head for c in flip] == ["stereographic FLIP", "nonlinear FLIP"]
+    known = two[0], dataclasses.replace(two[1], columns=(*COLUMNS, *flip))
+    monkeypatch.setattr(tables, "all_tables", lambda: known)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert run(["bench", "tables", "-o", str(tmp_path)]) == 0
+    out, err = capfd.readouterr()
+    assert err == (
+        "glowtree: note: table wallner2: left out: stereographic FLIP, nonlinear FLIP: needs flip-evaluator: "
+        "pip install 'glowtree[bench]'\n"
+    )
+    assert "FLIP" not in out
+    assert (tmp_path / "wallner2.csv").read_text() == "scene,n,ms\n,2,\n"
+    values = json.loads((tmp_path / "tables.json").read_text())
+    assert values["tables"]["plain"] == [{"n": 1}] and values["warnings"] == [
+        err.removeprefix("glowtree: note: ").strip()
+    ]
 
 
 def test_flip_sees_what_has_changed(rng: np.random.Generator) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from app.atlas.lightmap import Lightmap
 from app.atlas.quadtree import Change, Quadtree, Tile
 from app.atlas.regrow import Regrowth, corners
-from app.gpu import Framebuffer, Gpu, Pass, ReadBack, Texture
+from app.gpu import Gpu, Pass, ReadBack
 from app.scene.model import Material
 from app.solvers.shooting.options import TREE, ShootingOptions
 from app.solvers.shooting.reshooting import Reshooting
@@ -41,7 +41,6 @@ class AdaptiveShooting(Reshooting):
         self.tree = Quadtree(lightmap.nodes)
         self._regrowth = Regrowth(gpu, lightmap)
         self._judge = Pass(gpu, "shooting/judge", defines=lightmap.defines("TILE"))
-        self._roughness, self._roughness_target = self._slots(gpu, lightmap)
         self._judged: tuple[int, ReadBack] | None = None  # on its way, and the version of the leaves that it is of
         self._look_at = 0
         self._split_at: dict[Tile, int] = {}  # shots in the log when a leaf was split
@@ -50,6 +49,7 @@ class AdaptiveShooting(Reshooting):
             0,
         )  # whether the last look at the leaves found nothing to do; shots in the log then
         super().__init__(gpu, lightmap, options)
+        self._roughness, self._roughness_target = self._texels(per_slot=True)
 
     # -- the solver's interface ----------------------------------------------------------------------------------------
 
@@ -201,16 +201,10 @@ class AdaptiveShooting(Reshooting):
             self.lightmap.enlarge()
             self._enlarged()
             self.gpu.release_all(self._roughness_target, self._roughness)
-            self._roughness, self._roughness_target = self._slots(self.gpu, self.lightmap)
+            self._roughness, self._roughness_target = self._texels(per_slot=True)
             self.buffers = self.buffers.enlarged(self.lightmap)
             self._remake_stages(self.options)
             self._choice, self._audits = self.stages.choices[choice], audits
-
-    @staticmethod
-    def _slots(gpu: Gpu, lightmap: Lightmap) -> tuple[Texture, Framebuffer]:
-        """A texel for each slot of the node set."""
-        texture = gpu.texture((lightmap.columns, lightmap.rows), 4, "f4")
-        return texture, gpu.target(texture)
 
     def _opinion(self, judged: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which leaves should split, and which need not be as fine as they are."""

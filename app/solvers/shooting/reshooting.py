@@ -139,9 +139,10 @@ class Reshooting(UniformShooting):
             self._copy_into(self._strong[1], old)
             self.gpu.release_all(old_target, old)
 
-    def _texels(self) -> tuple[Texture, Framebuffer]:
-        """As large as the node set."""
-        texture = self.gpu.texture(self.lightmap.size, 4, "f4")
+    def _texels(self, *, per_slot: bool = False) -> tuple[Texture, Framebuffer]:
+        """As large as the node set, or one for each of its slots."""
+        size = (self.lightmap.columns, self.lightmap.rows) if per_slot else self.lightmap.size
+        texture = self.gpu.texture(size, 4, "f4")
         return texture, self.gpu.target(texture)
 
     def _copy_into(self, target: Framebuffer, source: Texture) -> None:

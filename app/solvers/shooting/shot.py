@@ -22,8 +22,19 @@ from app.atlas.lightmap import Lightmap
 from app.gpu import Buffer, Framebuffer, Gpu, Mesh
 from app.scene.model import F64
 from app.solvers.shooting.options import ShootingOptions
-from app.solvers.shooting.stages import BATCH, BLOCK_BYTES, OPEN, SHOOTER_ROWS, ChoiceStages, ShotBuffers, ShotStages
+from app.solvers.shooting.stages import (
+    BATCH,
+    BLOCK_BYTES,
+    BLOCK_ROWS,
+    OPEN,
+    SHOOTER_ROWS,
+    ChoiceStages,
+    Maps,
+    ShotBuffers,
+    ShotStages,
+)
 
+Blocks = dict[str, tuple[Buffer, int, int]]  # what a pass binds: buffer, offset and size [bytes]
 # The shots of a batch that holds so large a share of the emitted power are audited before they shoot; where one would make or
 # lose more than this share of its own, its patch is split. Most light is shot by few patches: a hall under skylights in coffers
 # gains 5.8 % without.
@@ -36,13 +47,14 @@ ResultT = TypeVar("ResultT")
 @dataclass(frozen=True)
 class Shot:
     """The shooter of one shot: centre [m], unit normal, area [m²], lower corner (x, y) and edge of its patch in the node set
-    [texels]."""
+    [texels]; rows (SHOOTER_ROWS, 4): all of it, see shooter.glsl."""
 
     centre: F64
     normal: F64
     area: float
     corner: tuple[int, int]
     size: int
+    rows: F64
 
 
 @dataclass(frozen=True)
@@ -203,9 +215,10 @@ class ShotPasses:
         )
         self.buffers.shooter_target.read_into(self.buffers.shooter_blocks, components=4, dtype="f4")
 
-    def _see(self, first: int, shots: int) -> None:
-        """Item buffer and depth from so many shooters of the batch, all views in one draw. [Coombe03, 3.2; Cohen85]"""
-        maps = self.stages.maps
+    def _see(self, first: int, shots: int, maps: Maps | None = None, shooters: Blocks | None = None) -> None:
+        """Item buffer and depth from so many shooters of the batch, all views in one draw; or of others, into other maps.
+        [Coombe03, 3.2; Cohen85]"""
+        maps, shooters = maps or self.stages.maps, shooters or self._shooter_blocks
         used = None if shots == maps.count else (0, 0, maps.items.width, shots * maps.map_size[1])
         maps.target.clear(OPEN, depth=1.0, viewport=used)
         projection, occluders = self.stages.projection, self.buffers.occluders
@@ -214,7 +227,7 @@ class ShotPasses:
             maps.target,
             textures=casters.textures,
             uniforms={"u_maps": maps.count, "u_first": first},
-            blocks=self._shooter_blocks,
+            blocks=shooters,
             mesh=casters.mesh,
             vertices=casters.vertices,
             instances=projection.views * shots,
@@ -225,7 +238,7 @@ class ShotPasses:
             maps.target,
             textures={"t_triangles": occluders.texture},
             uniforms={"u_maps": maps.count, "u_first": first},
-            blocks=self._shooter_blocks,
+            blocks=shooters,
             vertices=occluders.count,
             instances=shots,
             points=True,
@@ -270,8 +283,15 @@ class ShotPasses:
             )
 
     @property
-    def _shooter_blocks(self) -> dict[str, tuple[Buffer, int, int]]:
+    def _shooter_blocks(self) -> Blocks:
         return {"ShooterBlock": (self.buffers.shooter_blocks, 0, BATCH * BLOCK_BYTES)}
+
+    def _shooter_alone(self, shot: Shot) -> Blocks:
+        """One shooter, in whatever batch it shot."""
+        rows = np.zeros((BLOCK_ROWS, 4), np.float32)
+        rows[: len(shot.rows)] = shot.rows
+        self.buffers.inspected_block.write(rows.tobytes())
+        return {"ShooterBlock": (self.buffers.inspected_block, 0, BATCH * BLOCK_BYTES)}
 
     def _look_out(self, first: int, shots: int) -> None:
         """Add up how much of the shooters' sight leaves the scene."""
@@ -297,16 +317,16 @@ class ShotPasses:
     def _shot_from_rows(self, rows: F64) -> Shot:
         frame, corner = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3]))
         area = float(rows[0, 3]) * frame.scale**2
-        return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, int(rows[5, 3]))
+        rows = rows[:SHOOTER_ROWS]
+        return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, int(rows[5, 3]), rows)
 
     @property
     def _watt(self) -> float:
         """Watts in one stored unit of power: lightmap unit [W/m²] times solver area."""
         return self.lightmap.unit * self.lightmap.frame.scale**2
 
-    def vanished(self) -> int:
-        """Triangles that the first shooter of the last step sees, but between the samples of its map: each was drawn as one
-        sample. Waits for the GPU."""
+    def _count_vanished(self, shot: Shot) -> int:
+        """Triangles that it sees, but between the samples of its map. Waits for the GPU."""
         texture = self.gpu.texture((1, 1), 1, "f4")
         target = self.gpu.target(texture)
         target.clear()
@@ -314,7 +334,7 @@ class ShotPasses:
             target,
             textures={"t_triangles": self.buffers.occluders.texture},
             uniforms={"u_maps": 1, "u_first": 0},
-            blocks=self._shooter_blocks,
+            blocks=self._shooter_alone(shot),
             vertices=self.buffers.occluders.count,
             points=True,
             blend="add",

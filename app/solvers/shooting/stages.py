@@ -44,6 +44,7 @@ class ShotBuffers:
         self.runs = gpu.texture((max(RUNS, lightmap.rows), 1), 4, "f4")
         self.shooters = gpu.texture((BLOCK_ROWS, BATCH), 4, "f4")
         self.shooter_blocks = gpu.buffer(BATCH * BLOCK_BYTES)  # the same, as uniforms
+        self.inspected_block = gpu.buffer(BATCH * BLOCK_BYTES)  # the first is a shooter that is looked at by itself
         self.ledger = gpu.texture((BATCH, 2), 4, "f4")
         self.occluders = Occluders(gpu, lightmap)
         self.report = gpu.texture((REPORT_HEAD + SHOOTER_ROWS, 1), 4, "f4")
@@ -168,6 +169,7 @@ class ShotStages:
         width, height = self.map_size = self.projection.size(self.resolution)
         self.most_maps = max(1, min(BATCH, MAPS_TEXELS // (width * height)))
         self.maps = Maps(gpu, self.map_size, 1)
+        self._inspected: Maps | None = None
         self.weights = gpu.texture((width // 4, height // 4), 4, "f4")  # see weights.frag.glsl
 
         resolution = {"RESOLUTION": self.resolution}
@@ -203,6 +205,12 @@ class ShotStages:
         """What a receiver looks its visibility up in."""
         items = {"t_items": self.maps.items}
         return items if self._visibility == "item-id" else items | {"t_depth": self.maps.depth}
+
+    @property
+    def inspected(self) -> Maps:
+        """One map beside those of a step, which may be under way."""
+        self._inspected = self._inspected or Maps(self._gpu, self.map_size, 1)
+        return self._inspected
 
     def groups(self, shots: int) -> list[tuple[int, int]]:
         """(first, count) of those shots of a batch that see the scene at once; makes room for their maps."""

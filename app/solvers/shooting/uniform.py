@@ -25,7 +25,7 @@ from app.scene.model import F64, Material
 from app.solvers.base import EnergyBook, StepReport
 from app.solvers.shooting.options import ShootingOptions, highest_level
 from app.solvers.shooting.shot import Audit, AuditTargets, Shot, ShotPasses, powers_of, whole
-from app.solvers.shooting.stages import BATCH, REPORT_HEAD, ChoiceStages, ShotBuffers, ShotStages
+from app.solvers.shooting.stages import BATCH, OPEN, REPORT_HEAD, ChoiceStages, ShotBuffers, ShotStages
 
 # With ``coarsen``, a shot should carry this share of the emitted power: about 4096 shots for each time that all light is
 # reflected, whatever the scene's size. Measured on the Cornell box: a quarter of the shots, error 1.8 % -> 2.4 %.
@@ -212,9 +212,21 @@ class UniformShooting(ShotPasses):
     def resolution(self) -> int:
         return self.stages.resolution
 
-    def inspect(self) -> dict[str, Texture]:
-        """What the first shot of the last step saw, in the lowest of the maps that lie above each other."""
-        return {"items": self.stages.maps.items, "depth": self.stages.maps.depth}
+    def inspect(self, shot: Shot | None = None) -> dict[str, Texture]:
+        """What ``last_shot`` or another one sees. Drawn for this: the maps of a step are those of whatever it did last, and in
+        use while it is under way."""
+        maps, shot = self.stages.inspected, shot or self.last_shot
+        if shot is None:
+            maps.target.clear(OPEN, depth=1.0)
+        else:
+            self._see(0, 1, maps, self._shooter_alone(shot))
+        return {"items": maps.items, "depth": maps.depth}
+
+    def vanished(self, shot: Shot | None = None) -> int:
+        """Triangles that ``last_shot`` or another one sees, but between the samples of its map: each is drawn as one sample.
+        Waits for the GPU."""
+        shot = shot or self.last_shot
+        return 0 if shot is None else self._count_vanished(shot)
 
     def release(self) -> None:
         self._drop_reports()
