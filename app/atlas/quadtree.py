@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
-from app.atlas.node_set import NodeSet
+from app.atlas.node_set import Moves, NodeSet
 from app.atlas.texels import Leaves, uniform_leaves
 from app.atlas.tiles import Tiles
 from app.scene.model import Scene
@@ -59,10 +59,18 @@ class Quadtree:
     def __len__(self) -> int:
         return len(self.slots)
 
-    def enlarge(self, slots: int) -> None:
-        """Have so many slots, more than now."""
-        self._free[:0] = range(slots - 1, self.nodes.tiles - 1, -1)
-        self.nodes.enlarge(slots)
+    def resize(self, slots: int) -> Moves:
+        """Have so many slots, no fewer than leaves: those that lie beyond move into free ones."""
+        old = np.flatnonzero(self.nodes.used)
+        staying = old[old < slots]
+        free = np.setdiff1d(np.arange(slots), staying)
+        new = np.concatenate([staying, free[: len(old) - len(staying)]])
+        moves = Moves(old, new, slots)
+        self.nodes.resize(moves)
+        now = dict(zip(old.tolist(), new.tolist(), strict=True))
+        self.slots = {tile: now[slot] for tile, slot in self.slots.items()}
+        self._free = free[len(old) - len(staying) :][::-1].tolist()
+        return moves
 
     @property
     def room(self) -> int:
@@ -221,7 +229,7 @@ def quadtree_nodes(scene: Scene, charts: Charts) -> NodeSet:
     tree = Quadtree(nodes)
     while slots := tree.uneven():
         if tree.room < 4 * len(slots):
-            tree.enlarge(nodes.tiles + 4 * len(slots))
+            tree.resize(nodes.tiles + 4 * len(slots))
         tree.split(slots)
     return nodes
 

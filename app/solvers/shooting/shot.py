@@ -31,14 +31,15 @@ AUDITED, SOUND = 0.02, 0.02
 
 @dataclass(frozen=True)
 class Shot:
-    """The shooter of one shot: centre [m], unit normal, area [m²], lower corner (x, y) and edge of its patch in the node set
-    [texels]."""
+    """The shooter of one shot: centre [m], unit normal, area [m²], lower corner (x, y) and edge of its patch in the node set as
+    it is then [texels], and (u, v, u, v) of it in the virtual atlas [texels of level 0]."""
 
     centre: F64
     normal: F64
     area: float
     corner: tuple[int, int]
     size: int
+    rect: tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -266,9 +267,10 @@ class ShotPasses:
         )
 
     def _shot_from_rows(self, rows: F64) -> Shot:
-        frame, corner = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3]))
+        frame, corner, edge = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3])), int(rows[5, 3])
         area = float(rows[0, 3]) * frame.scale**2
-        return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, int(rows[5, 3]))
+        rect = self.lightmap.nodes.atlas_rect(corner, edge)
+        return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, edge, rect)
 
     @property
     def _watt(self) -> float:
