@@ -187,16 +187,19 @@ class Lightmap:
         for name in (*self.nodes.tile_arrays(np.empty(0, np.int64)), *LIGHT):
             self._textures[name] = self.moved(self._textures[name], moves)
         self._make_targets()
-        self._follow(moves.new[moves.new != moves.old])
+        self._follow(moves.new)
 
     def moved(self, texture: Texture, moves: Moves) -> Texture:
-        """With every leaf's texels where they are now and nothing elsewhere, in place of the texture."""
+        """With the texels of all leaves where they are now, and nothing in new slots, in place of the texture."""
         nodes, kind = self.nodes, {"INTEGER": texture.dtype == "u4"}
         empty = bytes(self.size[0] * self.size[1] * texture.components * _BYTES[texture.dtype])
         fresh = self.gpu.texture(self.size, texture.components, texture.dtype, empty)
         target = self.gpu.target(fresh)
-        squares = quads(nodes.corners(moves.new), nodes.tile, nodes.corners(moves.old))
-        mesh = Mesh(self.gpu, squares.tobytes(), QUAD_FORMAT, per_instance=True)
+        whole, rest = (nodes.tile * part for part in divmod(moves.staying, nodes.columns))  # rows, and a part of one
+        staying = [(0, 0, self.size[0], whole, 0, 0), (0, whole, rest, nodes.tile, 0, whole)]
+        moved = quads(nodes.corners(moves.new), nodes.tile, nodes.corners(moves.old))
+        rects = np.concatenate([np.array(staying, np.float32), moved])
+        mesh = Mesh(self.gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)
         Pass(self.gpu, "lightmap/move", defines=kind, vertex="common/rects").draw(
             target, textures={"t_source": texture}, uniforms={"u_size": self.size}, mesh=mesh
         )

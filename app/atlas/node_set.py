@@ -47,15 +47,18 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Moves:
-    """What becomes of the leaves where a node set gets so many ``slots``: old, new (n,): the slot of each before and after."""
+    """How a node set gets so many ``slots``: the first ``staying`` are as before, but that leaves which lay beyond them, in the
+    slots ``old`` (n,), are now in those of ``new`` (n,), which were free."""
 
+    slots: int
+    staying: int
     old: NDArray[np.int64]
     new: NDArray[np.int64]
-    slots: int
 
     def array(self, array: Any, value: float) -> Any:
-        """What was kept for each slot, as it is to be kept now: ``value`` where no leaf is."""
-        moved = np.full((self.slots, *array.shape[1:]), value, array.dtype)
+        """What was kept for each slot, as it is to be kept now; ``value`` in slots that are new."""
+        more = np.full((self.slots - self.staying, *array.shape[1:]), value, array.dtype)
+        moved = np.concatenate([array[: self.staying], more])
         moved[self.new] = array[self.old]
         return moved
 
@@ -102,7 +105,7 @@ class NodeSet:
         self.depth = 0
         self._pages = np.zeros([side // self.tile for side in self.charts.size[::-1]], np.uint32)
         nowhere = np.empty(0, np.int64)
-        self.resize(Moves(nowhere, nowhere, slots))
+        self.resize(Moves(slots, 0, nowhere, nowhere))
 
     def resize(self, moves: Moves) -> None:
         """Have another number of slots, in rows as long as before, with the leaves where ``moves`` has them."""
@@ -114,12 +117,11 @@ class NodeSet:
             self.emission_tiles = moves.array(self.emission_tiles, 1.0)
         self._kinds, self.used = moves.array(self._kinds, 0), moves.array(self.used, False)
         self._texels = moves.array(self._texels, 0)
-        self.surfaces.face[~self.used] = -1
+        self.surfaces.face[moves.staying :] = -1
         self.tiles, self.rows = moves.slots, max(1, -(-moves.slots // self.columns))
         self.size = (self.columns * self.tile, self.rows * self.tile)
-        moved = moves.new[moves.new != moves.old]
-        self._turn_pages(moved, moved + 1)
-        self.flat_spans, self.shaped_tiles = self.receivers_of(np.sort(moves.new))
+        self._turn_pages(moves.new, moves.new + 1)
+        self.flat_spans, self.shaped_tiles = self.receivers_of(np.flatnonzero(self.used))
 
     # -- leaves that come and go ---------------------------------------------------------------------------------------
 

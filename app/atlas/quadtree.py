@@ -61,15 +61,14 @@ class Quadtree:
 
     def resize(self, slots: int) -> Moves:
         """Have so many slots, no fewer than leaves: those that lie beyond move into free ones."""
-        old = np.flatnonzero(self.nodes.used)
-        staying = old[old < slots]
-        free = np.setdiff1d(np.arange(slots), staying)
-        new = np.concatenate([staying, free[: len(old) - len(staying)]])
-        moves = Moves(old, new, slots)
+        used = self.nodes.used
+        old = slots + np.flatnonzero(used[slots:])
+        free = np.setdiff1d(np.arange(slots), np.flatnonzero(used))
+        moves = Moves(slots, min(slots, len(used)), old, free[: len(old)])
         self.nodes.resize(moves)
-        now = dict(zip(old.tolist(), new.tolist(), strict=True))
-        self.slots = {tile: now[slot] for tile, slot in self.slots.items()}
-        self._free = free[len(old) - len(staying) :][::-1].tolist()
+        for slot in moves.new.tolist():
+            self.slots[self.tile(slot)] = slot
+        self._free = free[len(old) :][::-1].tolist()
         return moves
 
     @property

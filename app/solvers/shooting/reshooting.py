@@ -138,7 +138,8 @@ class Reshooting(UniformShooting):
             self.gpu.release_all(target)
             texture = self.lightmap.moved(texture, moves)
             self._strong = texture, self.gpu.target(texture)
-        self._fresh = set(moves.new[np.isin(moves.old, list(self._fresh))].tolist())
+        now = dict(zip(moves.old.tolist(), moves.new.tolist(), strict=True))
+        self._fresh = {now.get(slot, slot) for slot in self._fresh}
 
     def _texels(self) -> tuple[Texture, Framebuffer]:
         """As large as the node set."""

@@ -65,11 +65,11 @@ class ShotBuffers:
 
     def resize(self, lightmap: Lightmap, moves: Moves) -> None:
         """For a lightmap that has got another number of slots: all leaves shoot as fine as before, and the ledger stays."""
-        held = self._tiles
+        held = moves.array(self._tiles.reshape(-1, *self._tiles.shape[2:]), 0)
         self._gpu.release_all(self.run_target, self.books_target, self.runs, *self.books, self.finer)
         self._fit(lightmap)
-        columns = lightmap.columns
-        self._tiles[moves.new // columns, moves.new % columns] = held[moves.old // columns, moves.old % columns]
+        place = np.divmod(np.arange(moves.slots), lightmap.columns)
+        self._tiles[place] = held
         self.finer.write(self.finer_levels.tobytes())
 
     def shoot_finer(self, patches: Iterable[tuple[int, int, int]]) -> None:
