@@ -89,9 +89,7 @@ class Viewing(ABC):
     def _shooter_rect(self) -> Rect | None:
         """The last shooter's patch in atlas texels."""
         shot = self.solver.last_shot
-        if shot is None or not self.display.last_shooter:
-            return None
-        return self.lightmap.nodes.atlas_rect(shot.corner, shot.size)
+        return shot.rect if shot and self.display.last_shooter else None
 
     def atlas_image(self, size: tuple[int, int], *, turned: bool = False) -> Texture | None:
         """The virtual atlas with what was drawn last, v up or to the right; None before the first picture."""

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
-from app.atlas.node_set import OCCLUDER_FORMAT, VERTEX_FORMAT, Array, Frame, NodeSet
+from app.atlas.node_set import OCCLUDER_FORMAT, VERTEX_FORMAT, Array, Frame, Moves, NodeSet
 from app.atlas.receivers import RECEIVER_FORMAT
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.scene.model import F32, F64, Material, Scene
@@ -30,6 +30,7 @@ from app.scene.model import F32, F64, Material, Scene
 STORAGE = {"rgba32f": "f4", "rgba16f": "f2", "fixed8": "f1"}  # name: moderngl dtype
 HALF_HEADROOM = 64.0  # of 65504, the largest half float: H may be many times the largest exitance
 LIGHT = ("t_irradiance", "t_residual")
+QUAD_FORMAT = {"in_rect": "4f", "in_from": "2f"}  # see common/rects.vert.glsl
 _DTYPES = {"f4": np.float32, "f2": np.float16, "f1": np.uint8}
 _BYTES = {"f4": 4, "u4": 4, "f2": 2, "f1": 1}
 
@@ -52,7 +53,7 @@ class Lightmap:
         self._edit = Pass(
             gpu, "lightmap/edit", defines=self.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
         )
-        self._scale, self._copy = Pass(gpu, "lightmap/scale"), Pass(gpu, "common/copy")
+        self._scale = Pass(gpu, "lightmap/scale")
         self.mesh = Mesh(gpu, nodes.vertices.tobytes(), VERTEX_FORMAT)
         corners, triangles = nodes.occluders
         self.occluders = Mesh(gpu, corners.tobytes(), OCCLUDER_FORMAT, indices=triangles.tobytes())
@@ -103,11 +104,11 @@ class Lightmap:
         """Choose how H and r are stored (a key of STORAGE). What they hold then is undefined: clear."""
         self.gpu.release_all(*self._targets, *(self._textures.pop(name) for name in LIGHT if name in self._textures))
         self.storage = storage
-        self._make_light()
-
-    def _make_light(self) -> None:
         for name in LIGHT:
             self._textures[name] = self.gpu.texture(self.size, 4, STORAGE[self.storage])
+        self._make_targets()
+
+    def _make_targets(self) -> None:
         irradiance, residual = self._textures["t_irradiance"], self._textures["t_residual"]
         self._targets = [self.gpu.target(irradiance, residual), self.gpu.target(residual)]
         self._targets[1].color_mask = (True, True, True, False)  # of alpha, see receive.frag.glsl
@@ -169,39 +170,41 @@ class Lightmap:
             texture = self._textures[name]
             for slot, tile in zip(slots.tolist(), tiles, strict=True):
                 texture.write(np.ascontiguousarray(tile).tobytes(), viewport=(*self.nodes.corner(slot), edge, edge))
-        self._textures["t_leaves"].write(self.nodes.slot_tables["t_leaves"].tobytes())
-        self._textures["t_pages"] = write_pages(self.gpu, self._textures["t_pages"], self.nodes, slots)
+        self._follow(slots)
+
+    def _follow(self, slots: NDArray[np.int64]) -> None:
+        """Take over what follows from the leaves; other ones than before are in these slots."""
+        tables = self._textures
+        tables["t_leaves"] = write_table(self.gpu, tables["t_leaves"], self.nodes.slot_tables["t_leaves"])
+        tables["t_pages"] = write_pages(self.gpu, tables["t_pages"], self.nodes, slots)
         self.gpu.release_all(*self.receivers.values())
         self.receivers = receiver_meshes(self.gpu, self.nodes.flat_spans, self.nodes.shaped_tiles)
         self.version += 1
 
-    def enlarge(self) -> None:
-        """Take over a node set that has got more rows. The light stays."""
-        old = {name: self._textures[name] for name in LIGHT}
-        for name in self.nodes.tile_arrays(np.empty(0, np.int64)):
-            self._textures[name] = self._longer(self._textures[name])
-        self.gpu.release_all(self._textures["t_leaves"])
-        self._textures["t_leaves"] = upload(self.gpu, self.nodes.slot_tables["t_leaves"])
+    def resize(self, moves: Moves) -> None:
+        """Take over a node set that has got another number of slots. The light goes with its leaves."""
         self.gpu.release_all(*self._targets)
-        self._make_light()
-        for name, target in zip(LIGHT, (self.gpu.target(self._textures[n]) for n in LIGHT), strict=True):
-            target.clear()
-            self._copy.draw(
-                target,
-                textures={"t_source": old[name]},
-                uniforms={"u_offset_px": (0, 0)},
-                viewport=(0, 0, *old[name].size),
-            )
-            self.gpu.release_all(target, old[name])
-        self.version += 1
+        for name in (*self.nodes.tile_arrays(np.empty(0, np.int64)), *LIGHT):
+            self._textures[name] = self.moved(self._textures[name], moves)
+        self._make_targets()
+        self._follow(moves.new)
 
-    def _longer(self, texture: Texture) -> Texture:
-        """With as many rows as the node set, the new ones empty, in place of the texture."""
-        (width, height), texel = self.size, texture.components * _BYTES[texture.dtype]
-        held = texture.read(alignment=1).ljust(width * height * texel, b"\0")
-        longer = self.gpu.texture(self.size, texture.components, texture.dtype, held)
-        self.gpu.release_all(texture)
-        return longer
+    def moved(self, texture: Texture, moves: Moves) -> Texture:
+        """With the texels of all leaves where they are now, and nothing in new slots, in place of the texture."""
+        nodes, kind = self.nodes, {"INTEGER": texture.dtype == "u4"}
+        empty = bytes(self.size[0] * self.size[1] * texture.components * _BYTES[texture.dtype])
+        fresh = self.gpu.texture(self.size, texture.components, texture.dtype, empty)
+        target = self.gpu.target(fresh)
+        whole, rest = (nodes.tile * part for part in divmod(moves.staying, nodes.columns))  # rows, and a part of one
+        staying = [(0, 0, self.size[0], whole, 0, 0), (0, whole, rest, nodes.tile, 0, whole)]
+        moved = quads(nodes.corners(moves.new), nodes.tile, nodes.corners(moves.old))
+        rects = np.concatenate([np.array(staying, np.float32), moved])
+        mesh = Mesh(self.gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)
+        Pass(self.gpu, "lightmap/move", defines=kind, vertex="common/rects").draw(
+            target, textures={"t_source": texture}, uniforms={"u_size": self.size}, mesh=mesh
+        )
+        self.gpu.release_all(target, mesh, texture)
+        return fresh
 
     @property
     def columns(self) -> int:
@@ -295,15 +298,28 @@ def upload(gpu: Gpu, array: Array) -> Texture:
     return gpu.texture((width, height), components, dtype, np.ascontiguousarray(array).tobytes())
 
 
+def write_table(gpu: Gpu, texture: Texture, table: Array) -> Texture:
+    """The table (height, width, components) in place of what the texture holds: the same texture, or another of its size."""
+    if texture.size != table.shape[1::-1]:
+        gpu.release_all(texture)
+        return upload(gpu, table)
+    texture.write(np.ascontiguousarray(table).tobytes())
+    return texture
+
+
 def write_pages(gpu: Gpu, texture: Texture, nodes: NodeSet, slots: NDArray[np.int64]) -> Texture:
     """The page table after leaves came into these slots: the same texture, or another where pages are of another level now."""
     pages = nodes.slot_tables["t_pages"]
     if texture.size != pages.shape[1::-1]:
-        gpu.release_all(texture)
-        return upload(gpu, pages)
+        return write_table(gpu, texture, pages)
     for rect, block in nodes.page_blocks(slots):
         texture.write(block.tobytes(), viewport=rect)
     return texture
+
+
+def quads(corner: NDArray[np.int64], edge: int, source: NDArray[np.int64]) -> F32:
+    """(n, 6) f32 instances of QUAD_FORMAT: squares at ``corner`` (n, 2) that come from ``source`` (n, 2) [texels]."""
+    return np.column_stack([corner, np.full((len(corner), 2), edge), source]).astype(np.float32)
 
 
 def receiver_meshes(gpu: Gpu, flat_spans: F32, shaped_tiles: F32) -> dict[bool, Mesh]:

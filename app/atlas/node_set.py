@@ -45,6 +45,24 @@ class Frame:
         return self.centre + points * self.scale
 
 
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """How a node set gets so many ``slots``: the first ``staying`` are as before, but that leaves which lay beyond them, in the
+    slots ``old`` (n,), are now in those of ``new`` (n,), which were free."""
+
+    slots: int
+    staying: int
+    old: NDArray[np.int64]
+    new: NDArray[np.int64]
+
+    def array(self, array: Any, value: float) -> Any:
+        """What was kept for each slot, as it is to be kept now; ``value`` in slots that are new."""
+        more = np.full((self.slots - self.staying, *array.shape[1:]), value, array.dtype)
+        moved = np.concatenate([array[: self.staying], more])
+        moved[self.new] = array[self.old]
+        return moved
+
+
 class NodeSet:
     """Leaf tiles side by side in one rectangle of ``columns``×``rows`` slots, and the tables that go with them.
 
@@ -86,23 +104,24 @@ class NodeSet:
         self._texels = np.zeros(0, np.int64)  # of each slot, that cover a surface
         self.depth = 0
         self._pages = np.zeros([side // self.tile for side in self.charts.size[::-1]], np.uint32)
-        self.enlarge(slots)
+        nowhere = np.empty(0, np.int64)
+        self.resize(Moves(slots, 0, nowhere, nowhere))
 
-    def enlarge(self, slots: int) -> None:
-        """Have so many slots, more than now, in rows as long as before: what is there stays in its place."""
-        more = slots - len(self.used)
-        self.leaves = _longer(self.leaves, more, -1)
-        self.surfaces = _longer(self.surfaces, more, 0)
-        self.surfaces.face[-more:] = -1
+    def resize(self, moves: Moves) -> None:
+        """Have another number of slots, in rows as long as before, with the leaves where ``moves`` has them."""
+        self.leaves = _moved(self.leaves, moves, -1)
+        self.surfaces = _moved(self.surfaces, moves, 0)
         if self.albedo_tiles is not None:
-            self.albedo_tiles = _stretched(self.albedo_tiles, more, 1.0)
+            self.albedo_tiles = moves.array(self.albedo_tiles, 1.0)
         if self.emission_tiles is not None:
-            self.emission_tiles = _stretched(self.emission_tiles, more, 1.0)
-        self._kinds, self.used = _stretched(self._kinds, more, 0), _stretched(self.used, more, False)
-        self._texels = _stretched(self._texels, more, 0)
-        self.tiles, self.rows = slots, max(1, -(-slots // self.columns))
+            self.emission_tiles = moves.array(self.emission_tiles, 1.0)
+        self._kinds, self.used = moves.array(self._kinds, 0), moves.array(self.used, False)
+        self._texels = moves.array(self._texels, 0)
+        self.surfaces.face[moves.staying :] = -1
+        self.tiles, self.rows = moves.slots, max(1, -(-moves.slots // self.columns))
         self.size = (self.columns * self.tile, self.rows * self.tile)
-        self.__dict__.pop("_leaf_table", None)
+        self._turn_pages(moves.new, moves.new + 1)
+        self.flat_spans, self.shaped_tiles = self.receivers_of(np.flatnonzero(self.used))
 
     # -- leaves that come and go ---------------------------------------------------------------------------------------
 
@@ -207,6 +226,10 @@ class NodeSet:
         """Column and row of a slot's first texel."""
         return slot % self.columns * self.tile, slot // self.columns * self.tile
 
+    def corners(self, slots: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(n, 2) column and row of each slot's first texel."""
+        return np.stack([slots % self.columns, slots // self.columns], 1) * self.tile
+
     def tiles_from_image(self, image: Array) -> Array:
         """A node-set image (height, width, c) as tiles (tiles, t, t, c)."""
         cells = image.reshape(self.rows, self.tile, self.columns, self.tile, -1).swapaxes(1, 2)
@@ -305,14 +328,8 @@ class NodeSet:
 ArraysT = TypeVar("ArraysT", Leaves, TexelSurfaces)
 
 
-def _longer(arrays: ArraysT, more: int, value: float) -> ArraysT:
-    """So many more entries of ``value`` at the end of every array."""
-    fields = [field.name for field in dataclasses.fields(arrays)]
-    return type(arrays)(*(_stretched(getattr(arrays, name), more, value) for name in fields))
-
-
-def _stretched(array: Any, more: int, value: float) -> Any:
-    return np.concatenate([array, np.full((more, *array.shape[1:]), value, array.dtype)])
+def _moved(arrays: ArraysT, moves: Moves, value: float) -> ArraysT:
+    return type(arrays)(*(moves.array(getattr(arrays, field.name), value) for field in dataclasses.fields(arrays)))
 
 
 def octahedral(normals: NDArray[np.floating]) -> NDArray[np.uint32]:
@@ -370,4 +387,4 @@ def _vertices(scene: Scene, charts: Charts, frame: Frame) -> Array:
     return data.reshape(-1)
 
 
-__all__ = ["OCCLUDER_FORMAT", "VERTEX_FORMAT", "Array", "Frame", "NodeSet", "ScalarT", "octahedral"]
+__all__ = ["OCCLUDER_FORMAT", "VERTEX_FORMAT", "Array", "Frame", "Moves", "NodeSet", "ScalarT", "octahedral"]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
-from app.atlas.node_set import NodeSet
+from app.atlas.node_set import Moves, NodeSet
 from app.atlas.texels import Leaves, uniform_leaves
 from app.atlas.tiles import Tiles
 from app.scene.model import Scene
@@ -59,10 +59,17 @@ class Quadtree:
     def __len__(self) -> int:
         return len(self.slots)
 
-    def enlarge(self, slots: int) -> None:
-        """Have so many slots, more than now."""
-        self._free[:0] = range(slots - 1, self.nodes.tiles - 1, -1)
-        self.nodes.enlarge(slots)
+    def resize(self, slots: int) -> Moves:
+        """Have so many slots, no fewer than leaves: those that lie beyond move into free ones."""
+        used = self.nodes.used
+        old = slots + np.flatnonzero(used[slots:])
+        free = np.setdiff1d(np.arange(slots), np.flatnonzero(used))
+        moves = Moves(slots, min(slots, len(used)), old, free[: len(old)])
+        self.nodes.resize(moves)
+        for slot in moves.new.tolist():
+            self.slots[self.tile(slot)] = slot
+        self._free = free[len(old) :][::-1].tolist()
+        return moves
 
     @property
     def room(self) -> int:
@@ -221,7 +228,7 @@ def quadtree_nodes(scene: Scene, charts: Charts) -> NodeSet:
     tree = Quadtree(nodes)
     while slots := tree.uneven():
         if tree.room < 4 * len(slots):
-            tree.enlarge(nodes.tiles + 4 * len(slots))
+            tree.resize(nodes.tiles + 4 * len(slots))
         tree.split(slots)
     return nodes
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from app.atlas.lightmap import Lightmap
+from app.atlas.lightmap import QUAD_FORMAT, Lightmap, quads
 from app.atlas.quadtree import Change
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.scene.model import F32
 
 LIFTED_COLUMNS = 32  # tiles side by side among those that are lifted
-QUAD_FORMAT = {"in_rect": "4f", "in_from": "2f"}
 
 
 class Regrowth:
@@ -38,11 +36,11 @@ class Regrowth:
         size = (LIFTED_COLUMNS * tile, rows * tile)
         place = np.arange(len(lifted))
         aside = np.stack([place % LIFTED_COLUMNS, place // LIFTED_COLUMNS], 1) * tile
-        out = quads(aside, tile, corners(lightmap, lifted))
+        out = quads(aside, tile, lightmap.nodes.corners(lifted))
         if split:
-            into, how = quads(corners(lightmap, new), tile, aside[nth] + change.corner * half), self._push
+            into, how = quads(lightmap.nodes.corners(new), tile, aside[nth] + change.corner * half), self._push
         else:
-            into, how = quads(corners(lightmap, new) + change.corner * half, half, aside[nth]), self._pull
+            into, how = quads(lightmap.nodes.corners(new) + change.corner * half, half, aside[nth]), self._pull
         lights = [(lightmap.texture("t_irradiance"), lightmap.light_target), *carried]
         copies = []
         for light, _ in lights:
@@ -67,13 +65,3 @@ class Regrowth:
         uniforms |= {"u_signed": self._lightmap.storage != "fixed8"}
         how.draw(target, textures=textures | materials, uniforms=uniforms, mesh=mesh)
         self._gpu.release_all(mesh)
-
-
-def quads(corner: NDArray[np.int64], edge: int, source: NDArray[np.int64]) -> F32:
-    """(n, 6) f32 instances of QUAD_FORMAT: squares at ``corner`` (n, 2) that come from ``source`` (n, 2) [texels]."""
-    return np.column_stack([corner, np.full((len(corner), 2), edge), source]).astype(np.float32)
-
-
-def corners(lightmap: Lightmap, slots: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(n, 2) column and row of each slot's first texel."""
-    return np.stack([slots % lightmap.columns, slots // lightmap.columns], 1) * lightmap.nodes.tile

@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import Lightmap
-from app.atlas.regrow import QUAD_FORMAT
+from app.atlas.lightmap import QUAD_FORMAT, Lightmap
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.render.edges import KINDS, Kind, unequal_edges
 from app.scene.model import F64

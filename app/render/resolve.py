@@ -12,9 +12,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import Lightmap, upload, write_pages
+from app.atlas.lightmap import QUAD_FORMAT, Lightmap, quads, upload, write_pages
 from app.atlas.node_set import TABLE_WIDTH
-from app.atlas.regrow import QUAD_FORMAT, quads
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.gpu.shader import FULLSCREEN
 from app.render.ages import LeafAges

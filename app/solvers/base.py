@@ -60,12 +60,10 @@ OptionsT = TypeVar("OptionsT", bound=Options)
 
 
 class PatchShot(Protocol):
-    """The patch that shot: its lower corner (x, y) and its edge, in texels of the node set."""
+    """The patch that shot, (u, v, u, v) in the virtual atlas [texels of level 0]: its leaf may be gone since, or elsewhere."""
 
     @property
-    def corner(self) -> tuple[int, int]: ...
-    @property
-    def size(self) -> int: ...
+    def rect(self) -> tuple[float, float, float, float]: ...
 
 
 class Solver(Protocol[OptionsT]):

@@ -67,8 +67,7 @@ class Forest:
         used = np.flatnonzero(self.nodes.used)
         some = used if rng is None else used[rng.random(len(used)) < share]
         if self.tree.room < 4 * len(used):
-            self.tree.enlarge(self.nodes.tiles + 4 * len(used))
-            self.lightmap.enlarge()
+            self.lightmap.resize(self.tree.resize(self.nodes.tiles + 4 * len(used)))
         self.regrowth.apply(self.tree.split(self.tree.splits(some.tolist(), DEPTH)))
 
     def shrink(self) -> None:
@@ -258,8 +257,7 @@ def test_enlarging_keeps_the_light(forest: Callable[..., Forest], rng: np.random
     trees = forest(table_room(), storage=storage)
     trees.write_noise(rng)
     before, rows = trees.by_tile(), trees.lightmap.rows
-    trees.tree.enlarge(2 * trees.nodes.tiles)
-    trees.lightmap.enlarge()
+    trees.lightmap.resize(trees.tree.resize(2 * trees.nodes.tiles))
     assert trees.lightmap.rows > rows
     after = trees.by_tile()
     for tile, values in before.items():
@@ -441,8 +439,7 @@ def test_display_texels_follow_the_leaves(
 ) -> None:
     """A frame that brings only those of changed leaves up to date shows what one does that begins anew."""
     trees = forest(SCENES[name](), texels=12000)
-    trees.tree.enlarge(3000)
-    trees.lightmap.enlarge()
+    trees.lightmap.resize(trees.tree.resize(3000))
     options = DisplayOptions(layer="irradiance", tone_map="clamp", interpolation=interpolation)
     known = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.nodes), BORDER[interpolation])
     depths = set()

@@ -49,6 +49,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "DISC": FLAG,
     "DISC_SUBDIVISION": (OPTION["discs"].maximum,),
     "COUNT": FLAG,
+    "INTEGER": FLAG,
     "VISIBILITY": tuple(range(len(VISIBILITIES))),
 }
 CONSTANTS = {"BATCH"}

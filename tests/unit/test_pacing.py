@@ -1,4 +1,4 @@
-"""How much of a solve a frame does: whole shots where they are fast, bands of one where not, less while a hand is at a control."""
+"""How much of a solve a frame does: whole shots where they are fast, else bands of one; less while a hand is at a control."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def grow(tree: Quadtree, slots: list[int], depth: int = DEPTH) -> Change | None:
     """Split these leaves and what must split with them, whatever room that takes."""
     more = 4 * len(tree)
     if tree.room < more:
-        tree.enlarge(tree.nodes.tiles + more)
+        tree.resize(tree.nodes.tiles + more)
     splits = tree.splits(slots, depth)
     return tree.split(splits) if splits else None
 
@@ -249,7 +249,7 @@ def test_enlarging_keeps_everything() -> None:
     arrays = nodes.tile_arrays(np.arange(tiles))
     pages = nodes.slot_tables["t_pages"]
     receivers = [a.copy() for a in (nodes.flat_spans, nodes.shaped_tiles)]
-    tree.enlarge(tiles + 100)
+    tree.resize(tiles + 100)
     assert (nodes.tiles, nodes.columns, tree.room, tree.slots) == (tiles + 100, columns, room + 100, slots)
     assert nodes.size == (columns * nodes.tile, -(-nodes.tiles // columns) * nodes.tile)
     for name, array in nodes.tile_arrays(np.arange(tiles)).items():

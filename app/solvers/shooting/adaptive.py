@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.lightmap import Lightmap
-from app.atlas.quadtree import Change, Quadtree, Tile
-from app.atlas.regrow import Regrowth, corners
+from app.atlas.quadtree import FIRST_ROOM, Change, Quadtree, Tile
+from app.atlas.regrow import Regrowth
 from app.gpu import Gpu, Pass, ReadBack
 from app.scene.model import Material
 from app.solvers.shooting.options import TREE, ShootingOptions
@@ -134,6 +134,8 @@ class AdaptiveShooting(Reshooting):
         if version == self.lightmap.version:
             self._calm = not self._grow(data[: self.lightmap.nodes.tiles].astype(np.float64), most)
             self._calm_at = self._log.count
+            if self._calm:
+                self._give_room_back()
 
     def _look_anew(self) -> None:
         """What is known of the leaves is of another light."""
@@ -193,18 +195,28 @@ class AdaptiveShooting(Reshooting):
             return
         longest = self.gpu.limits.max_texture // (nodes.tile + 4)  # slots in a column of display texels and borders
         most = min(self.options.budget // nodes.tile**2, nodes.columns * longest)
-        wanted = max(nodes.tiles * 3 // 2, nodes.tiles + slots)
-        if min(wanted, most) > nodes.tiles:
-            self.poll(wait=True)
-            choice, audits = self.stages.choices.index(self._choice), self._audits
-            self.tree.enlarge(min(wanted, most))
-            self.lightmap.enlarge()
-            self._enlarged()
-            self.gpu.release_all(self._roughness_target, self._roughness)
-            self._roughness, self._roughness_target = self._texels(per_slot=True)
-            self.buffers = self.buffers.enlarged(self.lightmap)
-            self._remake_stages(self.options)
-            self._choice, self._audits = self.stages.choices[choice], audits
+        wanted = min(max(nodes.tiles * 3 // 2, nodes.tiles + slots), most)
+        if wanted > nodes.tiles:
+            self._resize(wanted)
+
+    def _give_room_back(self) -> None:
+        """Keep room for half as many leaves again, once there is more than twice that: leaves that come and go do not have it
+        made anew each time."""
+        kept = max(FIRST_ROOM // self.lightmap.nodes.tile**2, len(self.tree) * 3 // 2)
+        if self.lightmap.nodes.tiles > 2 * kept:
+            self.poll(wait=True)  # reports on their way name their shooter by its slot
+            self._resize(kept)
+
+    def _resize(self, slots: int) -> None:
+        """Have so many slots, between two judgements: those know leaves by slot."""
+        assert self._judged is None
+        moves = self.tree.resize(slots)
+        self.lightmap.resize(moves)
+        self._resized(moves)
+        self.gpu.release_all(self._roughness_target, self._roughness)
+        self._roughness, self._roughness_target = self._texels(per_slot=True)
+        self.buffers.resize(self.lightmap, moves)
+        self.stages.resize(self.lightmap)
 
     def _opinion(self, judged: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which leaves should split, and which need not be as fine as they are."""
@@ -221,7 +233,8 @@ class AdaptiveShooting(Reshooting):
         self._regrowth.apply(change, self._carried)
         self._emitted = self.lightmap.emitted
         gone, came = (change.parents, change.children) if change.split else (change.children, change.parents)
-        self.buffers.hand_down(*([(x, y) for x, y in corners(self.lightmap, at).tolist()] for at in (gone, came)))
+        corners = self.lightmap.nodes.corners
+        self.buffers.hand_down(*([(x, y) for x, y in corners(at).tolist()] for at in (gone, came)))
         self._exchange(gone, came, inherit=change.split)
 
     def _drop_judged(self) -> None:

@@ -20,8 +20,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import Lightmap, receiver_meshes
-from app.atlas.regrow import QUAD_FORMAT, corners, quads
+from app.atlas.lightmap import QUAD_FORMAT, Lightmap, quads, receiver_meshes
+from app.atlas.node_set import Moves
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.scene.model import F64, Material
 from app.solvers.shooting.log import ShotLog
@@ -104,7 +104,8 @@ class Reshooting(UniformShooting):
         yield from super()._choose(shots, bands)
         if self._weak and self._strong is None and self.lightmap.storage != "fixed8":
             self._strong, self._strong_shots = self._texels(), self._log.count
-            self._copy_into(self._strong[1], self.lightmap.texture("t_irradiance"))
+            H = self.lightmap.texture("t_irradiance")
+            self._copy.draw(self._strong[1], textures={"t_source": H}, uniforms={"u_offset_px": (0, 0)})
 
     def _hear(self, choice: ChoiceStages, report: F64) -> None:
         super()._hear(choice, report)
@@ -129,26 +130,24 @@ class Reshooting(UniformShooting):
         if inherit and self.lightmap.storage != "fixed8":
             self._fresh.update(came.tolist())  # fixed8 holds no negative correction: leaves keep what they inherit
 
-    def _enlarged(self) -> None:
-        """The lightmap has got more rows."""
+    def _resized(self, moves: Moves) -> None:
+        """The lightmap has got another number of slots."""
+        assert self._redo_under_way is None, "it knows its leaves by slot"
         self.gpu.release_all(self._correction_target, self._correction)
         self._correction, self._correction_target = self._texels()
         if self._strong is not None:
-            (old, old_target), self._strong = self._strong, self._texels()
-            self._strong[1].clear()
-            self._copy_into(self._strong[1], old)
-            self.gpu.release_all(old_target, old)
+            texture, target = self._strong
+            self.gpu.release_all(target)
+            texture = self.lightmap.moved(texture, moves)
+            self._strong = texture, self.gpu.target(texture)
+        now = dict(zip(moves.old.tolist(), moves.new.tolist(), strict=True))
+        self._fresh = {now.get(slot, slot) for slot in self._fresh}
 
     def _texels(self, *, per_slot: bool = False) -> tuple[Texture, Framebuffer]:
         """As large as the node set, or one for each of its slots."""
         size = (self.lightmap.columns, self.lightmap.rows) if per_slot else self.lightmap.size
         texture = self.gpu.texture(size, 4, "f4")
         return texture, self.gpu.target(texture)
-
-    def _copy_into(self, target: Framebuffer, source: Texture) -> None:
-        self._copy.draw(
-            target, textures={"t_source": source}, uniforms={"u_offset_px": (0, 0)}, viewport=(0, 0, *source.size)
-        )
 
     def _forget_strong(self) -> None:
         for texture, target in self._carried:
@@ -249,7 +248,7 @@ class _Redo:
     def __init__(self, gpu: Gpu, lightmap: Lightmap, slots: NDArray[np.int64], shots: int) -> None:
         self._gpu, self.slots, self.next, self.end, self.weak = gpu, slots, 0, shots, False
         nodes = lightmap.nodes
-        place = corners(lightmap, slots)
+        place = nodes.corners(slots)
         self.quads = Mesh(gpu, quads(place, nodes.tile, place).tobytes(), QUAD_FORMAT, per_instance=True)
         flat, shaped = nodes.receivers_of(slots)
         self.receivers = receiver_meshes(gpu, flat, shaped)

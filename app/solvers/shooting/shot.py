@@ -46,14 +46,16 @@ ResultT = TypeVar("ResultT")
 
 @dataclass(frozen=True)
 class Shot:
-    """The shooter of one shot: centre [m], unit normal, area [m²], lower corner (x, y) and edge of its patch in the node set
-    [texels]; rows (SHOOTER_ROWS, 4): all of it, see shooter.glsl."""
+    """The shooter of one shot: centre [m], unit normal, area [m²], lower corner (x, y) and edge of its patch in the node set as
+    it is then [texels], and (u, v, u, v) of it in the virtual atlas [texels of level 0]; rows (SHOOTER_ROWS, 4): all of it, see
+    shooter.glsl."""
 
     centre: F64
     normal: F64
     area: float
     corner: tuple[int, int]
     size: int
+    rect: tuple[float, float, float, float]
     rows: F64
 
 
@@ -194,7 +196,7 @@ class ShotPasses:
         choice.add_patches.draw(
             choice.patch_target,
             textures=textures | {"t_finer": self.buffers.finer},
-            scissor=rows_of(choice.patch_size, band, bands),
+            scissor=rows_of(choice.patches.size, band, bands),
         )
 
     def _add_runs(self, choice: ChoiceStages) -> None:
@@ -315,10 +317,10 @@ class ShotPasses:
         )
 
     def _shot_from_rows(self, rows: F64) -> Shot:
-        frame, corner = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3]))
+        frame, corner, edge = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3])), int(rows[5, 3])
         area = float(rows[0, 3]) * frame.scale**2
-        rows = rows[:SHOOTER_ROWS]
-        return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, int(rows[5, 3]), rows)
+        rect = self.lightmap.nodes.atlas_rect(corner, edge)
+        return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, edge, rect, rows[:SHOOTER_ROWS])
 
     @property
     def _watt(self) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
+from app.atlas.node_set import Moves
 from app.gpu import Gpu, Pass, Texture
 from app.projections import PROJECTIONS, Occluders
 from app.scene.model import F32
@@ -41,22 +42,36 @@ class ShotBuffers:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
         self._gpu, self._tile = gpu, lightmap.nodes.tile
-        self.runs = gpu.texture((max(RUNS, lightmap.rows), 1), 4, "f4")
         self.shooters = gpu.texture((BLOCK_ROWS, BATCH), 4, "f4")
         self.shooter_blocks = gpu.buffer(BATCH * BLOCK_BYTES)  # the same, as uniforms
         self.inspected_block = gpu.buffer(BATCH * BLOCK_BYTES)  # the first is a shooter that is looked at by itself
         self.ledger = gpu.texture((BATCH, 2), 4, "f4")
         self.occluders = Occluders(gpu, lightmap)
         self.report = gpu.texture((REPORT_HEAD + SHOOTER_ROWS, 1), 4, "f4")
-        self.books = [gpu.texture((lightmap.columns, lightmap.rows), 4, "f4") for _ in range(3)]
-        self.finer = gpu.texture((lightmap.size[0] >> BLOCK_LEVEL, lightmap.size[1] >> BLOCK_LEVEL), 1, "f4")
-        self.finer_levels = np.zeros(self.finer.size[::-1], np.float32)  # the same, see patch_level.glsl
-        self.all_alike()
-        self.run_target = gpu.target(self.runs)
         self.shooter_target = gpu.target(self.shooters)
         self.ledger_target = gpu.target(self.ledger)
         self.report_target = gpu.target(self.report)
+        self._fit(lightmap)
+        self.all_alike()
+
+    def _fit(self, lightmap: Lightmap) -> None:
+        """Make what is as large as the node set."""
+        gpu, (width, height) = self._gpu, lightmap.size
+        self.runs = gpu.texture((max(RUNS, lightmap.rows), 1), 4, "f4")
+        self.books = [gpu.texture((lightmap.columns, lightmap.rows), 4, "f4") for _ in range(3)]
+        self.finer = gpu.texture((width >> BLOCK_LEVEL, height >> BLOCK_LEVEL), 1, "f4")
+        self.finer_levels = np.zeros(self.finer.size[::-1], np.float32)  # the same, see patch_level.glsl
+        self.run_target = gpu.target(self.runs)
         self.books_target = gpu.target(*self.books)
+
+    def resize(self, lightmap: Lightmap, moves: Moves) -> None:
+        """For a lightmap that has got another number of slots: all leaves shoot as fine as before, and the ledger stays."""
+        held = moves.array(self._tiles.reshape(-1, *self._tiles.shape[2:]), 0)
+        self._gpu.release_all(self.run_target, self.books_target, self.runs, *self.books, self.finer)
+        self._fit(lightmap)
+        place = np.divmod(np.arange(moves.slots), lightmap.columns)
+        self._tiles[place] = held
+        self.finer.write(self.finer_levels.tobytes())
 
     def shoot_finer(self, patches: Iterable[tuple[int, int, int]]) -> None:
         """Let what is in these patches, column and row of the lower texel and edge, shoot from patches a level finer."""
@@ -84,15 +99,19 @@ class ShotBuffers:
         """Let each tile shoot all over as finely as it does anywhere: for patches of another level."""
         if not self.finer_levels.any():
             return
-        edge = self._tile >> BLOCK_LEVEL
-        rows, columns = (side // edge for side in self.finer_levels.shape)
-        most = self.finer_levels.reshape(rows, edge, columns, edge).max((1, 3))
-        self.finer_levels[:] = most.repeat(edge, 0).repeat(edge, 1)
+        self._tiles[:] = self._tiles.max((2, 3), keepdims=True)
         self.finer.write(self.finer_levels.tobytes())
 
     def finer_at(self, texel: tuple[int, int]) -> int:
         """Levels by which the patch of this texel is finer than others."""
         return int(self.finer_levels[texel[1] >> BLOCK_LEVEL, texel[0] >> BLOCK_LEVEL])
+
+    @property
+    def _tiles(self) -> F32:
+        """A view (rows, columns, blocks, blocks) of those of every slot."""
+        edge = self._tile >> BLOCK_LEVEL
+        rows, columns = (side // edge for side in self.finer_levels.shape)
+        return self.finer_levels.reshape(rows, edge, columns, edge).swapaxes(1, 2)
 
     def _blocks(self, corner: tuple[int, int]) -> F32:
         """Those of the tile that begins at this texel."""
@@ -104,15 +123,6 @@ class ShotBuffers:
         self.finer_levels[:] = 0
         self.finer.write(self.finer_levels.tobytes())
 
-    def enlarged(self, lightmap: Lightmap) -> ShotBuffers:
-        """For a lightmap that has got more rows: the ledger stays, these are released. Waits for the GPU."""
-        larger = ShotBuffers(self._gpu, lightmap)
-        larger.ledger.write(self.ledger.read())
-        larger.finer_levels[: len(self.finer_levels)] = self.finer_levels
-        larger.finer.write(larger.finer_levels.tobytes())
-        self.release()
-        return larger
-
     def release(self) -> None:
         release_all(self._gpu, self)
 
@@ -122,9 +132,7 @@ class ChoiceStages:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, level: int, *, adaptive: bool) -> None:
         self._gpu, self.level = gpu, level
-        self.patch_size = (lightmap.size[0] >> BLOCK_LEVEL, lightmap.size[1] >> BLOCK_LEVEL)
-        self.patches = gpu.texture(self.patch_size, 4, "f4")
-        self.patch_target = gpu.target(self.patches)
+        self._fit(lightmap)
         tile = lightmap.nodes.tile
         kind = lightmap.defines("TILE") | {"LEVEL": level - ROOT_LEVEL if adaptive else level}
         kind |= {"HIGHEST": highest_level(tile), "BLOCK": 1 << BLOCK_LEVEL}
@@ -133,6 +141,16 @@ class ChoiceStages:
             gpu, "shooting/runs", defines={"TILE_BLOCKS": tile >> BLOCK_LEVEL, "BLOCK": 1 << BLOCK_LEVEL}
         )
         self.choose = Pass(gpu, "shooting/choose", defines=kind | lightmap.defines("MATERIAL_BITS"))
+
+    def _fit(self, lightmap: Lightmap) -> None:
+        width, height = lightmap.size
+        self.patches = self._gpu.texture((width >> BLOCK_LEVEL, height >> BLOCK_LEVEL), 4, "f4")
+        self.patch_target = self._gpu.target(self.patches)
+
+    def resize(self, lightmap: Lightmap) -> None:
+        """For a lightmap that has got another number of slots."""
+        self._gpu.release_all(self.patch_target, self.patches)
+        self._fit(lightmap)
 
     def release(self) -> None:
         release_all(self._gpu, self)
@@ -219,6 +237,11 @@ class ShotStages:
             self.maps.release()
             self.maps = Maps(self._gpu, self.map_size, count)
         return [(first, min(count, shots - first)) for first in range(0, shots, count)]
+
+    def resize(self, lightmap: Lightmap) -> None:
+        """For a lightmap that has got another number of slots."""
+        for choice in self.choices:
+            choice.resize(lightmap)
 
     def _receive(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, flat: bool, near: bool) -> Pass:
         defines: dict[str, object] = {

@@ -1,0 +1,342 @@
+"""Node sets grow and shrink: leaves that move take everything along, and nobody sees or hears of it but the memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from solver_scenes import Solution, begin, table_room
+from test_regrow import SCENES, Forest, forest, tables
+
+from app.atlas.collapse import collapse
+from app.atlas.lightmap import LIGHT, STORAGE, Lightmap
+from app.atlas.options import AtlasOptions
+from app.atlas.quadtree import Quadtree, Tile, quadtree_nodes
+from app.gpu import Gpu, Texture
+from app.headless import picture
+from app.render import resolve
+from app.render.ages import LeafAges
+from app.render.options import DisplayOptions
+from app.render.resolve import BORDER, DisplayTexels
+from app.session import Session
+from app.solvers import SOLVERS, EnergyBook, ShootingOptions
+from app.solvers.shooting.adaptive import AdaptiveShooting
+from app.solvers.shooting.stages import ShotBuffers
+
+__all__ = ["forest"]
+
+SMALL_ROOM = 16_384  # texels that a node set has room for at least: a small scene outgrows it
+MANY: dict[str, object] = {"depth": 4, "gradient": 0.06}
+FEW: dict[str, object] = {"depth": 1, "gradient": 0.5}
+
+
+@pytest.fixture(autouse=True)
+def small_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("app.atlas.quadtree", "app.solvers.shooting.adaptive"):
+        monkeypatch.setattr(f"{module}.FIRST_ROOM", SMALL_ROOM)
+
+
+# -- what moves --------------------------------------------------------------------------------------------------------
+
+
+def by_leaf(tree: Quadtree, texture: Texture) -> dict[Tile, bytes]:
+    """What a texture that is as large as the node set holds of each leaf."""
+    nodes, raw = tree.nodes, np.frombuffer(texture.read(alignment=1), np.uint8)
+    tiles = nodes.tiles_from_image(raw.reshape(*nodes.size[::-1], -1))
+    return {tile: tiles[slot].tobytes() for tile, slot in tree.slots.items()}
+
+
+def leaf_textures(lightmap: Lightmap) -> list[str]:
+    return [*lightmap.nodes.tile_arrays(np.empty(0, np.int64)), *LIGHT]
+
+
+def scattered(trees: Forest, rng: np.random.Generator) -> None:
+    """Leaves and holes all over the node set."""
+    for _ in range(2):
+        trees.grow()
+    families = trees.tree.merges(np.flatnonzero(trees.nodes.used))
+    trees.regrowth.apply(trees.tree.merge([family for family in families if rng.random() < 0.7]))
+
+
+@pytest.mark.parametrize(("name", "storage"), [*(("table", storage) for storage in STORAGE), ("textured", "rgba32f")])
+def test_leaves_take_along_all_that_is_theirs(
+    gpu: Gpu, forest: Callable[..., Forest], rng: np.random.Generator, name: str, storage: str
+) -> None:
+    """To the bit: surfaces, light with its alpha, a solver's own texels, and how finely they shoot."""
+    trees = forest(SCENES[name](), storage=storage)
+    scattered(trees, rng)
+    nodes, tree, lightmap = trees.nodes, trees.tree, trees.lightmap
+    for light in LIGHT:
+        texture = lightmap.texture(light)
+        noise = rng.uniform(0, 1, (*texture.size[::-1], 4)) ** 8  # also very little
+        kind = {"rgba32f": np.float32, "rgba16f": np.float16, "fixed8": np.uint8}[storage]
+        texture.write((noise * (255 if storage == "fixed8" else 1)).astype(kind).tobytes())
+    own = gpu.texture(lightmap.size, 4, "f4", rng.uniform(-1, 1, (*lightmap.size, 4)).astype(np.float32).tobytes())
+    buffers = ShotBuffers(gpu, lightmap)
+    buffers._tiles[:] = rng.integers(0, 3, buffers._tiles.shape)
+
+    def held() -> list[dict[Tile, bytes]]:
+        assert buffers.finer.read() == buffers.finer_levels.tobytes()
+        finer = {tile: buffers._blocks(nodes.corner(slot)).tobytes() for tile, slot in tree.slots.items()}
+        return [*(by_leaf(tree, lightmap.texture(n)) for n in leaf_textures(lightmap)), by_leaf(tree, own), finer]
+
+    buffers.finer.write(buffers.finer_levels.tobytes())
+    before, memory, leaves, room = held(), sum(lightmap.memory.values()), len(tree), tree.room
+    moves = tree.resize(len(tree) + 5)
+    lightmap.resize(moves)
+    own = lightmap.moved(own, moves)
+    buffers.resize(lightmap, moves)
+    assert len(moves.old) > 20 and moves.new.max() < moves.old.min(), "it moved nothing"
+    assert (len(before) > 6) == (name == "textured")
+    for was, now in zip(before, held(), strict=True):
+        assert now == was and len(set(was.values())) > 1
+    assert len(tree) == leaves and tree.room == 5 < room
+    assert sum(lightmap.memory.values()) < memory
+    for texture in (own, *(lightmap.texture(light) for light in LIGHT)):  # books are added up over all slots
+        assert texture.size == lightmap.size == nodes.size
+    covered = by_area(lightmap)
+    assert covered[~nodes.used].sum() == 0 and covered[nodes.used].all()
+    buffers.release()
+    own.release()
+
+
+def by_area(lightmap: Lightmap) -> NDArray[np.bool_]:
+    """Whether the GPU holds texels that cover a surface in each slot, also those beyond the last."""
+    nodes = lightmap.nodes
+    raw = np.frombuffer(lightmap.texture("t_position_area").read(), np.float32).reshape(*nodes.size[::-1], 4)[..., 3]
+    cells = raw.reshape(nodes.rows, nodes.tile, nodes.columns, nodes.tile).swapaxes(1, 2)
+    found = (cells > 0).any((2, 3)).ravel()
+    assert not found[nodes.tiles :].any()
+    return np.asarray(found[: nodes.tiles])
+
+
+def test_the_node_set_is_one_that_was_never_larger(forest: Callable[..., Forest], rng: np.random.Generator) -> None:
+    """Tables, receivers and textures are what they would be for leaves that had always been there; and it grows again."""
+    trees = forest(SCENES["textured"]())
+    scattered(trees, rng)
+    nodes, tree = trees.nodes, trees.tree
+    whole = trees.energy
+    trees.lightmap.resize(tree.resize(len(tree) + 1))
+    assert sorted(tree.slots.values()) == np.flatnonzero(nodes.used).tolist()
+    assert all(tree.tile(slot) == tile for tile, slot in tree.slots.items())
+    pages = nodes.slot_tables["t_pages"][..., 0]
+    for slot in np.flatnonzero(nodes.used):
+        side = 1 << (nodes.depth - nodes.leaves.level[slot])
+        x, y = nodes.leaves.x[slot] * side, nodes.leaves.y[slot] * side
+        assert (pages[y : y + side, x : x + side] == slot + 1).all()
+    assert len(np.unique(pages)) == len(tree) + (pages == 0).any()
+    for name, array in nodes.arrays.items():
+        texture = trees.lightmap.texture(name)
+        read = np.frombuffer(texture.read(), array.dtype).reshape(array.shape)
+        if name in leaf_textures(trees.lightmap):
+            mine = nodes.surfaces.area > 0
+            read, array = nodes.tiles_from_image(read)[mine], nodes.tiles_from_image(array)[mine]
+        np.testing.assert_array_equal(read, array, err_msg=name)
+    quads = np.concatenate([nodes.flat_spans, nodes.shaped_tiles])
+    assert (quads[:, 2] * quads[:, 3]).sum() >= nodes.texel_count, "some leaves receive nothing"
+    assert (quads[:, 1] + quads[:, 3]).max() <= nodes.size[1]
+    np.testing.assert_allclose(trees.energy, whole, rtol=1e-12)  # sums in another order
+    trees.grow(0.3, rng)
+    np.testing.assert_allclose(trees.energy, whole, rtol=1e-4)  # as any split
+    assert tree.room + len(tree) == nodes.tiles
+
+
+@pytest.mark.parametrize("interpolation", BORDER)
+def test_display_texels_are_the_same(
+    gpu: Gpu, forest: Callable[..., Forest], rng: np.random.Generator, interpolation: str
+) -> None:
+    """Of new ones, and of those that stay and follow leaf by leaf, where the node set shrinks and grows between two frames."""
+    trees, border = forest(table_room()), BORDER[interpolation]
+    scattered(trees, rng)
+    noise = rng.uniform(0, np.pi / trees.lightmap.unit, (*trees.nodes.surfaces.area.shape, 3))
+    trees.write({"t_irradiance": noise})
+    options = DisplayOptions(layer="irradiance", tone_map="clamp", interpolation=interpolation)
+
+    def shown(display: DisplayTexels, *, whole: bool) -> dict[Tile, bytes]:
+        display.resolve("irradiance", options, scale=None, ambient=(0, 0, 0), whole=whole)
+        slots = np.flatnonzero(trees.nodes.used).tolist()
+        return {trees.tree.tile(slot): tables(display)["colours"][nth].tobytes() for nth, slot in enumerate(slots)}
+
+    known = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.nodes), border)
+    before, slots = shown(known, whole=True), trees.nodes.tiles
+    assert len(set(before.values())) == len(before), "it shows nothing"
+    trees.lightmap.resize(trees.tree.resize(len(trees.tree)))
+    assert not known.fits(border), "nor is there anything left that it could follow"
+    fresh = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.nodes), border)
+    assert shown(fresh, whole=True) == before
+    trees.lightmap.resize(trees.tree.resize(slots))
+    assert known.fits(border)
+    for _ in range(-(-known.size[0] * known.size[1] // resolve.TEXELS_PER_FRAME)):
+        after = shown(known, whole=False)
+    assert after == before
+    for display in (known, fresh):
+        display.release()
+
+
+# -- a solver that goes on -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def planted(gpu: Gpu) -> Iterator[Callable[..., Solution]]:
+    """The table's room before the first shot, on quadtrees."""
+    made: list[Solution] = []
+
+    def plant(**options: object) -> Solution:
+        known: dict[str, object] = {"density": 3.0, "level": 1, "resolution": 64, "residual": 0.1}
+        made.append(begin(gpu, table_room(), solver="adaptive", **(known | options)))  # type: ignore[arg-type]
+        return made[-1]
+
+    yield plant
+    for one in made:
+        one.release()
+
+
+def follow(solution: Solution, **options: object) -> None:
+    """Turn knobs, and let the leaves follow until they rest."""
+    solver = tree_solver(solution)
+    solver.set_options(solver.options.replace(**options))
+    solver.step(8)
+    solution.settle(3000)
+
+
+def tree_solver(solution: Solution) -> AdaptiveShooting:
+    assert isinstance(solution.solver, AdaptiveShooting)
+    return solution.solver
+
+
+def test_memory_follows_the_light(planted: Callable[..., Solution]) -> None:
+    """A tree that merges gives its room back, once: what is left serves as it comes and goes a little."""
+    box = planted(**MANY)
+    solver, nodes = tree_solver(box), box.lightmap.nodes
+    first, sizes = sum(box.lightmap.memory.values()), [nodes.tiles]
+    resize = solver._resize
+
+    def watched(slots: int) -> None:
+        before, books = leaves_of(box), solver.books()
+        resize(slots)
+        sizes.append(nodes.tiles)
+        assert leaves_of(box) == before
+        assert_same_books(solver.books(), books)
+
+    solver._resize = watched  # type: ignore[method-assign]
+    box.settle()
+    peak, most, imbalance = sum(box.lightmap.memory.values()), len(solver.tree), box.book.imbalance_share
+    assert peak > 2 * first and len(sizes) > 2 and sizes == sorted(sizes), "the node set did not grow"
+    grown = len(sizes)
+    follow(box, **FEW)
+    assert len(solver.tree) < most / 3
+    assert sizes[grown:] == [max(SMALL_ROOM // nodes.tile**2, len(solver.tree) * 3 // 2)]
+    assert sum(box.lightmap.memory.values()) < peak / 2
+    assert nodes.tiles >= len(solver.tree) and sorted(solver.tree.slots.values()) == np.flatnonzero(nodes.used).tolist()
+    for gradient in (0.4, 0.5, 0.4, 0.5):
+        follow(box, gradient=gradient)
+    assert len(sizes) == grown + 1, "a slider dragged to and fro makes it anew each time"
+    # shots since then are of the last tenth of the light, and strong ones are sound to 2 %
+    assert box.book.imbalance_share == pytest.approx(imbalance, abs=2e-3)
+
+
+def assert_same_books(a: EnergyBook, b: EnergyBook) -> None:
+    for name in ("absorbed", "escaped", "unshot"):  # the same sums of tiles, added up in another order
+        np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=1e-12)
+
+
+def leaves_of(solution: Solution) -> list[object]:
+    """All that a solver knows of its leaves."""
+    solver, lightmap = tree_solver(solution), solution.lightmap
+    textures = [lightmap.texture(name) for name in leaf_textures(lightmap)] + [t for t, _ in solver._carried]
+    held: list[object] = [by_leaf(solver.tree, texture) for texture in textures]
+    finer = {t: solver.buffers._blocks(lightmap.nodes.corner(s)).tobytes() for t, s in solver.tree.slots.items()}
+    return [*held, finer, {solver.tree.tile(slot) for slot in solver._fresh}]
+
+
+def test_a_solver_takes_along_what_it_knows_of_its_leaves(planted: Callable[..., Solution]) -> None:
+    """Also those that are fresh, and the light of strong shots that is kept."""
+    box = planted(**(MANY | {"depth": 2}))
+    box.settle()
+    solver = tree_solver(box)
+    assert solver._carried, "no strong light is kept"
+    solver.set_options(solver.options.replace(**FEW))
+    fresh = solver.tree.splits([slot for tile, slot in solver.tree.slots.items() if tile[0] < 2], 3)
+    solver._make_room(4 * len(fresh) + 400)
+    solver._apply(solver.tree.split(fresh))
+    solver.buffers._tiles[:] = np.arange(solver.buffers._tiles.size).reshape(solver.buffers._tiles.shape) % 3
+    families = solver.tree.merges(np.flatnonzero(box.lightmap.nodes.used))[::2]
+    solver._apply(solver.tree.merge(families))
+    before = leaves_of(box)
+    assert before[-1]
+    slots = np.array(sorted(solver._fresh))
+    solver._drop_judged()
+    solver._resize(len(solver.tree) + 3)
+    assert leaves_of(box) == before
+    assert sorted(solver._fresh) != slots.tolist()
+
+
+def twin(gpu: Gpu, solution: Solution) -> Solution:
+    """Before the first shot, on the same leaves."""
+    wanted, nodes = tree_solver(solution).tree.slots, quadtree_nodes(solution.lightmap.scene, solution.lightmap.charts)
+    tree = Quadtree(nodes)
+    while splits := [slot for tile, slot in tree.slots.items() if tile not in wanted]:
+        if tree.room < 4 * len(splits):
+            tree.resize(nodes.tiles + 4 * len(splits))
+        tree.split(splits)
+    lightmap = Lightmap(gpu, nodes)
+    return Solution(lightmap, SOLVERS["adaptive"](gpu, lightmap, solution.solver.options))
+
+
+def test_further_shots_come_to_the_same_answer(gpu: Gpu, planted: Callable[..., Solution]) -> None:
+    """As of a solver that kept its room: what either leaves unshot, at most 1 %, lies elsewhere, since the strongest patches are
+    found run by run of slots. As of one that had these leaves from the start: within 1 %, as whenever else a tree grows."""
+    box, roomy = (planted(**(MANY | {"density": 4.0, "residual": 0.5})) for _ in range(2))
+    tree_solver(roomy)._give_room_back = lambda: None  # type: ignore[method-assign]
+    for one in (box, roomy):
+        one.settle()
+        room = one.lightmap.nodes.tiles
+        follow(one, **FEW)
+    assert box.lightmap.nodes.tiles < room / 2 == roomy.lightmap.nodes.tiles / 2
+    others = roomy, twin(gpu, box)
+    for one in (box, *others):
+        tree_solver(one)._grow = lambda *_: False  # type: ignore[method-assign]  # they keep these leaves
+        one.solver.set_options(one.solver.options.replace(residual=0.01))
+        one.settle()
+    mine, here = collapse(box.lightmap.nodes, box.lightmap.irradiance())
+    for other, tolerance in zip(others, (0.005, 0.01), strict=True):
+        assert tree_solver(other).tree.slots.keys() == tree_solver(box).tree.slots.keys()
+        light, there = collapse(other.lightmap.nodes, other.lightmap.irradiance())
+        assert (here == there).all()
+        assert np.sqrt(((mine - light)[here] ** 2).mean() / (light[here] ** 2).mean()) < tolerance
+    others[1].release()
+
+
+# -- what the user sees --------------------------------------------------------------------------------------------------
+
+
+def test_the_picture_stays_and_the_panel_tells(gpu: Gpu) -> None:
+    """Texels of a leaf lie elsewhere in a texture of another height: the sampler weighs them with a fraction of so many bits."""
+    shooting = ShootingOptions(resolution=64, residual=0.2, **MANY)  # type: ignore[arg-type]
+    session = Session(gpu, shooting=shooting, atlas=AtlasOptions(adaptive=True, texels=900))
+    session.open_now("cornell-box")
+    solver = session.solver
+    assert isinstance(solver, AdaptiveShooting)
+    while not (solver.settled and session.converged):
+        session.shoot(8)
+        session.hear(books=False)
+    peak = session.stats.memory_mib
+    session.set_shooting(shooting.replace(**FEW))
+    pictures, resize = [], solver._resize
+
+    def watched(slots: int) -> None:
+        pictures.append(picture(session, (240, 160)))
+        resize(slots)
+        pictures.append(picture(session, (240, 160)))
+
+    solver._resize = watched  # type: ignore[method-assign]
+    session.shoot(8)
+    while not (solver.settled and session.converged):
+        session.shoot(8)
+        session.hear(books=False)
+    before, after = pictures
+    assert np.abs(before.astype(int) - after).max() <= 1
+    assert session.stats.memory_mib < peak / 2
+    session.release()
