@@ -1,8 +1,8 @@
 """The triangles of a scene as they are drawn: corners shared, and where there are many, cut by place into clusters.
 
-Clusters that a view does not see are left out, and the others come from near to far, so that what is hidden costs no shading. A
-depth test shows the one that is drawn first of two faces in one plane: triangles that overlap such a one of another cluster come
-before all others, in the scene's order. So their order, and with it the picture, does not depend on where the eye is.
+Clusters that a view does not see are left out, and the others come from near to far, so that what is hidden costs no shading.
+Where two faces lie in one plane, a depth test shows the one that was drawn first: triangles that overlap another one of their
+plane come before all others, in the scene's order. So no picture depends on the order of clusters.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ CLUSTERED = 4096  # triangles from which on clusters pay
 CLUSTER = 128  # triangles
 MORTON_BITS = 10  # along each axis
 SAME_PLANE = 1e-4  # of the normal and, in the solver frame, of the distance: below that, planes are compared as one
-TOUCHING = 1e-6  # solver frame: what overlaps no more than that only shares an edge, to single precision
-COMPARED = 512  # triangles of one plane with which each is compared at most
+TOUCHING = 1e-6  # solver frame: what overlaps by no more only shares an edge, to single precision
+COMPARED = 512  # neighbours in its plane with which a triangle is compared, at most
 
 VERTEX = np.dtype([("in_position", "f4", 3), ("in_uv_front", "f4", 2), ("in_uv_back", "f4", 2), ("in_material", "u4")])
 VERTEX_FORMAT = {"in_position": "3f", "in_uv_front": "2f", "in_uv_back": "2f", "in_material": "1u"}
@@ -81,9 +81,10 @@ def drawn_triangles(scene: Scene, charts: Charts, local: F64) -> DrawnTriangles:
     if count < CLUSTERED:
         return DrawnTriangles(vertices, corners, np.arange(count), None)
     points = local[scene.triangles]
-    cluster = _by_place(np.sort(points, 1).sum(1) / 3)  # sorted: the same for any order of the corners
-    fixed = _overlaps_elsewhere(points, cluster)
-    cluster[fixed] = np.arange(fixed.sum()) // CLUSTER
+    fixed = _overlaps_in_plane(points)
+    cluster = np.empty(count, np.int64)
+    for mine, order in ((fixed, np.arange(fixed.sum())), (~fixed, _morton_order(points[~fixed].mean(1)))):
+        cluster[np.flatnonzero(mine)[order]] = np.arange(len(order)) // CLUSTER
     order = np.lexsort((cluster, ~fixed))  # stable: within a cluster in the scene's order
     of, is_fixed = cluster[order], fixed[order]
     first = np.flatnonzero(np.r_[True, (of[1:] != of[:-1]) | (is_fixed[1:] != is_fixed[:-1])])
@@ -122,49 +123,58 @@ def _numbers(values: NDArray[np.uint64]) -> NDArray[np.uint64]:
     return np.unique(values, return_inverse=True)[1].astype(np.uint64)
 
 
-def _by_place(centres: F64) -> Ints:
-    """The cluster of each triangle: equal runs along the Morton order of their centres; equal centres stay together."""
+def _morton_order(centres: F64) -> Ints:
+    """(n, 3) points along a Z-curve through their cube."""
+    if not len(centres):
+        return np.zeros(0, np.int64)
     lower, extent = centres.min(0), float(np.ptp(centres, axis=0).max())
     cells = ((centres - lower) / max(extent, 1e-300) * (2**MORTON_BITS - 1)).astype(np.int64)
     code = np.zeros(len(centres), np.int64)
     for bit in range(MORTON_BITS):
         for axis in range(3):
             code |= (cells[:, axis] >> bit & 1) << (3 * bit + axis)
-    order = np.argsort(code, kind="stable")
-    run_of_code = np.maximum.accumulate(np.where(np.diff(code[order], prepend=-1) != 0, np.arange(len(order)), 0))
-    cluster = np.empty(len(order), np.int64)
-    cluster[order] = run_of_code // CLUSTER
-    return cluster
+    return np.asarray(np.argsort(code, kind="stable"))
 
 
-def _overlaps_elsewhere(points: F64, cluster: Ints) -> Mask:
-    """Whether a triangle (points (n, 3, 3)) lies in one plane with one of another cluster, and their boxes in it overlap; or with
-    more than can be compared."""
-    count, found = len(points), np.zeros(len(points), bool)
+def _overlaps_in_plane(points: F64) -> Mask:
+    """Whether a triangle (points (n, 3, 3)) overlaps another one of its plane, or has more neighbours than are compared."""
+    count, found, row = len(points), np.zeros(len(points), bool), np.arange(len(points))
     normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     steep = (np.abs(normal) > 0.5).argmax(1)  # an axis that the plane is not parallel to: a unit vector has such
-    row = np.arange(count)
     normal *= np.sign(normal[row, steep])[:, None]  # either winding
     plane = np.concatenate([normal, (normal * points.mean(1)).sum(1, keepdims=True)], 1)
-    lower, upper = points.min(1) + TOUCHING, points.max(1) - TOUCHING
-    u, v = (steep + 1) % 3, (steep + 2) % 3
-    u0, u1, v0, v1 = lower[row, u], upper[row, u], lower[row, v], upper[row, v]
+    across = (steep[:, None] + [1, 2]) % 3
+    flat = np.take_along_axis(points, across[:, None], 2)  # (n, 3, 2), seen along that axis
+    (u0, v0), (u1, v1) = (flat.min(1) + TOUCHING).T, (flat.max(1) - TOUCHING).T
     for shift in (0.0, 0.5):  # or rounding would part equal planes
-        cell = np.floor(plane / SAME_PLANE + shift).astype(np.int64)
         of = np.zeros(count, np.uint64)
-        for axis in range(4):
-            of = _numbers(of << np.uint64(32) | (cell[:, axis] + (1 << 30)).astype(np.uint64))
+        for cell in np.floor(plane / SAME_PLANE + shift).T:
+            of = _numbers(of << np.uint64(32) | (cell + (1 << 30)).astype(np.uint64))
         order = np.lexsort((u0, of))
-        here = np.arange(count - 1)
+        here = np.arange(count)
         for ahead in range(1, COMPARED + 1):
-            here = here[here + ahead < count]
+            here = here[: np.searchsorted(here, count - ahead)]
             a, b = order[here], order[here + ahead]
             near = (of[a] == of[b]) & (u0[b] < u1[a])
             here, a, b = here[near], a[near], b[near]
-            hit = (cluster[a] != cluster[b]) & (v0[a] < v1[b]) & (v0[b] < v1[a])
-            found[a[hit]] = found[b[hit]] = True
             if not len(here):
                 break
+            boxes = (v0[a] < v1[b]) & (v0[b] < v1[a])
+            a, b = a[boxes], b[boxes]
+            hit = ~_apart(flat[a], flat[b])
+            found[a[hit]] = found[b[hit]] = True
         found[order[here]] = True
     return found
+
+
+def _apart(a: F64, b: F64) -> Mask:
+    """Whether pairs of triangles (m, 3, 2) have an edge, of either, with one on this side and the other on that."""
+    apart = np.zeros(len(a), bool)
+    for one, other in ((a, b), (b, a)):
+        edge = np.roll(one, -1, 1) - one
+        across = np.stack([-edge[..., 1], edge[..., 0]], -1)
+        across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-300)
+        mine, others = (np.einsum("mei,mki->mek", across, triangle) for triangle in (one, other))
+        apart |= (others.min(-1) > mine.max(-1) - TOUCHING).any(1) | (others.max(-1) < mine.min(-1) + TOUCHING).any(1)
+    return apart
