@@ -104,10 +104,11 @@ class FrameRenderer:
         if self._last is None:
             return None
         lightmap, view, size = self._last
+        assert self._surfaces is not None
         extent = 2.0 / np.array(size, np.float64)
         centre = ((np.floor([x_px, y_px]) + 0.5) * extent - 1.0) * [1.0, -1.0]
         self._gpu.ctx.enable_direct(GL_DEPTH_CLAMP)
-        hit = self._picker.pick(lightmap, view.clip_from_local(size[0] / size[1], lightmap.frame), centre, extent)
+        hit = self._picker.pick(self._surfaces, view.clip_from_local(size[0] / size[1], lightmap.frame), centre, extent)
         self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
         return hit
 
