@@ -11,6 +11,7 @@ from app.atlas.lightmap import Lightmap, upload
 from app.errors import UserError
 from app.gpu import Gpu, Texture
 from app.loading import Loaded, Loading
+from app.parts import whole
 from app.render.frame import FrameRenderer
 from app.solvers import DEFAULT_SOLVER, SOLVERS, ShootingOptions, Solver
 
@@ -65,13 +66,7 @@ class Opening:
 
     def at_once(self, loaded: Loaded, options: ShootingOptions, interpolation: str) -> Ready:
         """All of what was loaded elsewhere. Raises UserError."""
-        parts = self._upload(loaded, options, interpolation)
-        while True:
-            try:
-                next(parts)
-            except StopIteration as last:
-                ready: Ready = last.value
-                return ready
+        return whole(self._upload(loaded, options, interpolation))
 
     def _upload(self, loaded: Loaded, options: ShootingOptions, interpolation: str) -> Generator[None, None, Ready]:
         """Upload what was loaded, and draw once with each program, since drivers compile it then; yields after each part.

@@ -10,7 +10,7 @@ import pytest
 
 APP = Path(__file__).parents[2] / "app"
 LAYERS = [
-    {"errors"},
+    {"errors", "parts"},
     {"options"},
     {"scene", "gpu"},
     {"atlas"},

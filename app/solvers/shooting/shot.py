@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
@@ -39,9 +38,6 @@ Blocks = dict[str, tuple[Buffer, int, int]]  # what a pass binds: buffer, offset
 # lose more than this share of its own, its patch is split. Most light is shot by few patches: a hall under skylights in coffers
 # gains 5.8 % without.
 AUDITED, SOUND = 0.02, 0.02
-
-
-ResultT = TypeVar("ResultT")
 
 
 @dataclass(frozen=True)
@@ -100,15 +96,6 @@ def rows_of(size: tuple[int, int], band: int, bands: int) -> tuple[int, int, int
     width, height = size
     lower, upper = (height * nth // bands for nth in (band, band + 1))
     return None if bands == 1 else (0, lower, width, upper - lower)
-
-
-def whole(parts: Generator[None, None, ResultT]) -> ResultT:
-    """Do all parts of something; what it returns."""
-    while True:
-        try:
-            next(parts)
-        except StopIteration as end:
-            return end.value  # type: ignore[no-any-return]  # StopIteration does not know it
 
 
 class ShotPasses:

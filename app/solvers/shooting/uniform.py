@@ -21,10 +21,11 @@ import numpy as np
 
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, ReadBack, Texture
+from app.parts import whole
 from app.scene.model import F64, Material
 from app.solvers.base import EnergyBook, StepReport
 from app.solvers.shooting.options import ShootingOptions, highest_level
-from app.solvers.shooting.shot import Audit, AuditTargets, Shot, ShotPasses, powers_of, whole
+from app.solvers.shooting.shot import Audit, AuditTargets, Shot, ShotPasses, powers_of
 from app.solvers.shooting.stages import BATCH, OPEN, REPORT_HEAD, ChoiceStages, ShotBuffers, ShotStages
 
 # With ``coarsen``, a shot should carry this share of the emitted power: about 4096 shots for each time that all light is
