@@ -24,6 +24,7 @@ from app.render.options import DisplayOptions
 from app.solvers import ShootingOptions
 
 DEFAULT_SCENE = "cornell-box"
+ERROR_SCENES = ("furnace", "cornell-box")
 ALIKE = 0.75  # share of letters in common that makes a flag a likely slip for another; all begin with the same dashes
 
 
@@ -131,6 +132,58 @@ def build_parser() -> Parser:
     tables.add_argument("--plots", action="store_true", help="draw PNGs too (needs matplotlib)")
     _json_flag(tables)
     tables.set_defaults(command=_bench_tables)
+    error = benches.add_parser("error", help="error against time and shots, of each method; minutes")
+    error.add_argument(
+        "scenes",
+        nargs="*",
+        default=ERROR_SCENES,
+        metavar="scene",
+        help=f"files or names (default {' '.join(ERROR_SCENES)})",
+    )
+    error.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write")
+    error.add_argument(
+        "--methods",
+        type=_method_names,
+        default="uniform,adaptive,disc,item-id,level-1,level-3",
+        metavar="A,B",
+        help="all, or some of uniform, adaptive, disc, item-id, depth, stereographic, nonlinear, rgba16f, fixed8, level-1, "
+        "level-3 (default %(default)s)",
+    )
+    error.add_argument(
+        "--peers",
+        type=_peer_names,
+        default=(),
+        metavar="A,B",
+        help="other programs on the same plot: mitsuba (needs glowtree[peers])",
+    )
+    error.add_argument(
+        "--seconds",
+        type=_positive(float),
+        default=30.0,
+        metavar="S",
+        help="of solving, for each curve at most (default 30)",
+    )
+    error.add_argument(
+        "--texels",
+        type=_positive(int),
+        metavar="N",
+        help="uniform ones; quadtrees begin with a sixteenth (default: chosen from the scene)",
+    )
+    error.add_argument(
+        "--reference",
+        choices=("closed-form", "path-traced", "dense"),
+        help="what errors are measured from (default: the first that can judge the scene)",
+    )
+    error.add_argument(
+        "--paths",
+        type=_positive(int),
+        default=16384,
+        metavar="N",
+        help="from each point of a path-traced reference (default 16384)",
+    )
+    _json_flag(error)
+    add_flags(error, ShootingOptions)
+    error.set_defaults(command=_bench_error)
 
     doctor = commands.add_parser("doctor", help="what this machine has, and what is missing")
     _json_flag(doctor)
@@ -195,6 +248,18 @@ def _table_names(text: str) -> tuple[str, ...]:
     return table_names(text)
 
 
+def _method_names(text: str) -> tuple[str, ...]:
+    from app.bench.methods import method_names
+
+    return method_names(text)
+
+
+def _peer_names(text: str) -> tuple[str, ...]:
+    from app.bench.peers import peer_names
+
+    return peer_names(text)
+
+
 # Each command imports what it needs: --help and errors answer at once.
 
 
@@ -238,6 +303,12 @@ def _bench_tables(flags: argparse.Namespace) -> int:
     from app.bench.tables import bench_tables
 
     return bench_tables(flags)
+
+
+def _bench_error(flags: argparse.Namespace) -> int:
+    from app.bench.error import bench_error
+
+    return bench_error(flags)
 
 
 def _doctor(flags: argparse.Namespace) -> int:
