@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
+from app.bench.measure import warm_up
 from app.bench.points import irradiance_of
 from app.bench.report import Row
 from app.bench.truth import Truth
@@ -22,7 +23,7 @@ from app.scene.model import F64
 from app.solvers import ShootingOptions, Solver
 from app.solvers.shooting.stages import BATCH
 
-GROWTH = 2.0**0.5  # of the time from one look to the next
+GROWTH = 2.0**0.25  # of the time from one look to the next
 LEVELS = (0.05, 0.02, 0.01)  # relative RMS that a solve should come down to
 
 
@@ -30,9 +31,8 @@ class Stopwatch:
     """Seconds since it was made, less those while it was held."""
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
-        self._clock, self._start, self._held_at = clock, clock(), None
-
-    _held_at: float | None
+        self._clock, self._start = clock, clock()
+        self._held_at: float | None = None
 
     @property
     def seconds(self) -> float:
@@ -60,10 +60,7 @@ def solve_curve(
 ) -> list[Row]:
     """Solve from the start until converged and settled, or for so many seconds: what ``look`` returned, and before it seconds and
     CPU seconds of all cores."""
-    for warm_up in solver.passes(BATCH).values():  # programs are compiled when they first draw
-        warm_up()
-    solver.reset()
-    gpu.ctx.finish()
+    warm_up(gpu, solver)
     rows: list[Row] = []
     watch, cpu, due, over = Stopwatch(clock), Stopwatch(cpu_clock), 0.0, False
     while not over:

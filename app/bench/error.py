@@ -11,12 +11,12 @@ import importlib.util
 import os
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from app import __version__
+from app.atlas.options import AtlasOptions
 from app.bake import json_text, prepare_directory
 from app.bench.curve import LEVELS, first_at, look_at, solve_curve
 from app.bench.machine import load, machine, processor
@@ -24,8 +24,8 @@ from app.bench.measure import opened
 from app.bench.methods import METHODS
 from app.bench.peers import PEERS
 from app.bench.report import Column, Row, csv_text, markdown_table
-from app.bench.truth import Tell, Truth, choose, truth_of
-from app.console import Console
+from app.bench.truth import Truth, choose, truth_of
+from app.console import Console, Tell
 from app.errors import UserError
 from app.gpu import Gpu, gpu_context
 from app.options import from_flags
@@ -66,60 +66,67 @@ NOTES = (
 
 @dataclass
 class SceneCurves:
-    """What was measured of one scene. name: for people, file: for file names; curves: of methods and of peers."""
+    """What was measured of one scene. name: for people; file: for file names; curves: samples of each method and peer."""
 
     name: str
     file: str
     scene: Scene
+    reference: str
     truth: Truth | None = None
     curves: dict[str, list[Row]] = field(default_factory=dict)
 
     @property
     def texels(self) -> int | None:
         """Uniform ones, if any were measured."""
-        return next(
-            (
-                rows[-1]["texels"]
-                for name, rows in self.curves.items()
-                if name not in PEERS and not METHODS[name].adaptive
-            ),
-            None,
-        )
+        uniform = (name for name in self.curves if name in METHODS and not METHODS[name].adaptive)
+        return next((self.curves[name][-1]["texels"] for name in uniform), None)
 
     @property
     def summary(self) -> list[Row]:
-        """The end of each curve, and when it came down to each level."""
-        out = []
-        for name, rows in self.curves.items():
-            out.append(rows[-1] | {"method": name} | {f"to_{level:g}": first_at(level, rows) for level in LEVELS})
-        return out
+        """The end of each curve, and when it had come down to each level."""
+        return [
+            rows[-1] | {"method": name} | {f"to_{level:g}": first_at(level, rows) for level in LEVELS}
+            for name, rows in self.curves.items()
+        ]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is measured of each scene. texels: uniform ones, None for as many as suit it; seconds: of each curve; paths: from each
+    point of a path-traced reference."""
+
+    methods: tuple[str, ...]
+    peers: tuple[str, ...]
+    texels: int | None
+    shooting: ShootingOptions
+    seconds: float
+    paths: int
+
+    def options(self, method: str) -> tuple[AtlasOptions, ShootingOptions]:
+        """Of a method. Raises UserError."""
+        return METHODS[method].options(self.texels, self.shooting)
 
 
 def bench_error(flags: argparse.Namespace) -> int:
     """Measure and write error.json, error.csv, error.md, and with matplotlib a PNG for each scene. Raises UserError."""
     console = Console(quiet=flags.json)
     shooting = from_flags(ShootingOptions, flags)
-    scenes = [(one, choose(one.scene, flags.reference)) for one in _scenes(flags.scenes)]
+    plan = Plan(flags.methods, flags.peers, flags.texels, shooting, flags.seconds, flags.paths)
+    for name in plan.methods:
+        plan.options(name)  # whose mistakes are told before anything is measured
+    scenes = _scenes(flags.scenes, flags.reference)
     folder = prepare_directory(flags.output)
-    peers = tuple(name for name in flags.peers if _installed(name, console))
+    plan = replace(plan, peers=tuple(name for name in plan.peers if _is_here(name, console)))
     with gpu_context() as gpu, console.progress("error") as tell:
-        values: dict[str, Any] = {
-            "glowtree": __version__,
-            "renderer": gpu.limits.renderer,
-            "machine": machine(),
-            "load": load(),
-            "seconds": flags.seconds,
-            "shooting": shooting.as_dict(),
-        }
-        interrupted = False
-        try:
-            for one, reference in scenes:
-                _measure(gpu, one, reference, flags, shooting, peers, console, tell)
-        except KeyboardInterrupt:
-            console.warn("stopped: only finished curves are written")
-            interrupted = True
-    done = [one for one, _ in scenes if one.curves]
-    values |= {"interrupted": interrupted, "scenes": [_values(one, flags.texels, shooting) for one in done]}
+        values: dict[str, Any] = {"glowtree": __version__, "renderer": gpu.limits.renderer, "machine": machine()}
+        values |= {"load": load(), "seconds": plan.seconds, "texels": plan.texels, "shooting": shooting.as_dict()}
+        interrupted = not _measured(gpu, scenes, plan, console, tell)
+    done = [one for one in scenes if one.curves]
+    if not done:
+        raise KeyboardInterrupt if interrupted else UserError("bench error: nothing could be measured")
+    if interrupted:
+        console.warn("stopped: only finished curves are written")
+    values |= {"interrupted": interrupted, "scenes": [_values(one, plan) for one in done]}
     text = document(values, done)
     write(folder, values, done, text)
     _plot(folder, values, done, console)
@@ -127,62 +134,71 @@ def bench_error(flags: argparse.Namespace) -> int:
     return 130 if interrupted else 0
 
 
-def _scenes(sources: Iterable[str]) -> list[SceneCurves]:
-    """Raises UserError for one that does not exist or has no light."""
+def _scenes(sources: Iterable[str], reference: str | None) -> list[SceneCurves]:
+    """Raises UserError for one that does not exist, has no light, or cannot be judged."""
     out: list[SceneCurves] = []
     for source in sources:
         scene, name = load_scene(source), Path(source).name
         if not scene.emits:
             raise UserError(f"{source}: nothing in the scene emits light")
         file = re.sub(r"[^\w-]", "-", name)
-        taken = sum(one.file == file for one in out)
-        out.append(SceneCurves(name, f"{file}-{taken + 1}" if taken else file, scene))
+        while any(one.file == file for one in out):
+            file += "-again"
+        out.append(SceneCurves(name, file, scene, choose(scene, reference)))
     return out
 
 
-def _installed(name: str, console: Console) -> bool:
-    there = importlib.util.find_spec(PEERS[name].module) is not None
-    if not there:
-        console.warn(f"{name} is left out: pip install 'glowtree[peers]'")
-    return there
+def _is_here(name: str, console: Console) -> bool:
+    """Whether a peer can run; a warning says why not."""
+    reason = PEERS[name].missing()
+    if reason is not None:
+        console.warn(f"{name} is left out: {reason}")
+    return reason is None
 
 
-def _measure(
-    gpu: Gpu,
-    one: SceneCurves,
-    reference: str,
-    flags: argparse.Namespace,
-    shooting: ShootingOptions,
-    peers: tuple[str, ...],
-    console: Console,
-    tell: Tell,
-) -> None:
+def _measured(gpu: Gpu, scenes: list[SceneCurves], plan: Plan, console: Console, tell: Tell) -> bool:
+    """Fill in the curves. False if Ctrl-C stopped it."""
+    try:
+        for one in scenes:
+            _measure(gpu, one, plan, console, tell)
+    except KeyboardInterrupt:
+        return False
+    return True
+
+
+def _measure(gpu: Gpu, one: SceneCurves, plan: Plan, console: Console, tell: Tell) -> None:
     """Fill in the curves of a scene; what this machine cannot do is left out with a warning."""
-    truth = one.truth = truth_of(
-        one.scene, reference, flags.paths, lambda text, share: tell(f"{one.name}, {text}", share)
-    )
-    names = (*flags.methods, *peers)
+    try:
+        truth = truth_of(one.scene, one.reference, plan.paths, lambda text, share: tell(f"{one.name}, {text}", share))
+    except UserError as error:
+        console.warn(f"{one.name}: left out: {error}")
+        return
+    one.truth = truth
+    names = (*plan.methods, *plan.peers)
     for i, name in enumerate(names):
         tell(f"{one.name}, {name}", i / len(names))
         try:
-            if name in PEERS:
-                one.curves[name] = PEERS[name].curve(one.scene, truth, flags.seconds)
-                continue
-            atlas, options = METHODS[name].options(flags.texels, shooting)
-            with opened(gpu, one.scene, atlas, options) as (lightmap, solver):
-                one.curves[name] = solve_curve(gpu, solver, flags.seconds, partial(look_at, lightmap, solver, truth))
+            one.curves[name] = _curve(gpu, one.scene, truth, name, plan)
         except (UserError, MemoryError) as error:
             console.warn(f"{one.name}, {name}: left out: {error or 'not enough memory'}")
 
 
-def _values(one: SceneCurves, texels: int | None, shooting: ShootingOptions) -> dict[str, Any]:
+def _curve(gpu: Gpu, scene: Scene, truth: Truth, name: str, plan: Plan) -> list[Row]:
+    """Of a method or a peer. Raises UserError."""
+    if name in PEERS:
+        return PEERS[name].curve(scene, truth, plan.seconds)
+    with opened(gpu, scene, *plan.options(name)) as (lightmap, solver):
+        return solve_curve(gpu, solver, plan.seconds, lambda: look_at(lightmap, solver, truth))
+
+
+def _values(one: SceneCurves, plan: Plan) -> dict[str, Any]:
     """All there is to know of a scene's curves, for error.json."""
     assert one.truth is not None
     curves: dict[str, dict[str, Any]] = {}
     for name, rows in one.curves.items():
         curves[name] = {"samples": rows}
         if name not in PEERS:
-            atlas, options = METHODS[name].options(texels, shooting)
+            atlas, options = plan.options(name)
             curves[name] |= {"axis": METHODS[name].axis, "atlas": atlas.as_dict(), "shooting": options.as_dict()}
     return {
         "scene": one.name,

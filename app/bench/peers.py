@@ -11,7 +11,7 @@ import numpy as np
 from app.bench.curve import Stopwatch, errors
 from app.bench.methods import names_of
 from app.bench.report import Row
-from app.bench.truth import PATHS_SEED, Truth
+from app.bench.truth import PATHS_SEED, Truth, no_tracer
 from app.scene.model import Scene
 
 PEER_SEED = 7919 * PATHS_SEED  # no path of the reference again
@@ -19,9 +19,9 @@ PEER_SEED = 7919 * PATHS_SEED  # no path of the reference again
 
 @dataclass(frozen=True)
 class Peer:
-    """module: that must be installed, by the extra ``peers``; curve: its samples within about so many seconds."""
+    """missing: why it cannot run here, None if it can; curve: its samples within about so many seconds."""
 
-    module: str
+    missing: Callable[[], str | None]
     curve: Callable[[Scene, Truth, float], list[Row]]
 
 
@@ -33,8 +33,7 @@ def _mitsuba(scene: Scene, truth: Truth, limit: float) -> list[Row]:
     place = truth.points.positions_normals(scene)
     rows: list[Row] = []
     total, paths, batch, nth = np.zeros_like(truth.E), 0, 1, 0
-    for samples in (1, 2):  # kernels are compiled when they first run
-        traced.irradiance(*place, samples, PEER_SEED)
+    traced.irradiance(*place, batch, PEER_SEED)  # kernels are compiled when they first run
     watch, cpu = Stopwatch(), Stopwatch(time.process_time)
     while not rows or 2 * watch.seconds <= limit:
         nth += 1
@@ -47,7 +46,7 @@ def _mitsuba(scene: Scene, truth: Truth, limit: float) -> list[Row]:
     return rows
 
 
-PEERS = {"mitsuba": Peer("mitsuba", _mitsuba)}
+PEERS = {"mitsuba": Peer(no_tracer, _mitsuba)}
 
 
 def peer_names(text: str) -> tuple[str, ...]:

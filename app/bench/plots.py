@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter, PercentFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from app.bench.report import Row
 from app.bench.tables import Plot
@@ -57,7 +57,9 @@ def draw_curves(
                 )
     for axes, label in ((by_time, "seconds of solving"), (by_shots, "shots")):
         axes.set(xscale="log", yscale="log", xlabel=label)
-        axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=None))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,g}"))
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{100 * y:g} %"))
         axes.yaxis.set_minor_formatter(NullFormatter())
         axes.grid(which="major", alpha=0.35)
         axes.grid(which="minor", alpha=0.12)

@@ -61,9 +61,10 @@ class Tracer:
             x = np.repeat((positions[some] - self._centre) * self._scale, samples, axis=0).astype(np.float32)
             n = np.repeat(normals[some], samples, axis=0).astype(np.float32)
             self._sampler.seed((seed * 1_000_003 + first) & 0xFFFFFFFF, len(x))
-            stratum = dr.arange(mi.UInt32, len(x)) % (strata * strata)
-            corner = mi.Point2f(mi.Float(stratum % strata), mi.Float(stratum // strata))
-            start = (corner + self._sampler.next_2d()) / strata
+            across = dr.opaque(mi.UInt32, strata)  # else one more kernel for each number
+            stratum = dr.arange(mi.UInt32, len(x)) % (across * across)
+            corner = mi.Point2f(mi.Float(stratum % across), mi.Float(stratum // across))
+            start = (corner + self._sampler.next_2d()) / mi.Float(across)
             L = _trace(self._scene, self._sampler, mi.Point3f(x.T), mi.Normal3f(n.T), start)
             out[some] = np.pi * np.array(L, np.float64).reshape(3, -1, samples).mean(axis=2).T
         return out

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from app import cache
 from app.atlas.sides import scene_size, weld
 from app.bench.points import Points, open_above, random_points
+from app.console import Tell
 from app.errors import UserError
 from app.reference.dense import irradiance_at, solve_dense
 from app.scene.model import F64, Scene
@@ -37,8 +38,6 @@ DENSE_TRIANGLES = 60  # most for which it takes minutes
 DARK = 1e-3  # share of the mean below which a point counts as dark
 FORMAT = b"glowtree truth 1"  # changes when a reference or its file does
 CACHE_FILES = 64  # kept, newest first
-
-Tell = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +114,10 @@ def no_furnace(scene: Scene) -> str | None:
     used = [scene.materials[k] for k in np.unique(scene.material_ids)]
     looks = {(m.albedo, m.emission, m.albedo_texture, m.emission_texture, m.double_sided) for m in used}
     albedo, _, *textures, double_sided = looks.pop()
-    if looks or any(textures) or double_sided or max(albedo) >= 1.0:
+    if looks or any(textures) or double_sided:
         return "not all surfaces are alike"
+    if max(albedo) >= 1.0:
+        return "nothing absorbs light"
     points, triangles = weld(scene)
     edges = {(int(t[k]), int(t[k - 2])) for t in triangles for k in range(3)}
     closed = len(edges) == 3 * len(triangles) and all((b, a) in edges for a, b in edges)
@@ -176,8 +177,17 @@ def dense_truth(
 # -- path tracing ------------------------------------------------------------------------------------------------------
 
 
-def _no_tracer(scene: Scene) -> str | None:
-    return None if importlib.util.find_spec("mitsuba") else "needs mitsuba: pip install 'glowtree[peers]'"
+def no_tracer() -> str | None:
+    """Why no paths can be traced here, None if they can."""
+    if importlib.util.find_spec("mitsuba") is None:
+        return "needs mitsuba: pip install 'glowtree[peers]'"
+    from app.bench import tracer
+
+    try:
+        tracer.description()
+    except UserError as error:
+        return str(error)
+    return None
 
 
 def traced_truth(scene: Scene, samples: int, tell: Tell, *, count: int = POINTS) -> Truth:
@@ -245,6 +255,6 @@ def arrays_of(scene: Scene) -> dict[str, NDArray[Any]]:
 
 REFERENCES = {
     "closed-form": Reference(no_furnace, _closed_form),
-    "path-traced": Reference(_no_tracer, traced_truth),
+    "path-traced": Reference(lambda scene: no_tracer(), traced_truth),
     "dense": Reference(_too_many_triangles, lambda scene, samples, tell: dense_truth(scene, tell)),
 }
