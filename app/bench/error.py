@@ -218,7 +218,9 @@ def document(values: dict[str, Any], scenes: Iterable[SceneCurves]) -> str:
     for one in scenes:
         truth = one.truth
         assert truth is not None
-        noise = "" if truth.noise is None else f"; its own noise is {truth.noise:.2%} RMS"
+        noise = ""
+        if truth.noise is not None:
+            noise = f"; its own noise is {truth.noise:.2%} RMS, {truth.median_noise:.2%} in the median"
         lit = int(truth.lit.sum())
         parts += [
             f"## {one.name}",
@@ -256,4 +258,11 @@ def _plot(folder: Path, values: dict[str, Any], scenes: Iterable[SceneCurves], c
         assert one.truth is not None
         texels = "" if one.texels is None else f", {one.texels:,} uniform texels"
         title = f"{one.name}{texels}\n{values['renderer']}; {processor()}, {os.cpu_count()} cores"
-        draw_curves(folder / f"{one.file}.png", title, one.curves, tuple(PEERS), one.truth.noise)
+        curves = {_label(name, rows, one.texels): rows for name, rows in one.curves.items()}
+        draw_curves(folder / f"{one.file}.png", title, curves, tuple(PEERS), one.truth.noise)
+
+
+def _label(name: str, rows: list[Row], texels: int | None) -> str:
+    """Of a curve, with its texels where they are others than those that the title has."""
+    own = rows[-1].get("texels")
+    return name if own in (None, texels) else f"{name}, {own:,} texels"

@@ -14,6 +14,7 @@ from app.errors import UserError
 
 SIZE, CURVES_SIZE = (10.0, 5.0), (12.0, 5.0)  # inches
 PEER = "0.25"  # grey
+MARKERS = "osD^vP<>Xph"
 STYLES = ("-", "--", ":", "-.")
 DPI = 150
 
@@ -38,23 +39,21 @@ def draw(path: Path, title: str, plot: Plot, rows: list[Row], renderer: str) -> 
 def draw_curves(
     path: Path, title: str, curves: Mapping[str, list[Row]], peers: Collection[str], noise: float | None
 ) -> None:
-    """Write one PNG: relative RMS over seconds and over shots, one line for each curve, dashed for peers; noise: of what is
-    compared with, drawn as a floor. Raises UserError if it cannot be written."""
+    """Write one PNG: relative RMS over seconds and over shots, one line for each curve by its label, dashed for those of peers;
+    noise: of what is compared with, drawn as a floor. Raises UserError if it cannot be written."""
     figure = Figure(CURVES_SIZE, dpi=DPI, layout="constrained")
     by_time, by_shots = figure.subplots(1, 2, sharey=True)
     for k, (name, rows) in enumerate(curves.items()):
         peer = name in peers
-        look = {"color": PEER if peer else f"C{k}", "linestyle": "--" if peer else "-", "marker": "s" if peer else "o"}
-        for axes, key in ((by_time, "seconds"), (by_shots, "shots")):
+        look = {
+            "color": PEER if peer else f"C{k}",
+            "linestyle": "--" if peer else "-",
+            "marker": MARKERS[k % len(MARKERS)],
+        }
+        for axes, key, label in ((by_time, "seconds", name), (by_shots, "shots", None)):
             points = [(row[key], row["rms"]) for row in rows if row.get("rms") and row.get(key)]
             if points:
-                axes.plot(
-                    *zip(*points, strict=True),
-                    markersize=3.5,
-                    linewidth=1.4,
-                    label=name if key == "seconds" else None,
-                    **look,
-                )
+                axes.plot(*zip(*points, strict=True), markersize=3.5, linewidth=1.4, label=label, **look)
     for axes, label in ((by_time, "seconds of solving"), (by_shots, "shots")):
         axes.set(xscale="log", yscale="log", xlabel=label)
         axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,g}"))

@@ -55,18 +55,26 @@ class Tracer:
         square number of them are stratified."""
         side = int(np.sqrt(samples))
         strata = side if side * side == samples else 1
+        points = mi.Point3f(((positions - self._centre) * self._scale).astype(np.float32).T)
+        point_normals = mi.Normal3f(normals.astype(np.float32).T)
         out = np.empty((len(positions), 3))
-        for first in range(0, len(positions), max(1, RAYS // samples)):
-            some = slice(first, first + max(1, RAYS // samples))
-            x = np.repeat((positions[some] - self._centre) * self._scale, samples, axis=0).astype(np.float32)
-            n = np.repeat(normals[some], samples, axis=0).astype(np.float32)
-            self._sampler.seed((seed * 1_000_003 + first) & 0xFFFFFFFF, len(x))
-            across = dr.opaque(mi.UInt32, strata)  # else one more kernel for each number
-            stratum = dr.arange(mi.UInt32, len(x)) % (across * across)
-            corner = mi.Point2f(mi.Float(stratum % across), mi.Float(stratum // across))
-            start = (corner + self._sampler.next_2d()) / mi.Float(across)
-            L = _trace(self._scene, self._sampler, mi.Point3f(x.T), mi.Normal3f(n.T), start)
-            out[some] = np.pi * np.array(L, np.float64).reshape(3, -1, samples).mean(axis=2).T
+        most = max(1, RAYS // samples)
+        for first in range(0, len(positions), most):
+            count = min(most, len(positions) - first)
+            self._sampler.seed((seed * 1_000_003 + first) & 0xFFFFFFFF, count * samples)
+            # numbers opaque and arrays evaluated, else each call compiles another kernel
+            before, each, across = (dr.opaque(mi.UInt32, number) for number in (first, samples, strata))
+            path = dr.arange(mi.UInt32, count * samples)
+            x = dr.gather(mi.Point3f, points, before + path // each)
+            n = dr.gather(mi.Normal3f, point_normals, before + path // each)
+            corner = mi.Point2f(mi.Float(path % across), mi.Float(path // across % across))
+            u = (corner + self._sampler.next_2d()) / mi.Float(across)
+            dr.eval(x, n, u)
+            L = _trace(self._scene, self._sampler, x, n, u)
+            dr.eval(L)
+            for k, component in enumerate((L.x, L.y, L.z)):
+                estimates = np.array(component, np.float64).reshape(count, samples)
+                out[first : first + count, k] = np.pi * estimates.mean(axis=1)
         return out
 
     def _shapes(self, scene: Scene, k: int, material: Material) -> list[Any]:

@@ -24,6 +24,7 @@ from app.atlas.sides import scene_size, weld
 from app.bench.points import Points, open_above, random_points
 from app.console import Tell
 from app.errors import UserError
+from app.metrics import median_local
 from app.reference.dense import irradiance_at, solve_dense
 from app.scene.model import F64, Scene
 
@@ -68,12 +69,21 @@ class Truth:
         lit = self.lit
         return float(np.sqrt((self.deviation[lit] ** 2).mean()) / self.E[lit].mean())
 
+    @property
+    def median_noise(self) -> float | None:
+        """Median over lit points of the standard error over the irradiance there."""
+        if self.deviation is None:
+            return None
+        lit = self.lit
+        return median_local(self.E[lit] + self.deviation[lit], self.E[lit])
+
     def as_dict(self) -> dict[str, Any]:
         """For reports."""
         return {
             "reference": self.reference,
             "made": self.made,
             "noise": self.noise,
+            "median_noise": self.median_noise,
             "points": len(self.points),
             "lit_points": int(self.lit.sum()),
             "points_seed": POINTS_SEED,

@@ -389,6 +389,26 @@ def test_a_furnace_from_the_command_line(
     assert drawn != ("no plots: pip install" in err)
 
 
+def test_a_plot_has_a_line_for_each_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plots = pytest.importorskip("app.bench.plots", reason="of the extra bench", exc_type=ImportError)
+    figures = []
+    monkeypatch.setattr(plots, "_save", lambda figure, path: figures.append(figure))
+    rows = [
+        {"seconds": 1.0, "shots": 8, "rms": 0.5},
+        {"seconds": 2.0, "shots": 16},
+        {"seconds": 3.0, "shots": 24, "rms": 0.1},
+    ]
+    paths = [{"seconds": 1.0, "paths": 1, "rms": 0.4}]
+    plots.draw_curves(
+        tmp_path / "a.png", "title", {"uniform": rows, "disc": rows, "mitsuba": paths}, ("mitsuba",), 0.01
+    )
+    by_time, by_shots = figures[0].axes
+    floor = 1
+    assert len(by_time.lines) == 3 + floor and len(by_shots.lines) == 2 + floor
+    assert by_shots.lines[0].get_xdata() == [8, 24], "what is not finite is left out"
+    assert by_time.get_xscale() == by_time.get_yscale() == by_shots.get_xscale() == "log"
+
+
 def test_ctrl_c_keeps_finished_curves(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
