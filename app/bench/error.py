@@ -47,6 +47,7 @@ SUMMARY = (
     Column("shots", "shots", ","),
     Column("paths", "paths per point", ","),
     Column("seconds", "s", ".2f"),
+    Column("cpu_seconds", "CPU s", ".2f"),
     Column("residual", "unshot", ".2%"),
     Column("rms", "RMS", ".2%"),
     Column("bias", "bias", "+.2%"),
@@ -60,7 +61,8 @@ NOTES = (
     "Error of the irradiance at random points of the surfaces. RMS: root mean square over all lit points and colours, over the "
     "mean. Bias: of the mean. Median, 90 %: quantiles of the error at each lit point, over the irradiance there. Leak: light at "
     "dark points, over the mean at lit ones. Imbalance: emitted light that is neither absorbed, nor unshot, nor gone. s to: "
-    "seconds of solving until the RMS was that small, read between two looks; looking stops the clock, and loading is not timed.",
+    "seconds of solving until the RMS was that small, read between two looks; looking stops the clock, and loading is not timed. "
+    "CPU s: of all cores, which other programs on the machine do not change.",
 )
 
 

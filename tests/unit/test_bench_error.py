@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +19,15 @@ from app.bench.error import TITLE
 from app.bench.measure import opened
 from app.bench.methods import DEFAULT_METHODS, METHODS, method_names
 from app.bench.peers import PEERS
-from app.bench.points import irradiance_of, open_above, random_points
+from app.bench.points import open_above, random_points
 from app.bench.truth import Truth
 from app.cli import ERROR_SCENES, build_parser, run
 from app.gpu import Gpu
 from app.metrics import relative_rms
 from app.options import specs
+from app.reference.patches import texture_at
 from app.scene.load import load_scene
-from app.scene.model import Scene
+from app.scene.model import Material, Scene, Texture
 from app.solvers import ShootingOptions
 
 
@@ -290,8 +292,6 @@ def test_textures_and_sides_are_part_of_the_key() -> None:
     scene = load_scene("textured-room")
     whole = cache.digest(b"", truth.arrays_of(scene))
     textured = next(k for k, m in enumerate(scene.materials) if m.albedo_texture is not None)
-    from dataclasses import replace
-
     for change in (
         {"double_sided": not scene.materials[textured].double_sided},
         {"albedo_texture": replace(scene.materials[textured].albedo_texture, wrap=("clamp", "clamp"))},
@@ -337,17 +337,29 @@ def test_a_lamp_that_shines_both_ways(tracer: Any) -> None:
     assert E == pytest.approx(4 / np.pi * x * np.arctan(x), rel=0.02)
 
 
-def test_textures_lie_as_the_solver_has_them(tracer: Any, gpu: Gpu) -> None:
-    """A picture that is turned over or shifted, or whose black back reflects, moves light by tens of per cent."""
-    scene = load_scene("textured-room")
-    points = random_points(scene, 300, 4)
-    E = tracer.Tracer(scene).irradiance(*points.positions_normals(scene), 1024, 3)
-    with opened(gpu, scene, AtlasOptions(texels=8_000), ShootingOptions(residual=0.02, level=3)) as (lightmap, solver):
-        curve.solve_curve(gpu, solver, 60.0, dict)
-        ours = irradiance_of(lightmap, points)
-    lit = E.mean(axis=1) > 0.1 * E.mean()
-    ratio = np.median(ours[lit] / E[lit], axis=0)
-    assert ratio == pytest.approx(0.97, abs=0.05)  # 2 % are unshot, 3 % what so few texels and paths leave
+@pytest.mark.parametrize("channel", ["emission", "albedo"])
+def test_textures_lie_as_the_solver_has_them(tracer: Any, channel: str) -> None:
+    """Close to a square with four colours each point sees the one that the dense reference looks up there; turned over or shifted
+    they are others."""
+    pixels = np.array([[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 1]]], np.float32)
+    texture = Texture(
+        "four", pixels, ("repeat", "repeat"), bilinear=False, uv_transform=np.array([[1, 0, 0.5], [0, -1, 1]])
+    )
+    if channel == "emission":
+        material = Material("glows", (0.0,) * 3, (2.0,) * 3, emission_texture=texture)
+    else:
+        material = Material("reflects", (0.5,) * 3, albedo_texture=texture)
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    sky = square[::-1] * 4 + [-1.5, -1.5, 1.0]  # lights the square almost evenly
+    scene = quads_scene([square, sky], [material, grey(0.0, 1.0)], [0, 1])
+    corners = square[:, :2].astype(np.float32)[[[0, 1, 2], [0, 2, 3]]]
+    scene = replace(scene, uv0=np.concatenate([corners, np.zeros_like(corners)]))
+    uv = np.array([[0.2, 0.3], [0.2, 0.8], [0.7, 0.3], [0.7, 0.8]])
+    above = np.column_stack([uv, np.full(4, 0.01)])  # sees the colour below in all but about 1 % of directions
+    E = tracer.Tracer(scene).irradiance(above, np.tile([0.0, 0, -1], (4, 1)), 4096, 1)
+    seen = texture_at(texture, uv)
+    assert len(np.unique(seen, axis=0)) == 4
+    assert pytest.approx(seen, abs=0.05) == E / E.max()
 
 
 def test_mitsuba_beside_us(tracer: Any, tmp_path: Path) -> None:
@@ -405,7 +417,7 @@ def test_a_plot_has_a_line_for_each_curve(tmp_path: Path, monkeypatch: pytest.Mo
     by_time, by_shots = figures[0].axes
     floor = 1
     assert len(by_time.lines) == 3 + floor and len(by_shots.lines) == 2 + floor
-    assert by_shots.lines[0].get_xdata() == [8, 24], "what is not finite is left out"
+    assert list(by_shots.lines[0].get_xdata()) == [8, 24], "what is not finite is left out"
     assert by_time.get_xscale() == by_time.get_yscale() == by_shots.get_xscale() == "log"
 
 
