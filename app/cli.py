@@ -24,6 +24,7 @@ from app.render.options import DisplayOptions
 from app.solvers import ShootingOptions
 
 DEFAULT_SCENE = "cornell-box"
+ERROR_SCENES = ("furnace", "cornell-box")
 ALIKE = 0.75  # share of letters in common that makes a flag a likely slip for another; all begin with the same dashes
 
 
@@ -96,6 +97,7 @@ def _bench_flags(parser: Parser) -> None:
         "shots": Command("milliseconds per shot, by pass, at the papers' sizes", _shots_flags, _bench_shots),
         "frames": Command("milliseconds per frame of the viewer, by part", _frames_flags, _bench_frames),
         "tables": Command("the papers' tables, ours beside theirs; minutes", _tables_flags, _bench_tables),
+        "error": Command("error against time and shots, of each method; minutes", _error_flags, _bench_error),
     }
     _add_commands(parser, "what", benches)
 
@@ -179,6 +181,59 @@ def _tables_flags(tables: Parser) -> None:
     _json_flag(tables)
 
 
+def _error_flags(error: Parser) -> None:
+    error.add_argument(
+        "scenes",
+        nargs="*",
+        default=ERROR_SCENES,
+        metavar="scene",
+        help=f"files or names (default {' '.join(ERROR_SCENES)})",
+    )
+    error.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write")
+    error.add_argument(
+        "--methods",
+        type=_method_names,
+        default="uniform,adaptive,disc,item-id,level-1,level-3",
+        metavar="A,B",
+        help="all, or some of uniform, adaptive, disc, item-id, depth, stereographic, nonlinear, rgba16f, fixed8, level-1, "
+        "level-3 (default %(default)s)",
+    )
+    error.add_argument(
+        "--peers",
+        type=_peer_names,
+        default=(),
+        metavar="A,B",
+        help="other programs on the same plot: mitsuba (needs glowtree[peers])",
+    )
+    error.add_argument(
+        "--seconds",
+        type=_positive(float),
+        default=30.0,
+        metavar="S",
+        help="of solving, for each curve at most (default 30)",
+    )
+    error.add_argument(
+        "--texels",
+        type=_positive(int),
+        metavar="N",
+        help="uniform ones; quadtrees begin with a sixteenth (default: chosen from the scene)",
+    )
+    error.add_argument(
+        "--reference",
+        choices=("closed-form", "path-traced", "dense"),
+        help="what errors are measured from (default: the first that can judge the scene)",
+    )
+    error.add_argument(
+        "--paths",
+        type=_positive(int),
+        default=16384,
+        metavar="N",
+        help="from each point of a path-traced reference (default 16384)",
+    )
+    _json_flag(error)
+    add_flags(error, ShootingOptions)
+
+
 def _scene_flags(parser: Parser, *, optional: bool = False) -> None:
     help = "a file (.glb .gltf .obj .ply .stl .toml) or the name of a scene"
     if optional:
@@ -239,6 +294,18 @@ def _table_names(text: str) -> tuple[str, ...]:
     return table_names(text)
 
 
+def _method_names(text: str) -> tuple[str, ...]:
+    from app.bench.methods import method_names
+
+    return method_names(text)
+
+
+def _peer_names(text: str) -> tuple[str, ...]:
+    from app.bench.peers import peer_names
+
+    return peer_names(text)
+
+
 # -- commands: each imports what it needs, so that --help and errors answer at once ------------------------------------
 
 
@@ -282,6 +349,12 @@ def _bench_tables(flags: argparse.Namespace) -> int:
     from app.bench.tables import bench_tables
 
     return bench_tables(flags)
+
+
+def _bench_error(flags: argparse.Namespace) -> int:
+    from app.bench.error import bench_error
+
+    return bench_error(flags)
 
 
 def _doctor(flags: argparse.Namespace) -> int:

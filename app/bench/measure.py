@@ -71,12 +71,20 @@ def opened(
         lightmap.release()
 
 
-def shoot(gpu: Gpu, solver: Solver[ShootingOptions], seconds: float) -> Run:
-    """Solve from the start until converged and settled, or for so many seconds."""
-    for warm_up in solver.passes(BATCH).values():  # programs are compiled when they first draw
-        warm_up()
+def warm_up(gpu: Gpu, solver: Solver[ShootingOptions]) -> None:
+    """Draw once with each program, for drivers compile it then: each pass, and a step with what is not part of every one."""
+    for run in solver.passes(BATCH).values():
+        run()
+    solver.reset()
+    solver.step(BATCH)
+    solver.poll(wait=True)
     solver.reset()
     gpu.ctx.finish()
+
+
+def shoot(gpu: Gpu, solver: Solver[ShootingOptions], seconds: float) -> Run:
+    """Solve from the start until converged and settled, or for so many seconds."""
+    warm_up(gpu, solver)
     run, heard, start = Run(curve=[(0, 1.0)]), 0, time.perf_counter()
     while run.seconds < seconds:
         report = solver.poll()

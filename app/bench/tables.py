@@ -7,8 +7,6 @@ its rows one by one; what is finished is written when the rest is stopped.
 from __future__ import annotations
 
 import argparse
-import os
-import platform
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +15,9 @@ from typing import Any
 from app.atlas.options import AtlasOptions
 from app.bake import json_text, prepare_directory
 from app.bench import equal, measure, published
+from app.bench.machine import load, machine
 from app.bench.report import FLIP, Column, Row, csv_text, markdown_table, missing
+from app.bench.truth import PATCHES
 from app.console import Console, Tell
 from app.errors import UserError
 from app.gpu import Gpu, gpu_context
@@ -131,23 +131,6 @@ def measured(
     return True
 
 
-def machine() -> str:
-    """Processor, cores and system."""
-    model = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.is_file():
-        names = [
-            line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if line[:10] == "model name"
-        ]
-        model = names[0] if names else model
-    return f"{model}, {os.cpu_count()} cores, {platform.platform()}"
-
-
-def load() -> float | None:
-    """How many processes wanted a core in the minute before this run; None where the system does not say."""
-    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-
-
 def document(values: dict[str, Any], tables: Iterable[Table]) -> str:
     """All tables as Markdown, with what they were measured on."""
     busy = "" if values["load"] is None else f", load {values['load']:.1f} when it began"
@@ -230,7 +213,7 @@ def _equal() -> Table:
         "no numbers for this",
         (
             f"Cornell box down to {equal.CONVERGED:.1%} unshot, all seconds counted. Error: irradiance at {equal.POINTS} random "
-            f"points against the dense float64 reference of {equal.PATCHES:,} patches.",
+            f"points against the dense float64 reference of {PATCHES:,} patches.",
             "Equal: what uniform texels would take for the adaptive ones' RMS, between the measured ones.",
         ),
         (

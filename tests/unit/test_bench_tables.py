@@ -13,6 +13,7 @@ import pytest
 
 from app.atlas.options import AtlasOptions
 from app.bench import equal, measure, published, tables
+from app.bench.points import irradiance_of, random_points
 from app.bench.report import Column, csv_text, markdown_table
 from app.bench.rooms import FEWEST, room_of
 from app.cli import run
@@ -247,8 +248,8 @@ def test_a_lightmap_is_read_where_its_points_are(gpu: Gpu, adaptive: bool) -> No
         scene, nodes = lightmap.scene, lightmap.nodes
         height = nodes.image_from_tiles(nodes.surfaces.position[..., 1:2].astype(np.float32))
         lightmap.texture("t_irradiance").write(np.ascontiguousarray(height.repeat(4, -1) / lightmap.unit).tobytes())
-        points = equal.random_points(scene, lightmap.charts, 300, 3)
-        read, position = equal.irradiance_of(lightmap, points)[:, 0], points.positions_normals(scene)[0][:, 1]
+        points = random_points(scene, 300, 3)
+        read, position = irradiance_of(lightmap, points)[:, 0], points.positions_normals(scene)[0][:, 1]
         texel = 1 / lightmap.charts.density
     assert np.abs(read - position).max() < 0.51 * texel
     assert np.median(np.abs(read - position)) < 1e-4

@@ -11,7 +11,7 @@ import pytest
 APP = Path(__file__).parents[2] / "app"
 LAYERS = [
     {"errors", "parts"},
-    {"options"},
+    {"options", "cache"},
     {"scene", "gpu"},
     {"atlas"},
     {"projections"},
