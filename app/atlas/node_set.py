@@ -304,10 +304,11 @@ class NodeSet:
         return self.slot_tables | {"t_facets": self._facet_table(), "t_materials": self.material_table(self.scene)}
 
     def _facet_table(self) -> F32:
-        """(rows, TABLE_WIDTH, 4): per facet, from 1, two entries: ∂p/∂u and ∂p/∂v per texel of level 0."""
+        """(rows, TABLE_WIDTH, 4): per facet, from 1, two entries: ∂p/∂u per texel of level 0 and its chart; ∂p/∂v."""
         rows = -(-2 * (self.charts.facet_count + 1) // TABLE_WIDTH)
         table = np.zeros((rows * TABLE_WIDTH, 4), np.float32)
         table[2 : 2 * len(self._dpdu) + 2 : 2, :3] = self._dpdu
+        table[2 * self.charts.face_facet + 2, 3] = self.charts.face_chart
         table[3 : 2 * len(self._dpdv) + 3 : 2, :3] = self._dpdv
         return table.reshape(rows, TABLE_WIDTH, 4)
 

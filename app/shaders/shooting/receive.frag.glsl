@@ -17,6 +17,7 @@ flat in vec3 v_normal;
 flat in float v_facet;
 flat in vec3 v_albedo;
 #else
+#include "shooting/belongs.glsl"
 uniform int u_own;  // whether patches are still where they shot from
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
@@ -56,8 +57,9 @@ void main() {
         Shooter s = shooter_of(shot);
         vec2 FV = received(position, normal, facet, s, shot);
 #if !FLAT
-        // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it
-        bool own = u_own != 0 && all(lessThan(uvec2(texel_px - s.patch_px), uvec2(s.size_px)));
+        // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it. Another chart in it is no part of it.
+        bool within = u_own != 0 && all(lessThan(uvec2(texel_px - s.patch_px), uvec2(s.size_px)));
+        bool own = within && chart_of(texel.facet) == s.chart;
         FV = own || texel.area <= 0.0 ? vec2(0.0) : FV;
 #endif
         light += s.exitance * FV.x * FV.y;

@@ -134,7 +134,8 @@ class ShotPasses:
         lightmap, buffers = self.lightmap, self.buffers
         self.stages.zero.draw(
             lightmap.residual_target,
-            textures=lightmap.textures("t_position_area", "t_normal_ids") | {"t_shooters": buffers.shooters},
+            textures=lightmap.textures("t_position_area", "t_normal_ids", "t_facets")
+            | {"t_shooters": buffers.shooters},
             uniforms={"u_size": lightmap.size},
             vertices=4,
             instances=shots,
@@ -254,7 +255,7 @@ class ShotPasses:
 
         own: whether patches still are where they shot from, and do not light themselves."""
         lightmap = self.lightmap
-        shaped = lightmap.textures("t_position_area", "t_normal_ids")
+        shaped = lightmap.textures("t_position_area", "t_normal_ids", "t_facets")
         meshes = lightmap.receivers if meshes is None else meshes
         for (flat, _), receive in self.stages.receive.items():
             if flat not in meshes:

@@ -16,7 +16,7 @@ from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOption
 BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
 RUNS = 64  # at least, of slots: a batch is chosen from the strongest patch of each
 OPEN = 0.0  # item of the open background, see common/item.glsl
-SHOOTER_ROWS = 7  # texels that describe one shooter, see shooter.glsl
+SHOOTER_ROWS = 6  # texels that describe one shooter, see shooter.glsl
 BLOCK_BYTES = 256  # no driver asks for a coarser uniform block alignment
 BLOCK_ROWS = BLOCK_BYTES // 16  # texels in a row of t_shooters: one shooter, padded to a uniform block
 REPORT_HEAD = 2  # texels of the report before those of its first shooter, see report.frag.glsl
