@@ -16,7 +16,7 @@ from app import cache
 from app.atlas.options import AtlasOptions
 from app.bench import curve, truth
 from app.bench.error import TITLE
-from app.bench.measure import opened
+from app.bench.measure import opened, warm_up
 from app.bench.methods import DEFAULT_METHODS, METHODS, method_names
 from app.bench.peers import PEERS
 from app.bench.points import open_above, random_points
@@ -126,6 +126,19 @@ def test_nothing_changes_by_looking(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -
     assert same["rms"] == pytest.approx(few[0]["rms"], rel=1e-5)  # sums of 32-bit floats
     # who waits for reports hears of convergence at once, and else two batches of 8 later
     assert 0 <= few[1]["shots"] - many[-1]["shots"] <= 3 * 8
+
+
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_warming_up_leaves_no_trace(gpu: Gpu, adaptive: bool) -> None:
+    with opened(gpu, "cornell-box", AtlasOptions(texels=2_000, adaptive=adaptive), ShootingOptions()) as (
+        lightmap,
+        solver,
+    ):
+        tiles = set(lightmap.nodes.leaves.only(lightmap.nodes.used).keys.tolist())
+        warm_up(gpu, solver)
+        assert set(lightmap.nodes.leaves.only(lightmap.nodes.used).keys.tolist()) == tiles
+        assert solver.poll(wait=True).shots == 0 and solver.unshot_share() == pytest.approx(1.0, rel=1e-5)
+        assert not lightmap.irradiance().any()
 
 
 def test_seconds_to_a_level_are_read_between_looks() -> None:
