@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from forests import Forest, forest, places
 from numpy.typing import NDArray
 from pictures import framing
 from solver_scenes import grey, quads_scene, room, table_room
-from test_regrow import Forest, forest, places
 
 from app.atlas.charts import DEFAULT_TILE as TILE
 from app.gpu import Gpu
