@@ -24,6 +24,7 @@ from app.render.options import DisplayOptions
 from app.solvers import ShootingOptions
 
 DEFAULT_SCENE = "cornell-box"
+HARD_SIZES = ("small", "large")
 ALIKE = 0.75  # share of letters in common that makes a flag a likely slip for another; all begin with the same dashes
 
 
@@ -132,6 +133,12 @@ def build_parser() -> Parser:
     _json_flag(tables)
     tables.set_defaults(command=_bench_tables)
 
+    hard = benches.add_parser("hard", help="scenes that are hard on a light solver, against the answers they must give")
+    hard.add_argument("--only", nargs="+", metavar="NAME", help="only these cases (default all)")
+    hard.add_argument("--size", choices=HARD_SIZES, default=HARD_SIZES[0], help="of scenes and texels (default small)")
+    _json_flag(hard)
+    hard.set_defaults(command=_bench_hard)
+
     doctor = commands.add_parser("doctor", help="what this machine has, and what is missing")
     _json_flag(doctor)
     doctor.set_defaults(command=_doctor)
@@ -238,6 +245,12 @@ def _bench_tables(flags: argparse.Namespace) -> int:
     from app.bench.tables import bench_tables
 
     return bench_tables(flags)
+
+
+def _bench_hard(flags: argparse.Namespace) -> int:
+    from app.bench.hard import bench_hard
+
+    return bench_hard(flags)
 
 
 def _doctor(flags: argparse.Namespace) -> int:

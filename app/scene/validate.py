@@ -1,7 +1,8 @@
 """From what a loader found to a Scene that keeps its promises: the one gate that every file passes.
 
-Repaired and counted as warnings: triangles without area, triangles listed twice, textured triangles without texture coordinates, albedo outside
-[0, 1], emission below 0, cameras that make no sense. Repaired without a word: normals that are zero or not finite.
+Repaired and counted as warnings: triangles without area, triangles listed twice, textured triangles without texture
+coordinates, albedo outside [0, 1], emission below 0, cameras that make no sense. Repaired without a word: normals that are
+zero or not finite.
 Refused with ``SceneError``: corners that are not finite, indices out of range, no triangle left, more than
 ``MAX_TRIANGLES``, an absurd size.
 """

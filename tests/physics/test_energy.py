@@ -273,9 +273,9 @@ def audit_area(solution: Solution) -> float:
 @EVERY_SOLVER
 @pytest.mark.parametrize("level", [2, 4])
 def test_small_charts_in_one_patch_are_not_taken_for_one_surface(gpu: Gpu, solver: str, level: int) -> None:
-    """Two closed rooms, side by side and alike, of 4×4 texels a wall: at level 4 a patch holds walls of both. The light of one must
-    stay in it, and reach those of its walls that share a tile with the lamp. Within 1 %: texels of a quarter of a metre."""
-    dark = [Q + [2.0, 0.37, 0.21] for Q in room()]
+    """Two closed rooms, side by side and alike, of 4×4 texels a wall: at level 4 a patch holds walls of both. The light of one
+    must stay in it, and reach those of its walls that share a tile with the lamp. Within 1 %: texels of a quarter of a metre."""
+    dark = np.add(room(), [2.0, 0.37, 0.21])
     scene = quads_scene([*room(), *dark], [grey(0.3), grey(0.3, 1.0)], [0, 1] + [0] * 10)
     H = []
     for only in (scene, quads_scene(room(), scene.materials, [0, 1, 0, 0, 0, 0])):
