@@ -25,6 +25,7 @@ from app.solvers import ShootingOptions
 
 DEFAULT_SCENE = "cornell-box"
 ERROR_SCENES = ("furnace", "cornell-box")
+HARD_SIZES = ("small", "large")
 ALIKE = 0.75  # share of letters in common that makes a flag a likely slip for another; all begin with the same dashes
 
 
@@ -98,6 +99,9 @@ def _bench_flags(parser: Parser) -> None:
         "frames": Command("milliseconds per frame of the viewer, by part", _frames_flags, _bench_frames),
         "tables": Command("the papers' tables, ours beside theirs; minutes", _tables_flags, _bench_tables),
         "error": Command("error against time and shots, of each method; minutes", _error_flags, _bench_error),
+        "hard": Command(
+            "scenes that are hard on a light solver, against the answers they must give", _hard_flags, _bench_hard
+        ),
     }
     _add_commands(parser, "what", benches)
 
@@ -179,6 +183,12 @@ def _tables_flags(tables: Parser) -> None:
     )
     tables.add_argument("--plots", action="store_true", help="draw PNGs too (needs matplotlib)")
     _json_flag(tables)
+
+
+def _hard_flags(hard: Parser) -> None:
+    hard.add_argument("--only", nargs="+", metavar="NAME", help="only these cases (default all)")
+    hard.add_argument("--size", choices=HARD_SIZES, default=HARD_SIZES[0], help="of scenes and texels (default small)")
+    _json_flag(hard)
 
 
 def _error_flags(error: Parser) -> None:
@@ -355,6 +365,12 @@ def _bench_error(flags: argparse.Namespace) -> int:
     from app.bench.error import bench_error
 
     return bench_error(flags)
+
+
+def _bench_hard(flags: argparse.Namespace) -> int:
+    from app.bench.hard import bench_hard
+
+    return bench_hard(flags)
 
 
 def _doctor(flags: argparse.Namespace) -> int:
