@@ -169,7 +169,7 @@ class Mesh:
         """Draw these from now on, at most as many as there were at first."""
         assert self._indices is not None
         self._indices.orphan()  # what is being drawn keeps its own
-        self._indices.write(indices.tobytes())
+        self._indices.write(indices)
         self.drawn = indices.size
 
     def _release_arrays(self) -> None:
