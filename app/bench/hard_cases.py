@@ -25,6 +25,7 @@ ANGLES = (1, 10, 45, 90, 135, 170, 179)  # degrees
 SUMS = "form factors of a shooter sum to 1 within 0.5 %, on average far better, and errors repeat at each bounce"
 ORDER = "the rooms are alike, shots come in another order; 32-bit floats hold 10^-38"
 RIM = "the rim of a map drawn in straight pieces is open by a sample or two, 1/R² each: a limit of this projection"
+ROUNDED = "walls of one patch lose nothing at their edges; each shot adds with a rounding of 2^-24: 0.6 % after 100 000"
 LAMP = "a lamp of one texel lies at that texel's centroid, sampled within its width"
 HINGE = "next to the hinge light changes within a texel; at 179° all sight is within two samples of the plane"
 ENDS = "light leaves at the ends of plates that are as long as wide"
@@ -47,19 +48,20 @@ def of(scene: Callable[[], Scene]) -> Callable[[str], Scene]:
 # -- closed forms ------------------------------------------------------------------------------------------------------
 
 
-def glows(albedo: float, tolerance: float, reason: str = SUMS) -> Claims:
+def glows(albedo: float, tolerance: float, reason: str = SUMS, *, grazes: bool = True) -> Claims:
     """B = E / (1 - ρ), here of E = 1. What is unshot makes as much more, at every moment: H = (E - r) / (1 - ρ) on average."""
 
     def claims(light: Light, _: Light) -> list[Claim]:
         mean = light.mean(light.area > 0) * (1 - albedo) + light.share("unshot")
         B = 1.0 + albedo * light.H
+        lost, why = (light.grazing * light.bounces, f"{reason}; {EACH}") if grazes else (0.0, reason)
         return [
             near(
                 "mean B, once all is shot, x (1 - ρ) / E",
                 1 + albedo * (mean - 1),
                 1.0,
-                tolerance + light.grazing * light.bounces,
-                f"{reason}; {EACH}",
+                tolerance + lost,
+                why,
             ),
             near("spread of B", float(B.std() / B.mean()), 0.0, 0.03, "some patches have shot once more than others"),
         ]
@@ -393,9 +395,10 @@ CASES: tuple[HardCase, ...] = (
         "many-shots",
         "1000 shots (large: 100 000) in a room that reflects 99.9 %",
         of(lambda: scenes.furnace(0.999)),
-        glows(0.999, 0.01),
+        glows(0.999, 0.01, ROUNDED, grazes=False),
         density=(4, 4),
         map=(64, 64),
+        grazes=False,
         shots=(1000, 100_000),
         ways=(Way(), Way(storage="rgba16f")),
     ),
