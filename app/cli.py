@@ -11,9 +11,9 @@ import difflib
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from app import __version__
 from app.atlas.lightmap import STORAGE
@@ -24,6 +24,8 @@ from app.render.options import DisplayOptions
 from app.solvers import ShootingOptions
 
 DEFAULT_SCENE = "cornell-box"
+ERROR_SCENES = ("furnace", "cornell-box")
+HARD_SIZES = ("small", "large")
 ALIKE = 0.75  # share of letters in common that makes a flag a likely slip for another; all begin with the same dashes
 
 
@@ -67,20 +69,67 @@ def run(arguments: list[str]) -> int:
         return 1
 
 
+class Command(NamedTuple):
+    """What a word after ``glowtree`` does. flags: adds its own to a parser. run: with them, returns the exit code; none where
+    another word follows."""
+
+    help: str
+    flags: Callable[[Parser], None]
+    run: Callable[[argparse.Namespace], int] | None = None
+
+
 def build_parser() -> Parser:
     parser = Parser(prog="glowtree", description="Interactive radiosity: watch light being shot until it converges.")
     parser.add_argument("--version", action="version", version=f"glowtree {__version__}")
-    commands = parser.add_subparsers(required=True, metavar="command", parser_class=Parser)
+    commands = {
+        "view": Command("open the viewer", _view_flags, _view),
+        "shot": Command("solve without a window and save a picture", _shot_flags, _shot),
+        "bake": Command("solve and write scene.glb, irradiance.exr and report.json", _bake_flags, _bake),
+        "info": Command("what a scene would take, before any work", _info_flags, _info),
+        "bench": Command("measure on this machine", _bench_flags),
+        "doctor": Command("what this machine has, and what is missing", _json_flag, _doctor),
+    }
+    _add_commands(parser, "command", commands)
+    return parser
 
-    view = _scene_command(commands, "view", _view, "open the viewer", optional=True)
+
+def _bench_flags(parser: Parser) -> None:
+    benches = {
+        "shots": Command("milliseconds per shot, by pass, at the papers' sizes", _shots_flags, _bench_shots),
+        "frames": Command("milliseconds per frame of the viewer, by part", _frames_flags, _bench_frames),
+        "tables": Command("the papers' tables, ours beside theirs; minutes", _tables_flags, _bench_tables),
+        "error": Command("error against time and shots, of each method; minutes", _error_flags, _bench_error),
+        "hard": Command(
+            "scenes that are hard on a light solver, against the answers they must give", _hard_flags, _bench_hard
+        ),
+    }
+    _add_commands(parser, "what", benches)
+
+
+def _add_commands(parser: Parser, what: str, commands: Mapping[str, Command]) -> None:
+    words = parser.add_subparsers(required=True, metavar=what, parser_class=Parser)
+    for word, command in commands.items():
+        own = words.add_parser(word, help=command.help, description=command.help[0].upper() + command.help[1:] + ".")
+        command.flags(own)
+        if command.run:
+            own.set_defaults(command=command.run)
+
+
+# -- flags -------------------------------------------------------------------------------------------------------------
+
+
+def _view_flags(view: Parser) -> None:
+    _scene_flags(view, optional=True)
     add_flags(view, ShootingOptions)
-    view.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="window size (default 1280x720)")
+    _size_flag(view, "window")
     view.add_argument("--frames", type=_positive(int), metavar="N", help="close after N frames (for tests)")
     add_flags(view, DisplayOptions)
 
-    shot = _scene_command(commands, "shot", _shot, "solve without a window and save a picture")
-    shot.add_argument("-o", "--output", type=Path, required=True, metavar="PNG", help="the picture to write")
-    shot.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="picture size (default 1280x720)")
+
+def _shot_flags(shot: Parser) -> None:
+    _scene_flags(shot)
+    _output_flag(shot, "PNG", "the picture to write")
+    _size_flag(shot, "picture")
     shot.add_argument("--camera", metavar="NAME", help="a camera of the scene (default: its first)")
     shot.add_argument("--ui", action="store_true", help="draw the viewer's panels too")
     _json_flag(shot)
@@ -88,33 +137,37 @@ def build_parser() -> Parser:
     _stop_flags(shot)
     add_flags(shot, DisplayOptions)
 
-    bake = _scene_command(commands, "bake", _bake, "solve and write scene.glb, irradiance.exr and report.json")
-    bake.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write")
+
+def _bake_flags(bake: Parser) -> None:
+    _scene_flags(bake)
+    _output_flag(bake, "DIR", "the folder to write")
     _json_flag(bake)
     add_flags(bake, ShootingOptions)
     _stop_flags(bake)
 
-    info = _scene_command(commands, "info", _info, "what a scene would take, before any work")
-    _json_flag(info)
-    info.add_argument(
-        "--storage", choices=tuple(STORAGE), default=ShootingOptions().storage, help="as for shot and bake"
-    )
 
-    bench = commands.add_parser("bench", help="measure", description="Measure on this machine.")
-    benches = bench.add_subparsers(required=True, metavar="what", parser_class=Parser)
-    shots = benches.add_parser("shots", help="milliseconds per shot, by pass, at the papers' sizes")
+def _info_flags(info: Parser) -> None:
+    _scene_flags(info)
+    _json_flag(info)
+    default = ShootingOptions().storage
+    info.add_argument("--storage", choices=tuple(STORAGE), default=default, help="as for shot and bake")
+
+
+def _shots_flags(shots: Parser) -> None:
     _json_flag(shots)
     add_flags(shots, ShootingOptions)
-    shots.set_defaults(command=_bench_shots)
-    frames = benches.add_parser("frames", help="milliseconds per frame of the viewer, by part")
+
+
+def _frames_flags(frames: Parser) -> None:
     frames.add_argument("scene", nargs="?", default=DEFAULT_SCENE, help=f"a file or a name (default {DEFAULT_SCENE})")
     frames.add_argument("--drag", action="store_true", help="drag the sliders of the quadtrees (with --adaptive)")
     _json_flag(frames)
     add_flags(frames, AtlasOptions)
     add_flags(frames, ShootingOptions)
-    frames.set_defaults(command=_bench_frames)
-    tables = benches.add_parser("tables", help="the papers' tables, ours beside theirs; minutes")
-    tables.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write")
+
+
+def _tables_flags(tables: Parser) -> None:
+    _output_flag(tables, "DIR", "the folder to write")
     tables.add_argument(
         "--only",
         type=_table_names,
@@ -130,32 +183,85 @@ def build_parser() -> Parser:
     )
     tables.add_argument("--plots", action="store_true", help="draw PNGs too (needs matplotlib)")
     _json_flag(tables)
-    tables.set_defaults(command=_bench_tables)
-
-    doctor = commands.add_parser("doctor", help="what this machine has, and what is missing")
-    _json_flag(doctor)
-    doctor.set_defaults(command=_doctor)
-    return parser
 
 
-def _scene_command(
-    commands: argparse._SubParsersAction[Parser],
-    name: str,
-    command: Callable[[argparse.Namespace], int],
-    help: str,
-    *,
-    optional: bool = False,
-) -> Parser:
-    parser = commands.add_parser(name, help=help, description=help[0].upper() + help[1:] + ".")
-    scene_help = "a file (.glb .gltf .obj .ply .stl .toml) or the name of a scene"
+def _hard_flags(hard: Parser) -> None:
+    hard.add_argument("--only", nargs="+", metavar="NAME", help="only these cases (default all)")
+    hard.add_argument("--size", choices=HARD_SIZES, default=HARD_SIZES[0], help="of scenes and texels (default small)")
+    _json_flag(hard)
+
+
+def _error_flags(error: Parser) -> None:
+    error.add_argument(
+        "scenes",
+        nargs="*",
+        default=ERROR_SCENES,
+        metavar="scene",
+        help=f"files or names (default {' '.join(ERROR_SCENES)})",
+    )
+    error.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write")
+    error.add_argument(
+        "--methods",
+        type=_method_names,
+        default="uniform,adaptive,disc,item-id,level-1,level-3",
+        metavar="A,B",
+        help="all, or some of uniform, adaptive, disc, item-id, depth, stereographic, nonlinear, rgba16f, fixed8, level-1, "
+        "level-3 (default %(default)s)",
+    )
+    error.add_argument(
+        "--peers",
+        type=_peer_names,
+        default=(),
+        metavar="A,B",
+        help="other programs on the same plot: mitsuba (needs glowtree[peers])",
+    )
+    error.add_argument(
+        "--seconds",
+        type=_positive(float),
+        default=30.0,
+        metavar="S",
+        help="of solving, for each curve at most (default 30)",
+    )
+    error.add_argument(
+        "--texels",
+        type=_positive(int),
+        metavar="N",
+        help="uniform ones; quadtrees begin with a sixteenth (default: chosen from the scene)",
+    )
+    error.add_argument(
+        "--reference",
+        choices=("closed-form", "path-traced", "dense"),
+        help="what errors are measured from (default: the first that can judge the scene)",
+    )
+    error.add_argument(
+        "--paths",
+        type=_positive(int),
+        default=16384,
+        metavar="N",
+        help="from each point of a path-traced reference (default 16384)",
+    )
+    _json_flag(error)
+    add_flags(error, ShootingOptions)
+
+
+def _scene_flags(parser: Parser, *, optional: bool = False) -> None:
+    help = "a file (.glb .gltf .obj .ply .stl .toml) or the name of a scene"
     if optional:
-        parser.add_argument("scene", nargs="?", default=DEFAULT_SCENE, help=f"{scene_help} (default {DEFAULT_SCENE})")
+        parser.add_argument("scene", nargs="?", default=DEFAULT_SCENE, help=f"{help} (default {DEFAULT_SCENE})")
     else:
-        parser.add_argument("scene", help=scene_help)
+        parser.add_argument("scene", help=help)
     parser.add_argument("--light", action="store_true", help="add a ceiling light")
     add_flags(parser, AtlasOptions)
-    parser.set_defaults(command=command)
-    return parser
+
+
+def _output_flag(parser: Parser, what: str, help: str) -> None:
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar=what, help=help)
+
+
+def _size_flag(parser: Parser, what: str) -> None:
+    default = (1280, 720)
+    help = f"{what} size (default {default[0]}x{default[1]})"
+    parser.add_argument("--size", type=_size, default=default, metavar="WxH", help=help)
 
 
 def _json_flag(parser: Parser) -> None:
@@ -166,6 +272,9 @@ def _stop_flags(parser: Parser) -> None:
     stop = parser.add_argument_group("stop (whichever comes first; --residual is always on)")
     stop.add_argument("--shots", type=_positive(int), metavar="N", help="after N shots")
     stop.add_argument("--time", type=_positive(float), metavar="S", help="after S seconds of shooting")
+
+
+# -- values ------------------------------------------------------------------------------------------------------------
 
 
 def _positive(kind: type[int] | type[float]) -> Callable[[str], float]:
@@ -195,7 +304,19 @@ def _table_names(text: str) -> tuple[str, ...]:
     return table_names(text)
 
 
-# Each command imports what it needs: --help and errors answer at once.
+def _method_names(text: str) -> tuple[str, ...]:
+    from app.bench.methods import method_names
+
+    return method_names(text)
+
+
+def _peer_names(text: str) -> tuple[str, ...]:
+    from app.bench.peers import peer_names
+
+    return peer_names(text)
+
+
+# -- commands: each imports what it needs, so that --help and errors answer at once ------------------------------------
 
 
 def _view(flags: argparse.Namespace) -> int:
@@ -238,6 +359,18 @@ def _bench_tables(flags: argparse.Namespace) -> int:
     from app.bench.tables import bench_tables
 
     return bench_tables(flags)
+
+
+def _bench_error(flags: argparse.Namespace) -> int:
+    from app.bench.error import bench_error
+
+    return bench_error(flags)
+
+
+def _bench_hard(flags: argparse.Namespace) -> int:
+    from app.bench.hard import bench_hard
+
+    return bench_hard(flags)
 
 
 def _doctor(flags: argparse.Namespace) -> int:

@@ -73,7 +73,7 @@ def load(
     tell("cutting into texels", 0.6)
     nodes = quadtree_nodes(scene, charts) if atlas.adaptive else NodeSet(scene, charts)
     exposure, arrays = first_exposure(nodes) if expose else None, nodes.arrays
-    _ = nodes.emission_weights  # cached here: the window, which reads them next, does not wait
+    _ = nodes.emission_weights, nodes.drawn  # cached here: the window, which reads them next, does not wait
     tell("done", 1.0)
     return Loaded(nodes, arrays, atlas, exposure, seconds | {"texels": time.perf_counter() - start})
 

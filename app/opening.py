@@ -1,54 +1,102 @@
-"""From a node set to a lightmap and its solver on the GPU, in parts that a window makes one per frame."""
+"""From a source to a lightmap and its solver on the GPU: loaded in the background, then uploaded in parts, one per frame."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Generator, Mapping
+import time
+from collections.abc import Generator
+from dataclasses import dataclass
 
 from app.atlas.lightmap import Lightmap, upload
-from app.atlas.node_set import Array, NodeSet
+from app.errors import UserError
 from app.gpu import Gpu, Texture
+from app.loading import Loaded, Loading
+from app.parts import whole
 from app.render.frame import FrameRenderer
 from app.solvers import DEFAULT_SOLVER, SOLVERS, ShootingOptions, Solver
 
 
-def prepare(
-    gpu: Gpu,
-    nodes: NodeSet,
-    arrays: Mapping[str, Array],
-    options: ShootingOptions,
-    renderer: FrameRenderer,
-    interpolation: str,
-    *,
-    solver_name: str = DEFAULT_SOLVER,
-) -> Generator[None, None, tuple[Lightmap, Solver[ShootingOptions]]]:
-    """Upload a node set's ``arrays``, and draw once with each program, since drivers compile it then; yields after each part. The
-    light is as before the first shot. interpolation: that pictures will be drawn with. Raises UserError; then, and when given
-    up between two parts, nothing stays on the GPU."""
-    with contextlib.ExitStack() as undo:
-        textures: dict[str, Texture] = {}
-        uploads = undo.enter_context(contextlib.ExitStack())
-        for name, array in arrays.items():
-            textures[name] = upload(gpu, array)
-            uploads.callback(gpu.release_all, textures[name])
-            yield
-        lightmap = Lightmap(gpu, nodes, storage=options.storage, textures=textures)
-        uploads.pop_all()
-        undo.callback(lightmap.release)
-        gpu.ctx.finish()
-        yield
-        solver = SOLVERS[solver_name](gpu, lightmap, options)
-        undo.callback(solver.release)
-        yield
-        for run in solver.passes(1).values():
-            run()
+@dataclass(frozen=True, eq=False)
+class Ready:
+    """What can take the place of what is open: its light is as before the first shot. began: when its upload did [s], of
+    ``time.perf_counter``."""
+
+    loaded: Loaded
+    lightmap: Lightmap
+    solver: Solver[ShootingOptions]
+    began: float
+
+
+class Opening:
+    """At most one scene on its way, ``loading``. What is open stays as it is until the other is Ready."""
+
+    def __init__(self, gpu: Gpu, renderer: FrameRenderer) -> None:
+        self._gpu, self._renderer = gpu, renderer
+        self.loading: Loading | None = None
+        self._parts: Generator[None, None, Ready] | None = None
+
+    def begin(self, loading: Loading) -> None:
+        """This one instead of any other."""
+        self.stop()
+        self.loading = loading
+
+    def stop(self) -> None:
+        """None at all; nothing of it stays on the GPU."""
+        if self.loading is not None:
+            self.loading.cancel()
+        if self._parts is not None:
+            self._parts.close()
+        self.loading = self._parts = None
+
+    def part(self, options: ShootingOptions, interpolation: str) -> Ready | None:
+        """The next part of what was loaded; all of it after the last. Raises UserError, and ends then."""
+        assert self.loading is not None
+        try:
+            if self._parts is None:
+                self._parts = self._upload(self.loading.result, options, interpolation)
+            next(self._parts)
+        except StopIteration as last:
+            self.loading = self._parts = None
+            ready: Ready = last.value
+            return ready
+        except UserError:
+            self.loading = self._parts = None
+            raise
+        return None
+
+    def at_once(self, loaded: Loaded, options: ShootingOptions, interpolation: str) -> Ready:
+        """All of what was loaded elsewhere. Raises UserError."""
+        return whole(self._upload(loaded, options, interpolation))
+
+    def _upload(self, loaded: Loaded, options: ShootingOptions, interpolation: str) -> Generator[None, None, Ready]:
+        """Upload what was loaded, and draw once with each program, since drivers compile it then; yields after each part.
+        interpolation: that pictures will be drawn with. Raises UserError; then, and when given up between two parts, nothing
+        stays on the GPU."""
+        began, gpu = time.perf_counter(), self._gpu
+        with contextlib.ExitStack() as undo:
+            textures: dict[str, Texture] = {}
+            uploads = undo.enter_context(contextlib.ExitStack())
+            for name, array in loaded.arrays.items():
+                textures[name] = upload(gpu, array)
+                uploads.callback(gpu.release_all, textures[name])
+                yield
+            lightmap = Lightmap(gpu, loaded.nodes, storage=options.storage, textures=textures)
+            uploads.pop_all()
+            undo.callback(lightmap.release)
             gpu.ctx.finish()
             yield
-        solver.reset()
-        yield
-        renderer.prepare(lightmap, interpolation)
-        undo.callback(renderer.give_up)
-        gpu.ctx.finish()
-        yield
-        undo.pop_all()
-    return lightmap, solver
+            solver = SOLVERS["adaptive" if loaded.atlas.adaptive else DEFAULT_SOLVER](gpu, lightmap, options)
+            undo.callback(solver.release)
+            yield
+            for run in solver.passes(1).values():
+                run()
+                gpu.ctx.finish()
+                yield
+            solver.reset()
+            yield
+            self._renderer.prepare(lightmap, interpolation)
+            undo.callback(self._renderer.give_up)
+            gpu.ctx.finish()
+            yield
+            undo.pop_all()
+        return Ready(loaded, lightmap, solver, began)

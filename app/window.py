@@ -21,6 +21,7 @@ from moderngl_window.timers.clock import Timer
 from app.errors import GpuError, UserError
 from app.gpu import Gpu
 from app.headless_ui import UiFrame, save_screenshot
+from app.pacing import Turns
 from app.ui.app import Ui
 from app.ui.state import Request
 
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 GL_VERSION = (4, 1)
 TITLE = "Glowtree"
 AWAKE_SECONDS = 1.0  # that frames go on after the last event: tooltips appear, scroll bars settle
-SLOW_FRAME, FAST_FRAME = 0.08, 0.05  # s for shooting and drawing, beyond which they take turns, and below which not
 LOADING_PAUSE = 0.03  # s between frames while there is only a scene to wait for: loading gets the processor
 REST_SECONDS = 0.5  # between two looks around at rest; an event ends the rest at once
 NOWHERE = -3.4e38  # where Dear ImGui has the mouse when it is outside the window
@@ -156,22 +156,6 @@ def _text_scale(window: Any) -> float:
     return max(1.0, float(window._window.scale) / window.pixel_ratio)
 
 
-class Turns:
-    """Which frames shoot and which draw the view: every one both, or in turns where both together take long."""
-
-    def __init__(self) -> None:
-        self._alternate, self._shoot, self._last = False, True, 0.0
-
-    def next(self, seconds: float) -> tuple[bool, bool]:
-        """Whether the next frame shoots, and whether it draws the view. seconds: that the last frame took."""
-        both = seconds + (self._last if self._alternate else 0.0)
-        self._last = seconds
-        if self._alternate != (both > (FAST_FRAME if self._alternate else SLOW_FRAME)):
-            self._alternate = not self._alternate
-        self._shoot = not (self._alternate and self._shoot)
-        return self._shoot, not (self._alternate and self._shoot)
-
-
 class ViewerWindow(WindowConfig):
     """Steps and draws a session, frame by frame, and passes events on. Owns none of what it is given."""
 
@@ -238,7 +222,8 @@ class ViewerWindow(WindowConfig):
             session.poll()
             shoot, look = self._turns.next(frame_time) if session.shooting_goes_on else (False, True)
             if shoot:
-                session.advance(budget_ms=state.pace.frame_budget, shots=state.pace.shots_per_frame)
+                pace = state.pace
+                session.advance(budget_ms=pace.frame_budget, shots=pace.shots_per_frame, brisk=self._ui.held)
         except UserError as error:
             session.running = False
             state.notify(str(error), error=True)

@@ -14,7 +14,6 @@ from app.render.camera import CameraView
 from app.render.false_colour import LUMINANCE
 from app.render.frame import FrameRenderer
 from app.render.options import DisplayOptions
-from app.render.targets import release_targets
 from app.scene.model import F64
 
 
@@ -45,8 +44,7 @@ def render_image(
         pixels = np.frombuffer(colour.read(), np.uint8).reshape(size[1], size[0], 4)
     finally:
         renderer.release()
-        release_targets(gpu, target)
-        colour.release()
+        gpu.release_all(target, colour)
     return np.ascontiguousarray(pixels[::-1, :, :3])
 
 

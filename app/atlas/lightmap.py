@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
-from app.atlas.node_set import OCCLUDER_FORMAT, VERTEX_FORMAT, Array, Frame, Moves, NodeSet
+from app.atlas.node_set import OCCLUDER_FORMAT, Array, Frame, Moves, NodeSet
 from app.atlas.receivers import RECEIVER_FORMAT
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.scene.model import F32, F64, Material, Scene
@@ -54,7 +54,6 @@ class Lightmap:
             gpu, "lightmap/edit", defines=self.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
         )
         self._scale = Pass(gpu, "lightmap/scale")
-        self.mesh = Mesh(gpu, nodes.vertices.tobytes(), VERTEX_FORMAT)
         corners, triangles = nodes.occluders
         self.occluders = Mesh(gpu, corners.tobytes(), OCCLUDER_FORMAT, indices=triangles.tobytes())
         self.receivers = receiver_meshes(gpu, nodes.flat_spans, nodes.shaped_tiles)
@@ -234,9 +233,7 @@ class Lightmap:
         )
 
     def release(self) -> None:
-        self.gpu.release_all(
-            *self._targets, *self._textures.values(), self.mesh, self.occluders, *self.receivers.values()
-        )
+        self.gpu.release_all(*self._targets, *self._textures.values(), self.occluders, *self.receivers.values())
 
     # -- read-back -----------------------------------------------------------------------------------------------------
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
+from app.atlas.drawn import DrawnTriangles, drawn_triangles
 from app.atlas.receivers import KIND, TileTexels, receivers, tile_kinds
 from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents, uniform_leaves
 from app.atlas.tiles import Tiles
@@ -69,7 +70,7 @@ class NodeSet:
     tile: edge of a leaf [texels], t below; tiles: number of slots; used (tiles,) bool: those that hold a leaf; adaptive: whether
     leaves may be of several levels; depth: the level in which pages are counted, that of the finest leaf or one more.
     leaves, surfaces, albedo_tiles, emission_tiles: of every slot, empty where it is not used.
-    occluders: of the visibility map; vertices: the triangles' vertex buffer; flat_spans, shaped_tiles: the receivers.
+    occluders: of the visibility map; flat_spans, shaped_tiles: the receivers.
     Raises UserError where facets and materials do not fit the 32 bits of a texel's ids.
     """
 
@@ -89,7 +90,6 @@ class NodeSet:
         self._make_room(cut, max(len(cut), slots))
         self.put(np.arange(len(cut)), cut)
         self.occluders = occluders(scene, charts, self.frame)
-        self.vertices = _vertices(scene, charts, self.frame)
 
     def _make_room(self, cut: Tiles, slots: int) -> None:
         self.columns = max(1, int(np.ceil(np.sqrt(slots))))
@@ -183,6 +183,11 @@ class NodeSet:
         for x, y in np.unique(np.stack([leaves.x >> leaves.level, leaves.y >> leaves.level], 1), axis=0).tolist():
             rows, columns = slice(y * side, (y + 1) * side), slice(x * side, (x + 1) * side)
             yield (x * side, y * side, side, side), np.ascontiguousarray(self._pages[rows, columns])
+
+    @functools.cached_property
+    def drawn(self) -> DrawnTriangles:
+        """The triangles for pictures: no bake needs them."""
+        return drawn_triangles(self.scene, self.charts, self.frame.local_from_world(self.scene.positions))
 
     @functools.cached_property
     def emission_weights(self) -> F64:
@@ -299,10 +304,11 @@ class NodeSet:
         return self.slot_tables | {"t_facets": self._facet_table(), "t_materials": self.material_table(self.scene)}
 
     def _facet_table(self) -> F32:
-        """(rows, TABLE_WIDTH, 4): per facet, from 1, two entries: ∂p/∂u and ∂p/∂v per texel of level 0."""
+        """(rows, TABLE_WIDTH, 4): per facet, from 1, two entries: ∂p/∂u per texel of level 0 and its chart; ∂p/∂v."""
         rows = -(-2 * (self.charts.facet_count + 1) // TABLE_WIDTH)
         table = np.zeros((rows * TABLE_WIDTH, 4), np.float32)
         table[2 : 2 * len(self._dpdu) + 2 : 2, :3] = self._dpdu
+        table[2 * self.charts.face_facet + 2, 3] = self.charts.face_chart
         table[3 : 2 * len(self._dpdv) + 3 : 2, :3] = self._dpdv
         return table.reshape(rows, TABLE_WIDTH, 4)
 
@@ -366,25 +372,4 @@ def occluders(scene: Scene, charts: Charts, frame: Frame) -> tuple[Array, Array]
     return vertices, triangles.astype(np.uint32)
 
 
-VERTEX = np.dtype([("in_position", "f4", 3), ("in_uv_front", "f4", 2), ("in_uv_back", "f4", 2), ("in_ids", "u4", 4)])
-VERTEX_FORMAT = {"in_position": "3f", "in_uv_front": "2f", "in_uv_back": "2f", "in_ids": "4u"}
-
-
-def _vertices(scene: Scene, charts: Charts, frame: Frame) -> Array:
-    """All triangles, unwelded (3·triangles,) VERTEX: position in the solver frame; atlas texel of front and back, -1 without a
-    chart; ids: facet from 1 of front and back (0 without a chart), material, triangle."""
-    count = len(scene.triangles)
-    data = np.zeros((count, 3), VERTEX)
-    data["in_position"] = frame.local_from_world(scene.corners)
-    data["in_uv_front"] = data["in_uv_back"] = -1.0
-    for side, uv in enumerate(("in_uv_front", "in_uv_back")):
-        faces = np.flatnonzero(charts.face_back == bool(side))
-        triangles = charts.face_triangle[faces]
-        data[uv][triangles] = charts.face_uv[faces]
-        data["in_ids"][triangles, :, side] = charts.face_facet[faces, None] + 1
-    data["in_ids"][:, :, 2] = scene.material_ids[:, None]
-    data["in_ids"][:, :, 3] = np.arange(count)[:, None]
-    return data.reshape(-1)
-
-
-__all__ = ["OCCLUDER_FORMAT", "VERTEX_FORMAT", "Array", "Frame", "Moves", "NodeSet", "ScalarT", "octahedral"]
+__all__ = ["OCCLUDER_FORMAT", "Array", "Frame", "Moves", "NodeSet", "ScalarT", "octahedral"]

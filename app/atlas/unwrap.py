@@ -6,22 +6,20 @@ few triangles it gives up on, every flat piece becomes a chart by itself, laid d
 
 from __future__ import annotations
 
-import hashlib
 import os
 import subprocess
 import sys
 import tempfile
 import time
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-import platformdirs
 from numpy.typing import NDArray
 
+from app import cache
 from app.atlas.sides import totals
 from app.scene.model import F64, I32
 
@@ -100,10 +98,7 @@ def _xatlas(
         "triangles": local.reshape(-1, 3).astype(np.uint32),
         "groups": groups.astype(np.int32),
     }
-    digest = hashlib.sha256(FORMAT + version("xatlas").encode())
-    for name, array in given.items():
-        digest.update(f"{name} {array.shape}".encode() + array.tobytes())
-    cached = Path(platformdirs.user_cache_dir("glowtree")) / "unwrap" / f"{digest.hexdigest()}.npz"
+    cached = cache.entry("unwrap", cache.digest(FORMAT + version("xatlas").encode(), given))
     answer = _read(cached, len(triangles))
     if answer is None:
         if time_limit is None:
@@ -115,7 +110,7 @@ def _xatlas(
             answer = _read(target, len(triangles))
             if answer is None:
                 raise _UnwrapError("wrote no charts")
-            _store(target, cached)
+            cache.store(target.read_bytes(), cached, CACHE_FILES)
     return answer
 
 
@@ -146,26 +141,11 @@ def _run_worker(source: Path, target: Path, time_limit: float, progress: Progres
 
 def _read(path: Path, count: int) -> tuple[I32, F64] | None:
     """Charts from a file, or None where there is no such file or it is not whole."""
-    try:
-        with np.load(path) as data:
-            chart, uv = data["chart"].astype(np.int32), data["uv"].astype(np.float64)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    data = cache.read(path)
+    if data is None or not {"chart", "uv"} <= data.keys():
         return None
+    chart, uv = data["chart"].astype(np.int32), data["uv"].astype(np.float64)
     return (chart, uv) if chart.shape == (count,) and uv.shape == (count, 3, 2) and np.isfinite(uv).all() else None
-
-
-def _store(source: Path, cached: Path) -> None:
-    """Keep an answer for next time; a cache that cannot be written is none."""
-    try:
-        cached.parent.mkdir(parents=True, exist_ok=True)
-        partial = cached.with_suffix(f".{os.getpid()}.tmp")
-        partial.write_bytes(source.read_bytes())
-        partial.replace(cached)
-        by_age = sorted(cached.parent.glob("*.npz"), key=lambda p: p.stat().st_mtime, reverse=True)
-        for old in by_age[CACHE_FILES:]:
-            old.unlink()
-    except OSError:
-        return
 
 
 def _to_scale(chart: I32, uv: F64, corners: F64) -> tuple[I32, F64]:

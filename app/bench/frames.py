@@ -24,6 +24,7 @@ from app.errors import UserError
 from app.gpu import Gpu, gpu_context
 from app.headless_ui import UiFrame
 from app.options import from_flags
+from app.pacing import Turns
 from app.session import Session
 from app.solvers import ShootingOptions
 from app.ui.app import Ui
@@ -68,6 +69,7 @@ class _Viewer:
         self._target = gpu.target(self._texture)
         self._ui = Ui()
         self._frame = UiFrame(gpu, self._ui, whole=False)
+        self._turns, self._seconds = Turns(), 0.0
         gpu.timers.enabled = True  # as in the window
 
     def open(self) -> list[list[float]]:
@@ -80,19 +82,22 @@ class _Viewer:
         return rows
 
     def frame(self, options: ShootingOptions | None = None) -> list[float]:
-        """One frame: milliseconds by part, and of CPU time. options: that a hand asks for."""
-        session = self.session
+        """One frame: milliseconds by part, and of CPU time. options: that a hand at a slider asks for."""
+        session, held = self.session, options is not None
         cpu, clock = time.process_time(), [time.perf_counter()]
         session.poll()
         clock.append(time.perf_counter())
-        session.advance(budget_ms=Pace().frame_budget, shots=1)
+        shoot, look = self._turns.next(self._seconds) if session.shooting_goes_on else (False, True)
+        if shoot:
+            session.advance(budget_ms=Pace().frame_budget, shots=1, brisk=held)
         self._gpu.ctx.finish()
         clock.append(time.perf_counter())
         if options is not None and options != session.shooting:
             session.set_shooting(options)
-        self._frame.draw(session, self._target, size=SIZE)
+        self._frame.draw(session, self._target, size=SIZE, look=look)
         self._gpu.ctx.finish()
         clock.append(time.perf_counter())
+        self._seconds = clock[-1] - clock[0]
         return [*(np.diff(clock) * 1e3), (time.process_time() - cpu) * 1e3]
 
     def release(self) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from app.atlas.lightmap import Lightmap
 from app.atlas.options import AtlasOptions
 from app.bench.published import CoombeRow, RmsRow, WallnerRow
-from app.bench.report import Row
+from app.bench.report import FLIP, Row, missing
 from app.bench.rooms import room_of
 from app.bench.shots import ms_per_shot, passes_ms
 from app.gpu import Gpu
@@ -71,12 +71,20 @@ def opened(
         lightmap.release()
 
 
-def shoot(gpu: Gpu, solver: Solver[ShootingOptions], seconds: float) -> Run:
-    """Solve from the start until converged and settled, or for so many seconds."""
-    for warm_up in solver.passes(BATCH).values():  # programs are compiled when they first draw
-        warm_up()
+def warm_up(gpu: Gpu, solver: Solver[ShootingOptions]) -> None:
+    """Draw once with each program, for drivers compile it then: each pass, and a step with what is not part of every one."""
+    for run in solver.passes(BATCH).values():
+        run()
+    solver.reset()
+    solver.step(BATCH)
+    solver.poll(wait=True)
     solver.reset()
     gpu.ctx.finish()
+
+
+def shoot(gpu: Gpu, solver: Solver[ShootingOptions], seconds: float) -> Run:
+    """Solve from the start until converged and settled, or for so many seconds."""
+    warm_up(gpu, solver)
     run, heard, start = Run(curve=[(0, 1.0)]), 0, time.perf_counter()
     while run.seconds < seconds:
         report = solver.poll()
@@ -197,9 +205,8 @@ def first_below(curve: list[tuple[int, float]], level: float) -> int | None:
 
 
 def rms_row(gpu: Gpu, seconds: float, theirs: RmsRow) -> Row:
-    """RMS and FLIP of the picture against the hemicube's for both hemispheres, at the same residual; none where time ran out."""
-    from app.bench.flip import flip
-
+    """RMS and FLIP of the picture against the hemicube's for both hemispheres, at the same residual; none where time ran out, and
+    no FLIP where it is not installed."""
     roots = round(ROOT_TEXELS * theirs.size**2) if theirs.level else round(ROOT_TEXELS * theirs.size**2 / 4)
     adaptive = theirs.subdivision == "adaptive"
     atlas = AtlasOptions(texels=roots if adaptive else roots << 2 * theirs.level, adaptive=adaptive)
@@ -222,7 +229,10 @@ def rms_row(gpu: Gpu, seconds: float, theirs: RmsRow) -> Row:
     if converged:  # else the pictures differ by their shots
         for name in ("stereographic", "nonlinear"):
             row[f"{name}_rms"] = rms(pictures[name] - pictures["hemicube"])
-            row[f"{name}_flip"] = flip(pictures["hemicube"], pictures[name])
+            if not missing(FLIP):
+                from app.bench.flip import flip
+
+                row[f"{name}_flip"] = flip(pictures["hemicube"], pictures[name])
     return row | {"their_stereographic": theirs.stereographic, "their_nonlinear": theirs.nonlinear}
 
 

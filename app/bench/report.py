@@ -3,26 +3,37 @@
 from __future__ import annotations
 
 import csv
+import importlib.util
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 Row = dict[str, Any]
+FLIP = "flip_evaluator"  # see flip.py
 
 
 @dataclass(frozen=True)
 class Column:
-    """key: of the row; head: above the column in Markdown (CSV has the key); spec: format specification of its numbers."""
+    """key: of the row; head: above the column in Markdown (CSV has the key); spec: format specification of its numbers; needs:
+    a module of the extra ``bench`` without which there are none."""
 
     key: str
     head: str
     spec: str = ""
+    needs: str | None = None
 
     def text(self, row: Row) -> str:
         """The cell; empty where the row has nothing."""
         value = row.get(self.key)
         return "" if value is None else value if isinstance(value, str) else format(value, self.spec)
+
+
+def missing(module: str) -> str | None:
+    """What to do about a module of the extra ``bench``; None if it is installed."""
+    if importlib.util.find_spec(module) is not None:
+        return None
+    return f"needs {module.replace('_', '-')}: pip install 'glowtree[bench]'"
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -7,18 +7,17 @@ its rows one by one; what is finished is written when the rest is stopped.
 from __future__ import annotations
 
 import argparse
-import importlib.util
-import os
-import platform
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from app.atlas.options import AtlasOptions
 from app.bake import json_text, prepare_directory
 from app.bench import equal, measure, published
-from app.bench.report import Column, Row, csv_text, markdown_table
+from app.bench.machine import load, machine
+from app.bench.report import FLIP, Column, Row, csv_text, markdown_table, missing
+from app.bench.truth import PATCHES
 from app.console import Console, Tell
 from app.errors import UserError
 from app.gpu import Gpu, gpu_context
@@ -45,8 +44,7 @@ class Plot:
 
 @dataclass(frozen=True)
 class Table:
-    """jobs: (label, what measures one row within about so many seconds). finish: adds what follows from all rows. needs: a module
-    of the extra ``bench`` without which there are none."""
+    """jobs: (label, what measures one row within about so many seconds). finish: adds what follows from all rows."""
 
     name: str
     title: str
@@ -56,27 +54,28 @@ class Table:
     jobs: tuple[tuple[str, Measure], ...]
     plot: Plot | None = None
     finish: Callable[[list[Row]], None] = lambda rows: None
-    needs: str | None = None
 
 
 def bench_tables(flags: argparse.Namespace) -> int:
     """Measure and write tables.md, tables.json, and for each table NAME.csv and with --plots NAME.png. Raises UserError."""
-    tables = [t for t in all_tables() if flags.only is None or t.name in flags.only]
-    wanted = {f": table {t.name}": t.needs for t in tables if t.needs} | (
-        {" --plots": "matplotlib"} if flags.plots else {}
-    )
-    for what, module in wanted.items():
-        if importlib.util.find_spec(module) is None:
-            name = module.replace("_", "-")
-            raise UserError(f"glowtree bench tables{what} needs {name}: pip install 'glowtree[bench]'")
+    if flags.plots and (lacks := missing("matplotlib")):
+        raise UserError(f"glowtree bench tables --plots {lacks}")
+    tables, warnings = possible(all_tables(), flags.only)
     folder = prepare_directory(flags.output)
     console = Console(quiet=flags.json)
+    for warning in warnings:
+        console.warn(warning)
+
+    def warn(text: str) -> None:
+        warnings.append(text)
+        console.warn(text)
+
     rows: dict[str, list[Row]] = {t.name: [] for t in tables}
     with gpu_context() as gpu, console.progress("tables") as tell:
         values = {"renderer": gpu.limits.renderer, "machine": machine(), "seconds": flags.seconds}
         values["load"] = load()
-        interrupted = not measured(gpu, flags.seconds, tables, rows, tell, console.warn)
-    values |= {"interrupted": interrupted, "tables": {t.name: rows[t.name] for t in tables}}
+        interrupted = not measured(gpu, flags.seconds, tables, rows, tell, warn)
+    values |= {"interrupted": interrupted, "warnings": warnings, "tables": {t.name: rows[t.name] for t in tables}}
     text = document(values, tables)
     write(folder, values, tables, text)
     if flags.plots:
@@ -87,6 +86,23 @@ def bench_tables(flags: argparse.Namespace) -> int:
                 draw(folder / f"{table.name}.png", table.title, table.plot, rows[table.name], values["renderer"])
     console.result(values, text)
     return 130 if interrupted else 0
+
+
+def possible(tables: Iterable[Table], only: Sequence[str] | None) -> tuple[list[Table], list[str]]:
+    """Those asked for, without columns that need what is not installed, and a warning for each that had some. Raises UserError
+    for one that was named."""
+    kept, warnings = [], []
+    for table in tables:
+        if only is not None and table.name not in only:
+            continue
+        absent = {c.key: lacks for c in table.columns if c.needs and (lacks := missing(c.needs))}
+        for lacks in dict.fromkeys(absent.values()):
+            if only is not None:
+                raise UserError(f"glowtree bench tables: table {table.name} {lacks}")
+            heads = ", ".join(c.head for c in table.columns if absent.get(c.key) == lacks)
+            warnings.append(f"table {table.name}: left out: {heads}: {lacks}")
+        kept.append(replace(table, columns=tuple(c for c in table.columns if c.key not in absent)))
+    return kept, warnings
 
 
 def measured(
@@ -113,23 +129,6 @@ def measured(
         for table in tables:
             table.finish(rows[table.name])
     return True
-
-
-def machine() -> str:
-    """Processor, cores and system."""
-    model = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.is_file():
-        names = [
-            line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if line[:10] == "model name"
-        ]
-        model = names[0] if names else model
-    return f"{model}, {os.cpu_count()} cores, {platform.platform()}"
-
-
-def load() -> float | None:
-    """How many processes wanted a core in the minute before this run; None where the system does not say."""
-    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
 
 
 def document(values: dict[str, Any], tables: Iterable[Table]) -> str:
@@ -214,7 +213,7 @@ def _equal() -> Table:
         "no numbers for this",
         (
             f"Cornell box down to {equal.CONVERGED:.1%} unshot, all seconds counted. Error: irradiance at {equal.POINTS} random "
-            f"points against the dense float64 reference of {equal.PATCHES:,} patches.",
+            f"points against the dense float64 reference of {PATCHES:,} patches.",
             "Equal: what uniform texels would take for the adaptive ones' RMS, between the measured ones.",
         ),
         (
@@ -351,13 +350,12 @@ def _wallner_2() -> Table:
             Column("hemicube_texels", "texels", ","),
             Column("stereographic_rms", "stereographic", ".6f"),
             Column("nonlinear_rms", "nonlinear", ".6f"),
-            Column("stereographic_flip", "stereographic FLIP", ".4f"),
-            Column("nonlinear_flip", "nonlinear FLIP", ".4f"),
+            Column("stereographic_flip", "stereographic FLIP", ".4f", FLIP),
+            Column("nonlinear_flip", "nonlinear FLIP", ".4f", FLIP),
             *(Column(f"{name}_s", f"{name} s", ".1f") for name in PROJECTIONS),
             *(Column(f"{name}_unshot", "unshot", ".1%") for name in PROJECTIONS),
             Column("their_stereographic", "their stereographic", ".6f"),
             Column("their_nonlinear", "their nonlinear", ".6f"),
         ),
         tuple((f"{r.subdivision} {r.level}, {r.size} px", job(r)) for r in published.WALLNER_TABLE_2),
-        needs="flip_evaluator",
     )

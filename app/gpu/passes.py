@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
 from app.gpu.context import Gpu
 from app.gpu.shader import FULLSCREEN, ShaderError
@@ -108,7 +110,7 @@ class Pass:
                 if mesh.per_instance:
                     array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=mesh.count)
                 else:
-                    array.render(mode, instances=instances)
+                    array.render(mode, vertices=mesh.drawn, instances=instances)
         if scissor:  # or later clears would keep it
             target.scissor = None  # type: ignore[assignment]  # None is no scissor; moderngl's stub is wrong
         for plane in range(clip_distances):
@@ -141,6 +143,7 @@ class Mesh:
         self.per_instance = per_instance
         self._indices = None if indices is None else gpu.ctx.buffer(indices)
         self.count = len(data) // sum(int(f[0]) * 4 for f in attributes.values())
+        self.drawn = -1  # indices, or all vertices
         self._arrays: list[tuple[moderngl.Program, moderngl.VertexArray]] = []
         self._generation = gpu.shaders.generation
 
@@ -161,6 +164,13 @@ class Mesh:
         array = self._ctx.vertex_array(program, [(self.buffer, layout, *names)], index_buffer=self._indices)
         self._arrays.append((program, array))
         return array
+
+    def choose(self, indices: NDArray[np.uint32]) -> None:
+        """Draw these from now on, at most as many as there were at first."""
+        assert self._indices is not None
+        self._indices.orphan()  # what is being drawn keeps its own
+        self._indices.write(indices)
+        self.drawn = indices.size
 
     def _release_arrays(self) -> None:
         for _, array in self._arrays:

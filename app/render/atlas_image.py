@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from app.gpu import Gpu, Pass, Texture
+from app.render.resolve import PLACES_WIDTH
 from app.render.surfaces import Surfaces
 
 
@@ -11,7 +12,7 @@ class AtlasImage:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._pass = Pass(gpu, "render/atlas", label="atlas")
+        self._pass = Pass(gpu, "render/atlas", defines={"PLACES_WIDTH": PLACES_WIDTH}, label="atlas")
         self._image: Texture | None = None
 
     def draw(self, surfaces: Surfaces, size: tuple[int, int], *, turned: bool) -> Texture:

@@ -7,13 +7,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import Lightmap
+from app.atlas.lightmap import QUAD_FORMAT, Lightmap
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.render.edges import KINDS, Kind, unequal_edges
 from app.scene.model import F64
 
 Make = Callable[[Kind, Framebuffer, Mapping[str, object], Mapping[str, Texture]], None]
-BORDER_FORMAT = {"in_rect": "4f", "in_from": "3f"}
 IN_A_ROW = 16  # instances whose texels are made side by side
 
 
@@ -24,7 +23,7 @@ class EdgeTexels:
         self._gpu, self._lightmap, self._border = gpu, lightmap, border
         self._found = unequal_edges(lightmap.nodes, border, np.flatnonzero(lightmap.nodes.used))
         self._of_rows: dict[tuple[int, int], list[_Batch]] = {}
-        self._place = Pass(gpu, "render/border", label="edges")
+        self._place = Pass(gpu, "render/border", vertex="common/rects", label="edges")
 
     def follow(self, slots: NDArray[np.int64]) -> None:
         """The leaves in these slots are others, or have other neighbours."""
@@ -44,8 +43,8 @@ class EdgeTexels:
         for batch in batches:
             self._place.draw(
                 target,
-                textures={"t_made": batch.made},
-                uniforms={"u_size": target.size, "u_along": along[batch.kind]},
+                textures={"t_made": batch.made, "t_edges": batch.edges},
+                uniforms={"u_size": target.size, "u_along": along[batch.kind], "u_border": self._border},
                 mesh=batch.mesh,
                 scissor=(0, first, target.size[0], end - first),
             )
@@ -66,8 +65,10 @@ class EdgeTexels:
             self._of_rows[key] = batches = []
             for kind, found in self._found.items():
                 some = found[(found[:, 2] < end) & (found[:, 2] + tile > first)]  # none is as high as a tile
-                if len(some):
-                    batches.append(_Batch(self._gpu, kind, some, kind.along(tile, border), border))
+                most = IN_A_ROW * self._gpu.limits.max_texture
+                for start in range(0, len(some), most):
+                    part = some[start : start + most]
+                    batches.append(_Batch(self._gpu, kind, part, kind.along(tile, border), border))
         return self._of_rows[key]
 
 
@@ -85,8 +86,8 @@ class _Batch:
         upright = found[:, 4] == 0
         size = np.where(upright[:, None], (border, along), (along, border))
         row, nth = np.divmod(np.arange(len(found)), IN_A_ROW)
-        places = np.column_stack([found[:, 1:3], size, nth * along * border, row, upright]).astype(np.float32)
-        self.mesh = Mesh(gpu, places.tobytes(), BORDER_FORMAT, per_instance=True)
+        places = np.column_stack([found[:, 1:3], size, nth * along * border, row]).astype(np.float32)
+        self.mesh = Mesh(gpu, places.tobytes(), QUAD_FORMAT, per_instance=True)
 
     def release(self) -> None:
         self._gpu.release_all(self.target, self.edges, self.made, self.mesh)

@@ -12,7 +12,6 @@ from app.render.false_colour import LAYER, Scale, false_colour_scale
 from app.render.options import DisplayOptions
 from app.render.pick import Picker, PickHit
 from app.render.surfaces import Rect, Surfaces
-from app.render.targets import release_targets
 from app.scene.model import RGB
 
 GL_DEPTH_CLAMP = 0x864F  # OpenGL 3.2: what lies before the near plane is drawn at it instead of being cut away
@@ -105,10 +104,11 @@ class FrameRenderer:
         if self._last is None:
             return None
         lightmap, view, size = self._last
+        assert self._surfaces is not None
         extent = 2.0 / np.array(size, np.float64)
         centre = ((np.floor([x_px, y_px]) + 0.5) * extent - 1.0) * [1.0, -1.0]
         self._gpu.ctx.enable_direct(GL_DEPTH_CLAMP)
-        hit = self._picker.pick(lightmap, view.clip_from_local(size[0] / size[1], lightmap.frame), centre, extent)
+        hit = self._picker.pick(self._surfaces, view.clip_from_local(size[0] / size[1], lightmap.frame), centre, extent)
         self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
         return hit
 
@@ -151,7 +151,4 @@ class _Picture:
         self.target = gpu.target(self.colour, depth=self.depth)
 
     def release(self) -> None:
-        release_targets(self._gpu, self.target)
-        self.depth.release()
-        if self.own:
-            self.colour.release()
+        self._gpu.release_all(self.target, self.depth, *([self.colour] if self.own else []))

@@ -8,8 +8,7 @@ import numpy as np
 
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, Pass
-from app.render.surfaces import uniform_matrix
-from app.render.targets import release_targets
+from app.render.surfaces import Surfaces, uniform_matrix
 from app.scene.model import F64
 
 
@@ -37,23 +36,23 @@ class Picker:
     """Owns the one-pixel target. Whoever makes it releases it."""
 
     def __init__(self, gpu: Gpu) -> None:
-
-        self._textures = [gpu.texture((1, 1), 4, "u4"), gpu.texture((1, 1), 4, "f4"), gpu.texture((1, 1), 4, "f4")]
+        self._textures = [gpu.texture((1, 1), 2, "u4"), gpu.texture((1, 1), 4, "f4"), gpu.texture((1, 1), 4, "f4")]
         self._gpu, self._pass = gpu, Pass(gpu, "render/pick")
         self._depth = gpu.depth_texture((1, 1))
         self._target = gpu.target(*self._textures, depth=self._depth)
 
-    def pick(self, lightmap: Lightmap, clip_from_local: F64, centre: F64, extent: F64) -> PickHit | None:
+    def pick(self, surfaces: Surfaces, clip_from_local: F64, centre: F64, extent: F64) -> PickHit | None:
         """The nearest surface that a pixel sees: its centre (2,) and extent (2,) in the picture from -1 to 1, +y up.
         Waits for the GPU."""
         zoom = np.diag([2 / extent[0], 2 / extent[1], 1.0, 1.0])
         zoom[:2, 3] = -centre * zoom.diagonal()[:2]
+        clip_from_local = zoom @ clip_from_local
         self._target.use()
         self._target.clear(depth=1.0)
         self._pass.draw(
             self._target,
-            uniforms={"u_clip_from_local": uniform_matrix(zoom @ clip_from_local)},
-            mesh=lightmap.mesh,
+            uniforms={"u_clip_from_local": uniform_matrix(clip_from_local)},
+            mesh=surfaces.mesh.seen(clip_from_local),
             depth=True,
         )
         ids, atlas, local = (
@@ -62,17 +61,18 @@ class Picker:
         )
         if ids[0] == 0:
             return None
+        lightmap, triangle, back = surfaces.lightmap, surfaces.mesh.triangle(int(ids[0]) - 1), bool(ids[1])
         x, y, z = lightmap.frame.world_from_local(local[:3].astype(np.float64)).tolist()
-        hit = PickHit(int(ids[0]) - 1, bool(ids[1]), int(ids[3]), (x, y, z))
-        if ids[2] == 0:
+        hit = PickHit(triangle, back, int(lightmap.scene.material_ids[triangle]), (x, y, z))
+        charts = lightmap.charts
+        face = np.flatnonzero((charts.face_triangle == triangle) & (charts.face_back == back))
+        if not len(face):
             return hit
-        return with_texel(replace(hit, facet=int(ids[2]) - 1, atlas_uv=(float(atlas[0]), float(atlas[1]))), lightmap)
+        facet, atlas_uv = int(charts.face_facet[face[0]]), (float(atlas[0]), float(atlas[1]))
+        return with_texel(replace(hit, facet=facet, atlas_uv=atlas_uv), lightmap)
 
     def release(self) -> None:
-        release_targets(self._gpu, self._target)
-        self._depth.release()
-        for texture in self._textures:
-            texture.release()
+        self._gpu.release_all(self._target, self._depth, *self._textures)
 
 
 def with_texel(hit: PickHit, lightmap: Lightmap) -> PickHit:

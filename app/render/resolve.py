@@ -23,14 +23,13 @@ from app.render.edges import Kind, reached_from
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS, Layer
 from app.render.options import DisplayOptions
-from app.render.targets import release_targets
 from app.scene.model import RGB
 
 # Texels around each tile: as many as interpolation at its edge reaches beyond it
 BORDER = {"nearest": 1, "bilinear": 1, "bicubic": 2}
 TEXELS_PER_FRAME = 1 << 17  # that are brought up to date in one frame, where not all must be
 LAYER_TABLES = ("t_normal_ids", "t_materials", "t_albedo", "t_emission", "t_facets", "t_leaves")
-PLACES_WIDTH = 256  # see app/shaders/render/places.glsl
+PLACES_WIDTH = 256  # of the table of places; pixels divide by it: a constant, a power of two
 T = TypeVar("T")
 
 
@@ -158,10 +157,9 @@ class DisplayTexels:
         return float(self._lightmap.columns), self._lightmap.nodes.pages_per_texel
 
     def release(self) -> None:
-        release_targets(self._gpu, self._target, self._unlit_target, self._source_target)
         self._edges.release()
-        for texture in (self._colour, self._unlit, *self._tables.values()):
-            texture.release()
+        targets = (self._target, self._unlit_target, self._source_target)
+        self._gpu.release_all(*targets, self._colour, self._unlit, *self._tables.values())
 
     def _band(self, whole: bool) -> tuple[int, int]:
         """First row and number of rows to resolve now; their sources are there."""

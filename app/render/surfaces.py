@@ -8,7 +8,8 @@ from app.render.ages import LATER, LeafAges
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
-from app.render.resolve import BORDER, DisplayTexels
+from app.render.resolve import BORDER, PLACES_WIDTH, DisplayTexels
+from app.render.surface_mesh import SurfaceMesh
 from app.scene.model import F64, RGB
 
 Rect = tuple[float, float, float, float]
@@ -22,6 +23,7 @@ class Surfaces:
     def __init__(self, gpu: Gpu, lightmap: Lightmap, interpolation: str) -> None:
         self._gpu, self.lightmap = gpu, lightmap
         self._ages = LeafAges(lightmap.nodes)
+        self.mesh = SurfaceMesh(gpu, lightmap.nodes)
         self._texels = DisplayTexels(gpu, lightmap, self._ages, BORDER[interpolation])
         self._passes = {(overlay, False): self._pass(overlay, bicubic=False) for overlay in (False, True)}
         self._shown: dict[str, Texture] = {}
@@ -63,7 +65,8 @@ class Surfaces:
         kind = overlay, layer.smooth and display.interpolation == "bicubic"
         if kind not in self._passes:
             self._passes[kind] = self._pass(*kind)
-        self._passes[kind].draw(target, textures=self._shown, uniforms=uniforms, mesh=self.lightmap.mesh, depth=True)
+        mesh = self.mesh.seen(clip_from_local)
+        self._passes[kind].draw(target, textures=self._shown, uniforms=uniforms, mesh=mesh, depth=True)
 
     def draw_atlas(self, program: Pass, target: Framebuffer, *, turned: bool) -> None:
         """The virtual atlas with what was drawn last, all over ``target``; ``program`` is render/atlas. turned: u for v."""
@@ -97,10 +100,12 @@ class Surfaces:
         return 1.0 / width, 1.0 / height, self._shown["t_shown_pages"].width / self.lightmap.charts.size[0]
 
     def _pass(self, overlay: bool, bicubic: bool) -> Pass:
-        return Pass(self._gpu, "render/surfaces", defines={"OVERLAY": overlay, "BICUBIC": bicubic}, label="surfaces")
+        defines = {"OVERLAY": overlay, "BICUBIC": bicubic, "PLACES_WIDTH": PLACES_WIDTH}
+        return Pass(self._gpu, "render/surfaces", defines=defines, label="surfaces")
 
     def release(self) -> None:
         self._texels.release()
+        self.mesh.release()
 
 
 def uniform_matrix(matrix: F64) -> tuple[float, ...]:

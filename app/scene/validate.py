@@ -1,7 +1,8 @@
 """From what a loader found to a Scene that keeps its promises: the one gate that every file passes.
 
-Repaired and counted as warnings: triangles without area, textured triangles without texture coordinates, albedo outside
-[0, 1], emission below 0, cameras that make no sense. Repaired without a word: normals that are zero or not finite.
+Repaired and counted as warnings: triangles without area, triangles listed twice, textured triangles without texture
+coordinates, albedo outside [0, 1], emission below 0, cameras that make no sense. Repaired without a word: normals that are
+zero or not finite.
 Refused with ``SceneError``: corners that are not finite, indices out of range, no triangle left, more than
 ``MAX_TRIANGLES``, an absurd size.
 """
@@ -25,6 +26,13 @@ MAX_TRIANGLES = 20_000_000
 EXTENT_RANGE = (1e-12, 1e12)  # m; outside of it areas leave the range of 32-bit floats by far
 # Files and GPU hold 32-bit floats: a triangle flatter than their spacing (2^-23 relative) has no shape, only rounding.
 FLATNESS = 2.0**-23
+# Odd multipliers that spread the bits of coordinates [Knuth, multiplicative hashing by the golden ratio].
+HASH = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
+ODD_ORDERS = (
+    0 * 9 + 2 * 3 + 1,
+    1 * 9 + 0 * 3 + 2,
+    2 * 9 + 1 * 3 + 0,
+)  # of a triangle's corners: it winds the other way
 
 Array = NDArray[Any]
 Bools = NDArray[np.bool_]
@@ -91,6 +99,12 @@ def validate(
     if kept < total:
         verb = "has no area and was" if total - kept == 1 else "have no area and were"
         notes.append(f"{total - kept} of {counted(total, 'triangle', 'triangles')} {verb} dropped")
+    double_sided = np.array([m.double_sided for m in materials], bool)
+    again = repeated(positions, triangles, _join_ids([p.material_ids for p in parts], parts), double_sided) & keep
+    if again.any():
+        verb = "was listed before and was" if again.sum() == 1 else "were listed before and were"
+        notes.append(f"{counted(int(again.sum()), 'triangle', 'triangles')} {verb} dropped")
+        keep &= ~again
 
     triangles = triangles[keep]
     used = np.zeros(len(positions), bool)
@@ -133,6 +147,29 @@ def has_area(positions: F64, triangles: Array) -> Bools:
     twice_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     solid: Bools = twice_area > FLATNESS * longest
     return solid
+
+
+def repeated(positions: F64, triangles: Array, material_ids: NDArray[np.int64], double_sided: Bools) -> Bools:
+    """(m,) whether a triangle has the corners, the material and, unless that is double-sided, the front of one before it: in the
+    same place, both would be lit and reflect, and make light."""
+    bits = np.ascontiguousarray(positions + 0.0).view(np.uint64)  # -0 is 0
+    x, y, z = ((bits ^ (bits >> np.uint64(32))) * HASH).T  # signs reach all bits, or mirrored triangles would be alike
+    vertex = ((x + y + z) ^ ((x + y + z) >> np.uint64(29))) * HASH[0]
+    whole = vertex[triangles[:, 0]] + vertex[triangles[:, 1]] + vertex[triangles[:, 2]]
+    ranked = np.sort(whole)
+    twice = ranked[1:][ranked[1:] == ranked[:-1]]
+    alike = (
+        np.flatnonzero(np.isin(whole, twice)) if len(twice) else twice.astype(np.int64)
+    )  # told apart below, if they differ
+    corners = positions[triangles[alike]]
+    order = np.lexsort((corners[..., 2], corners[..., 1], corners[..., 0]), axis=1)
+    turned = np.isin((order * [9, 3, 1]).sum(axis=1), ODD_ORDERS) & ~double_sided[material_ids[alike]]
+    rows = np.take_along_axis(corners, order[..., None], axis=1).reshape(-1, 9)
+    _, kept = np.unique(np.column_stack([rows, material_ids[alike], turned]), axis=0, return_index=True)
+    again = np.zeros(len(triangles), bool)
+    again[alike] = True
+    again[alike[kept]] = False
+    return again
 
 
 def _check_part(source: str | Path, part: Part, object_count: int, material_count: int) -> None:

@@ -122,10 +122,10 @@ class Solver(Protocol[OptionsT]):
         """Edge of a full face of the visibility map [px]: as set, or as the scene asks for."""
 
     def inspect(self) -> dict[str, Texture]:
-        """Textures that explain the last step, by name; ``items`` and ``depth`` are what its first shooter saw."""
+        """Textures that explain ``last_shot``, by name; ``items`` and ``depth`` are what it sees, nothing before the first."""
 
     def vanished(self) -> int:
-        """Triangles that this shooter sees only because each is drawn as one sample at least. Waits for the GPU."""
+        """Triangles that ``last_shot`` sees only because each is drawn as one sample at least. Waits for the GPU."""
 
     def release(self) -> None:
         """Give back what is on the GPU, but for the lightmap."""

@@ -107,6 +107,12 @@ class Ui:
         state = self.state
         return bool(state.toasts) or state.flight is not None or state.drag_button >= 0 or self._dialog.waiting
 
+    @property
+    def held(self) -> bool:
+        """Whether a hand is at a control or moves the view."""
+        self.use()
+        return bool(imgui.is_any_item_active()) or self.state.drag_button >= 0
+
     def take_requests(self) -> list[Request]:
         """What the host has to do, once."""
         requests, self.state.requests = self.state.requests, []

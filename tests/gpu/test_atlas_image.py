@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from forests import Forest, forest, places
 from numpy.typing import NDArray
 from pictures import framing
 from solver_scenes import grey, quads_scene, room, table_room
-from test_regrow import Forest, forest, places
 
 from app.atlas.charts import DEFAULT_TILE as TILE
 from app.gpu import Gpu
@@ -20,7 +20,6 @@ from app.render.ages import NEVER, LeafAges
 from app.render.develop import encode_srgb
 from app.render.frame import FrameRenderer
 from app.render.options import DisplayOptions
-from app.render.targets import release_targets
 from app.scene.model import F64
 
 __all__ = ["forest"]
@@ -52,8 +51,7 @@ class Viewer:
 
     def release(self) -> None:
         self.renderer.release()
-        release_targets(self._gpu, self._target)
-        self._colour.release()
+        self._gpu.release_all(self._target, self._colour)
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from forests import SCENES, Forest, forest, tables
 from numpy.typing import NDArray
 from solver_scenes import Solution, begin, table_room
-from test_regrow import SCENES, Forest, forest, tables
 
 from app.atlas.collapse import collapse
 from app.atlas.lightmap import LIGHT, STORAGE, Lightmap

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from solver_scenes import begin, table_room
+from solver_scenes import Solution, begin, table_room
 
 from app.gpu import Gpu, Pass
 from app.gpu.shader import SHADERS, ShaderLibrary
@@ -17,6 +17,7 @@ from app.projections import PROJECTIONS
 from app.projections.occluders import halved
 from app.scene.load import load_scene
 from app.scene.model import F64
+from app.solvers.shooting.shot import Shot
 from app.solvers.shooting.stages import BATCH
 
 # One fragment per texel of the map: its weight and direction; how far each pair of functions is from inverting the other
@@ -120,6 +121,8 @@ WRONG = {"hemicube": 5e-4, "stereographic": 1e-3, "nonlinear": 5e-4}
 CLOSE = (
     0.03  # solver frame. A patch's middle inside of a block, or next to it: for this no straight edge is short enough
 )
+# The same at 64 px: a sample is twice as large as at the 128 px of WRONG
+EDGES_OF_64 = 2 * WRONG["hemicube"]
 SCENES = {"table": table_room, "cornell-box": lambda: load_scene("cornell-box")}
 
 
@@ -140,27 +143,32 @@ def met(corners: F64, sides: F64, origin: F64, rays: F64, own: int) -> tuple[F64
     return np.where(np.isfinite(t[at, first]), item, 0.0), t[at, first]
 
 
+def met_from(solution: Solution, shot: Shot, weight: F64) -> tuple[F64, F64]:
+    """What rays from a shooter through every texel of its map meet: item and distance; weight: see ``probed``."""
+    vertices, triangles = solution.lightmap.nodes.occluders
+    corners = vertices["in_position"][triangles].astype(np.float64)
+    sides = vertices["in_sides"][triangles[:, 2]]
+    normal, u = shot.rows[1, :3], shot.rows[3, :3]
+    u = u - normal * (u @ normal)
+    u /= np.linalg.norm(u)
+    rays = weight[:, :3] @ np.stack([u, np.cross(normal, u), normal])
+    return met(corners, sides, shot.rows[0, :3], rays, int(shot.rows[1, 3]))
+
+
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("name", PROJECTIONS)
 def test_map_shows_what_a_ray_meets(probe: Gpu, name: str, scene: str) -> None:
     resolution = 128
     solution = begin(probe, SCENES[scene](), texels=1500, projection=name, resolution=resolution, level=3)
     weight, _, _ = probed(probe, name, resolution)
-    vertices, triangles = solution.lightmap.nodes.occluders
-    corners = vertices["in_position"][triangles].astype(np.float64)
-    sides = vertices["in_sides"][triangles[:, 2]]
     solution.light_up()
     wrong, off = [], []
     for x, y in solution.patches()[::5]:
         solver = solution.solver
-        solver.audit((int(x), int(y)))
-        rows = np.frombuffer(solver.buffers.shooters.read(), np.float32).reshape(BATCH, -1, 4)[0].astype(np.float64)
-        normal, u = rows[1, :3], rows[3, :3]
-        u = u - normal * (u @ normal)
-        u /= np.linalg.norm(u)
-        rays = weight[:, :3] @ np.stack([u, np.cross(normal, u), normal])
-        item, distance = met(corners, sides, rows[0, :3], rays, int(rows[1, 3]))
-        shown, depth = (np.frombuffer(solver.inspect()[k].read(), np.float32) for k in ("items", "depth"))
+        shot = solver.audit((int(x), int(y))).shot
+        item, distance = met_from(solution, shot, weight)
+        seen = solver.inspect(shot)
+        shown, depth = (np.frombuffer(seen[k].read(), np.float32) for k in ("items", "depth"))
         share = weight[shown != item, 3].sum()
         if distance.min() < CLOSE:
             assert share < 0.2
@@ -175,6 +183,51 @@ def test_map_shows_what_a_ray_meets(probe: Gpu, name: str, scene: str) -> None:
     # DEPTH_SLACK of shooting/visible.glsl, but for a few samples that graze a surface
     assert np.quantile(np.concatenate(off), 0.999) < 1 / 16384
     solution.release()
+
+
+# -- looking into it ---------------------------------------------------------------------------------------------------
+
+
+def test_inspect_shows_what_the_last_shot_saw(probe: Gpu) -> None:
+    """Before the first one, after a step of several maps, while earlier shots are made again, and with another projection."""
+    solution = begin(
+        probe, table_room(), density=4.0, solver="adaptive", level=1, resolution=64, depth=0, gradient=0.1, residual=0.2
+    )
+    solver = solution.solver
+
+    def share_wrong() -> float:
+        weight, _, _ = probed(probe, solver.options.projection, 64)
+        item, _ = met_from(solution, solver.last_shot, weight)
+        return float(weight[np.frombuffer(solver.inspect()["items"].read(), np.float32) != item, 3].sum())
+
+    assert not np.frombuffer(solver.inspect()["items"].read(), np.float32).any() and solver.vanished() == 0
+    solution.settle()
+    assert share_wrong() < EDGES_OF_64
+    solver.set_options(solver.options.replace(depth=1))
+    while solver._redo_under_way is None:
+        solver.step(BATCH)
+        solver.poll()
+    solver.poll(wait=True)
+    assert share_wrong() < EDGES_OF_64
+    solver.set_options(solver.options.replace(projection="nonlinear"))
+    assert share_wrong() < EDGES_OF_64
+    solution.release()
+
+
+def test_inspecting_a_shot_under_way_leaves_its_light_alone(gpu: Gpu) -> None:
+    light = []
+    for looked_at in (False, True):
+        solution = begin(gpu, table_room(), texels=2000, resolution=64)
+        solution.shoot(4)
+        assert solution.solver.last_shot is not None
+        for _ in range(4):
+            while not solution.solver.step_part(3):
+                if looked_at:
+                    solution.solver.inspect()
+                    solution.solver.vanished()
+        light.append(solution.H)
+        solution.release()
+    np.testing.assert_array_equal(*light)
 
 
 # -- short edges -------------------------------------------------------------------------------------------------------

@@ -1,106 +1,25 @@
-"""The picture: what is shown of known light, where, in which colour, and what lies under a pixel."""
+"""The picture: what is shown of known light, where, and in which colour."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from boxes import PLAIN, SIZE, STEP, box, cornell, even, hits, picture, put, some_pixels, view_of
 from numpy.typing import NDArray
-from pictures import framing, ray, render_image, tone_map
+from pictures import framing, tone_map
 
 import app.render.resolve
 from app.atlas.lightmap import Lightmap
 from app.atlas.parametrize import parametrize
 from app.gpu import Gpu
-from app.render.camera import CameraView
 from app.render.develop import encode_srgb
-from app.render.exposure import exposure_of
-from app.render.false_colour import LUMINANCE, colour_map, false_colour_scale
 from app.render.frame import FrameRenderer
 from app.render.options import INTERPOLATIONS, LAYERS, TONE_MAPS, DisplayOptions
-from app.render.targets import release_targets
-from app.scene.load import load_scene
 from app.scene.model import F64, Material, Scene
 
-SIZE = (160, 120)
-PLAIN = DisplayOptions(tone_map="clamp")
-# One step of the 8 bits that display texels and picture are both rounded to, half a step each
-STEP = 1.01 / 255
-
-
-@pytest.fixture(scope="module")
-def cornell() -> Scene:
-    return load_scene("cornell-box")
-
-
-@pytest.fixture
-def box(gpu: Gpu, cornell: Scene) -> Iterator[Lightmap]:
-    lightmap = Lightmap.of(gpu, cornell, parametrize(cornell, texels=4000))
-    yield lightmap
-    release_targets(gpu)
-    lightmap.release()
-
-
-def view_of(lightmap: Lightmap) -> CameraView:
-    camera = lightmap.scene.cameras[0]
-    distance = float(np.linalg.norm(camera.world_from_camera[:3, 3] - lightmap.frame.centre))
-    return CameraView.from_camera(camera, distance)
-
-
-def put(lightmap: Lightmap, name: str, tiles: F64) -> None:
-    """Light (tiles, 16, 16, 3) [W/m²] into ``t_irradiance`` or ``t_residual``."""
-    image = lightmap.nodes.image_from_tiles(np.concatenate([tiles / lightmap.unit, tiles[..., :1] * 0], -1))
-    lightmap.texture(name).write(np.ascontiguousarray(image, np.float32).tobytes())
-
-
-def even(lightmap: Lightmap, H: tuple[float, float, float]) -> F64:
-    """The same light on every texel that covers a surface, none on the others."""
-    return (lightmap.nodes.surfaces.area > 0)[..., None] * np.array(H)
-
-
-def picture(gpu: Gpu, lightmap: Lightmap, display: DisplayOptions = PLAIN, **more: object) -> NDArray[np.uint8]:
-    view = more.pop("view", None) or view_of(lightmap)
-    return render_image(gpu, lightmap, view, display, SIZE, **more)
-
-
-def hits(scene: Scene, view: CameraView, pixels: NDArray[np.intp]) -> tuple[NDArray[np.intp], F64]:
-    """Nearest triangle (-1: none) and position (n, 3) [m] behind pixel centres (n, 2), in float64 [Moller97]."""
-    a, b, c = np.moveaxis(scene.corners, 1, 0)
-    triangles, positions = [], []
-    for x, y in pixels:
-        ndc = (np.array([x, y]) + 0.5) / SIZE * 2 - 1
-        origin, direction = ray(view, ndc[0], -ndc[1], SIZE[0] / SIZE[1])
-        normal = np.cross(b - a, c - a)
-        det = -normal @ direction
-        from_a = origin - a
-        along = np.cross(from_a, direction)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            u = np.einsum("ij,ij->i", c - a, along) / det
-            v = -np.einsum("ij,ij->i", b - a, along) / det
-            t = np.einsum("ij,ij->i", from_a, normal) / det
-        t[~((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0))] = np.inf
-        nearest = int(t.argmin())
-        triangles.append(nearest if np.isfinite(t[nearest]) else -1)
-        positions.append(origin + direction * (t[nearest] if np.isfinite(t[nearest]) else 0.0))
-    return np.array(triangles), np.array(positions)
-
-
-def looking_at(eye: F64, target: F64) -> CameraView:
-    """A view of the 20 cm around a target, with a level horizon."""
-    back = (eye - target) / np.linalg.norm(eye - target)
-    right = np.cross([0.0, 1.0, 0.0], back)
-    right /= np.linalg.norm(right)
-    world_from_camera = np.eye(4)
-    world_from_camera[:3] = np.stack([right, np.cross(back, right), back, eye], axis=1)
-    distance = float(np.linalg.norm(eye - target))
-    return CameraView(world_from_camera, 2 * float(np.arctan(0.1 / distance)), distance)
-
-
-def some_pixels(rng: np.random.Generator, count: int) -> NDArray[np.intp]:
-    return np.stack([rng.integers(0, SIZE[0], count), rng.integers(0, SIZE[1], count)], -1)
-
+__all__ = ["box", "cornell"]
 
 # -- colours -----------------------------------------------------------------------------------------------------------
 
@@ -140,7 +59,7 @@ def test_pixels_show_their_texel(gpu: Gpu, box: Lightmap, rng: np.random.Generat
         compared += 1
     assert compared > 20
     renderer.release()
-    release_targets(gpu, target)
+    gpu.release_all(target)
 
 
 @pytest.mark.parametrize("interpolation", INTERPOLATIONS)
@@ -206,7 +125,7 @@ def test_bicubic_is_the_cubic_b_spline(gpu: Gpu, box: Lightmap, rng: np.random.G
     assert compared > 30
     assert crossing > 5
     renderer.release()
-    release_targets(gpu, target)
+    gpu.release_all(target)
 
 
 def test_right_way_up_and_round(gpu: Gpu, box: Lightmap) -> None:
@@ -266,182 +185,8 @@ def test_sides_without_texels_show_what_they_are(gpu: Gpu, layer: str, double_si
         assert hit.back == back
         assert (hit.texel is not None) == (back and double_sided)
     renderer.release()
-    release_targets(gpu, target)
-    colour.release()
+    gpu.release_all(target, colour)
     lightmap.release()
-
-
-# -- depth -------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("eye", [(0.278, 0.3, 0.1), (0.278, 0.273, -0.8), (0.278, 0.2, -3.0), (0.5, 0.5, 0.4)])
-def test_the_lamp_does_not_flicker_through_its_ceiling(
-    gpu: Gpu, box: Lightmap, rng: np.random.Generator, eye: tuple[float, float, float]
-) -> None:
-    """0.1 mm between them: every pixel whose ray meets the lamp first shows it, none else."""
-    lamp_centre = np.array([0.278, 0.5487, 0.2795])
-    view = looking_at(np.array(eye), lamp_centre)
-    image = picture(gpu, box, PLAIN.replace(layer="residual"), view=view)
-    bright = (image > 250).all(-1)
-    pixels = some_pixels(rng, 1500)
-    triangle, _ = hits(box.scene, view, pixels)
-    lamp = (triangle >= 0) & (box.scene.material_ids[triangle] == [m.name for m in box.scene.materials].index("light"))
-    assert 40 < lamp.sum() < 1460
-    # rays that graze the lamp's edge: the rasteriser snaps corners to 1/256 pixel
-    assert (bright[pixels[:, 1], pixels[:, 0]] != lamp).mean() < 0.01
-
-
-def test_walls_nearer_than_the_near_plane_are_drawn(gpu: Gpu, box: Lightmap) -> None:
-    put(box, "t_irradiance", even(box, (1.0, 1.0, 1.0)))
-    view = view_of(box)
-    back_wall = 0.5592  # z of the back wall [m]; the view looks along +z
-    view.world_from_camera[:3, 3] = (0.278, 0.273, back_wall - 1e-5)
-    image = picture(gpu, box, PLAIN.replace(layer="irradiance"), view=view)
-    assert (np.abs(image.astype(int) - int(encode_srgb(np.array(1 / np.pi)) * 255)) <= 1).all()
-
-
-# -- picking -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("samples", [1, 2])
-def test_pick_agrees_with_a_ray(gpu: Gpu, box: Lightmap, rng: np.random.Generator, samples: int) -> None:
-    renderer = FrameRenderer(gpu)
-    target = gpu.target(gpu.texture(SIZE, 4, "f1"))
-    assert renderer.pick(1, 1) is None, "nothing has been drawn yet"
-    renderer.render(target, SIZE, box, view_of(box), PLAIN, samples=samples)
-    pixels = some_pixels(rng, 50)
-    triangle, world = hits(box.scene, view_of(box), pixels)
-    for (x, y), expected, position in zip(pixels, triangle, world, strict=True):
-        hit = renderer.pick(x, y)
-        assert (-1 if hit is None else hit.triangle) == expected
-        if hit is None or hit.texel is None:
-            continue
-        # single precision on a scene of radius 1
-        assert np.array(hit.position) == pytest.approx(position, abs=1e-5 * box.frame.scale)
-        assert hit.material == box.scene.material_ids[expected]
-        assert hit.tile is not None
-        assert hit.tile_texel is not None
-        column, row = hit.tile_texel
-        texel = box.nodes.surfaces.position[hit.tile, row, column]
-        # a texel's centroid and a point of it: within its diagonal, twice as long where it is cut or stretched
-        assert np.linalg.norm(texel - position) < 2 * np.sqrt(2) / box.charts.density
-    assert (triangle >= 0).any()
-    assert (triangle < 0).any()
-    renderer.release()
-    release_targets(gpu, target)
-
-
-# -- overlays ----------------------------------------------------------------------------------------------------------
-
-
-def test_the_shooter_is_marked_where_it_is(gpu: Gpu, box: Lightmap, rng: np.random.Generator) -> None:
-    put(box, "t_irradiance", even(box, (1.0, 1.0, 1.0)))
-    renderer = FrameRenderer(gpu)
-    target = gpu.target(gpu.texture(SIZE, 4, "f1"))
-    renderer.render(target, SIZE, box, view_of(box), PLAIN)
-    plain = picture(gpu, box)
-    hit = renderer.pick(SIZE[0] // 2, SIZE[1] // 2)
-    assert hit is not None
-    assert hit.atlas_uv is not None
-    u, v = np.floor(np.array(hit.atlas_uv) / 8) * 8
-    rect = (float(u), float(v), float(u) + 8, float(v) + 8)
-    assert (picture(gpu, box, PLAIN, shooter=rect) == plain).all(), "off by default"
-    changed = np.argwhere((picture(gpu, box, PLAIN.replace(last_shooter=True), shooter=rect) != plain).any(-1))
-    assert len(changed) > 30
-    for y, x in rng.permutation(changed)[:20]:
-        under = renderer.pick(x, y)
-        assert under is not None
-        assert under.atlas_uv is not None
-        # the outline reaches up to two pixels outside, here less than two texels
-        assert rect[0] - 2 <= under.atlas_uv[0] <= rect[2] + 2
-        assert rect[1] - 2 <= under.atlas_uv[1] <= rect[3] + 2
-    renderer.release()
-    release_targets(gpu, target)
-
-
-@pytest.mark.parametrize("display", [PLAIN.replace(grid=True), PLAIN.replace(layer="charts")])
-def test_lines_and_squares_are_there_and_do_not_hide_the_picture(
-    gpu: Gpu, box: Lightmap, display: DisplayOptions
-) -> None:
-    put(box, "t_irradiance", even(box, (1.0, 1.0, 1.0)))
-    view = view_of(box)
-    view.dolly(0.4)
-    plain = picture(gpu, box, display.replace(grid=False, layer="irradiance"), view=view).astype(int)
-    image = picture(gpu, box, display, view=view).astype(int)
-    assert 0.02 < (np.abs(image - plain).max(-1) > 8).mean()
-    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 10
-    assert image.mean() > 60
-
-
-# -- false colour and exposure -----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("logarithmic", [False, True])
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 1.0])
-def test_false_colour_is_the_colour_of_the_value(gpu: Gpu, box: Lightmap, logarithmic: bool, share: float) -> None:
-    """A share of the top of the scale has the colour of the legend there, whatever the exposure."""
-    high = 500.0
-    put(box, "t_irradiance", even(box, (1, 1, 1)) * (share * high / 179.0))
-    display = DisplayOptions(
-        false_colour="illuminance", false_colour_max=high, false_colour_log=logarithmic, exposure=7
-    )
-    scale = false_colour_scale(display, box)
-    assert scale.high == high and scale.unit == "lx"
-    assert (0 < scale.low < high) if logarithmic else scale.low == 0
-    low = scale.low
-    place = np.log(max(share * high, low) / low) / np.log(high / low) if logarithmic else share
-    expected = colour_map(1001)[round(place * 1000)]
-    x, y = SIZE[0] // 2, SIZE[1] // 3
-    # the legend is sampled in steps of 1/1000 here, less than half a step of 8 bits
-    assert picture(gpu, box, display)[y, x] / 255 == pytest.approx(expected, abs=STEP + 0.5 / 255)
-
-
-def mean_residual(lightmap: Lightmap) -> np.ndarray:
-    """r̄ over all texels, RGB [W/m²]."""
-    area = lightmap.nodes.surfaces.area
-    return np.einsum("tijc,tij->c", lightmap.residual().astype(np.float64), area) / area.sum()
-
-
-def test_a_logarithmic_scale_spans_what_is_lit(box: Lightmap) -> None:
-    """From what is nearly the darkest to nearly the brightest of what does not emit, however bright a lamp is."""
-    rng = np.random.default_rng(7)
-    lux = 10 ** rng.uniform(1, 3, box.nodes.surfaces.area.shape)
-    emits = np.array([m.emits for m in box.scene.materials])
-    face = box.nodes.surfaces.face
-    lamp = emits[box.scene.material_ids[box.charts.face_triangle[face]]] & (face >= 0)
-    assert lamp.any()
-    lux[lamp] = 1e6
-    put(box, "t_irradiance", np.repeat((lux / 179)[..., None], 3, -1))
-    low, high, _ = false_colour_scale(DisplayOptions(false_colour="illuminance"), box)
-    assert 8 <= low <= 12 and 900 <= high <= 1200  # 1 % and 99 % of two decades, rounded outwards to short numbers
-
-
-def test_scale_and_exposure_come_from_the_light(box: Lightmap) -> None:
-    H = (1.0, 2.0, 0.5)
-    put(box, "t_irradiance", even(box, H))
-    put(box, "t_residual", even(box, (0.0, 0.0, 0.0)))
-    lux = 179 * np.array(H) @ LUMINANCE
-    scale = false_colour_scale(DisplayOptions(false_colour="illuminance", false_colour_log=False), box)
-    assert lux <= scale.high <= 1.5 * lux
-    luminance = false_colour_scale(DisplayOptions(false_colour="luminance", false_colour_log=False), box)
-    brightest = max(np.array(m.albedo) * H @ LUMINANCE for m in box.scene.materials if not m.emits)
-    assert 179 / np.pi * brightest <= luminance.high <= 1.5 * 179 / np.pi * brightest
-    assert luminance.unit == "cd/m²"
-
-    exposure = exposure_of(box, mean_residual(box))
-    area = box.nodes.surfaces.area
-    mean = np.average(np.log((box.albedo() * H @ LUMINANCE)[area > 0] / np.pi), weights=area[area > 0])
-    assert 2.0**exposure * np.exp(mean) == pytest.approx(0.18, rel=1e-5)
-    put(box, "t_irradiance", even(box, H) * 8)
-    assert exposure_of(box, mean_residual(box)) == pytest.approx(exposure - 3, abs=1e-5)
-
-
-def test_a_scene_just_opened_is_exposed_for_the_light_to_come(box: Lightmap) -> None:
-    exposure = exposure_of(box, mean_residual(box))
-    assert np.isfinite(exposure)
-    assert abs(exposure) < 4, "the lamp of the Cornell box gives about as much light as the exposure of 0 is for"
-    put(box, "t_residual", even(box, (0.0, 0.0, 0.0)))
-    assert exposure_of(box, mean_residual(box)) == 0.0, "no light at all"
 
 
 # -- frames ------------------------------------------------------------------------------------------------------------
@@ -466,8 +211,7 @@ def test_any_target_gets_the_same_picture(gpu: Gpu, box: Lightmap) -> None:
         renderer.render(target, SIZE, box, view_of(box), PLAIN)
         pixels = np.frombuffer(target.read((0, 0, *SIZE), 3), np.uint8).reshape(SIZE[1], SIZE[0], 3)[::-1]
         assert (pixels == expected).all()
-        release_targets(gpu, target)
-        colour.release()
+        gpu.release_all(target, colour)
     renderer.release()
 
 
@@ -495,8 +239,7 @@ def test_large_lightmaps_are_brought_up_to_date_in_turn(
         display = PLAIN.replace(interpolation=interpolation)
         assert (frame(display) == picture(gpu, box, display)).all()
     renderer.release()
-    release_targets(gpu, target)
-    colour.release()
+    gpu.release_all(target, colour)
 
 
 def test_a_frame_follows_storage_and_materials(gpu: Gpu, box: Lightmap) -> None:
@@ -514,5 +257,4 @@ def test_a_frame_follows_storage_and_materials(gpu: Gpu, box: Lightmap) -> None:
     assert brightest == pytest.approx(encode_srgb(np.array([0.17, 0.12, 0.04])), abs=0.15)
     assert brightest[0] == pytest.approx(encode_srgb(np.array(0.17)), abs=STEP)
     renderer.release()
-    release_targets(gpu, target)
-    colour.release()
+    gpu.release_all(target, colour)

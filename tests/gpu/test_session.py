@@ -4,16 +4,15 @@ behind by a scene that was closed."""
 from __future__ import annotations
 
 import dataclasses
-import gc
 import os
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import moderngl
 import numpy as np
 import psutil
 import pytest
+from gl_objects import forgotten, held
 
 from app.atlas.lightmap import STORAGE
 from app.atlas.options import AtlasOptions
@@ -25,6 +24,8 @@ from app.render.false_colour import colour_map
 from app.session import Session, Stop
 from app.solvers import ShootingOptions
 from app.solving import share_done
+
+__all__ = ["forgotten"]
 
 ATLAS = AtlasOptions(texels=900)
 SHOOTING = ShootingOptions(resolution=64, residual=0.05)
@@ -287,33 +288,6 @@ def test_a_session_without_a_scene(gpu: Gpu, tmp_path: Path) -> None:
 
 
 # -- nothing is left behind --------------------------------------------------------------------------------------------
-
-RESOURCES = (moderngl.Texture, moderngl.Buffer, moderngl.Framebuffer, moderngl.VertexArray, moderngl.Program)
-
-
-def held(gpu: Gpu) -> int:
-    """GL objects that are there: those that Python still knows and has not released. Those that it forgot without releasing
-    are counted by ``forgotten``; both together are all."""
-    gc.collect()
-    invalid = moderngl.InvalidObject
-    objects = (o for o in gc.get_objects() if isinstance(o, RESOURCES))
-    return sum(1 for o in objects if o.ctx is gpu.ctx and not isinstance(o.mglo, invalid))
-
-
-@pytest.fixture
-def forgotten(gpu: Gpu) -> Iterator[Callable[[], list[object]]]:
-    """Says which GL objects Python has let go without releasing them, since the test began."""
-    gc.collect()
-    mode, gpu.ctx.gc_mode = gpu.ctx.gc_mode, "context_gc"
-    gpu.ctx.objects.clear()
-
-    def let_go() -> list[object]:
-        gc.collect()
-        return [o for o in gpu.ctx.objects if not isinstance(o, moderngl.InvalidObject)]
-
-    yield let_go
-    gpu.ctx.gc_mode = mode
-    gpu.ctx.objects.clear()
 
 
 def test_reloading_leaves_nothing_behind(gpu: Gpu, forgotten: Callable[[], list[object]]) -> None:

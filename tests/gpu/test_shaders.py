@@ -20,7 +20,7 @@ from app.options import specs
 from app.projections import PROJECTIONS
 from app.render.layers import LAYER_SHADERS
 from app.render.options import TONE_MAPS
-from app.render.resolve import BORDER
+from app.render.resolve import BORDER, PLACES_WIDTH
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 from app.solvers.shooting.stages import OPEN_BLOCK
 
@@ -42,6 +42,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "BICUBIC": FLAG,
     "FOLLOWS": FLAG,
     "BORDER": tuple(sorted(set(BORDER.values()))),
+    "PLACES_WIDTH": (PLACES_WIDTH,),
     "SAMPLES": (1, 4),
     "FLAT": FLAG,
     "NEAR_FIELD": FLAG,

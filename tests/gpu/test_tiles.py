@@ -18,7 +18,7 @@ from app.gpu import Gpu, ShaderLibrary
 from app.gpu.shader import SHADERS, Source
 from app.render.camera import CameraView
 from app.render.options import LAYERS, DisplayOptions
-from app.render.targets import release_targets
+from app.render.resolve import PLACES_WIDTH
 from app.scene.load import load_scene
 from app.session import Session, Stop
 from app.solvers import SOLVERS, ShootingOptions
@@ -52,8 +52,7 @@ def test_every_program_that_asks_for_the_tile_is_told(gpu: Gpu, monkeypatch: pyt
     assert {"render/source", "render/resolve", "render/edges", "lightmap/push"} <= set(asked)
     assert {"shooting/choose", "shooting/patches", "shooting/books", "shooting/judge"} <= set(asked)
     session.release()
-    release_targets(gpu, target)
-    texture.release()
+    gpu.release_all(target, texture)
     library.release()
 
 
@@ -61,7 +60,8 @@ def pictures(gpu: Gpu, display: DisplayOptions, light: float) -> list[NDArray[np
     """The box with light that grows along an axis of each rectangle, for every size of leaf."""
     scene, made = load_scene("textured-room"), []
     for tile in TILES:
-        lightmap = Lightmap.of(gpu, scene, parametrize(scene, texels=4000, tile=tile))
+        lightmap = Lightmap.of(gpu, scene, parametrize(scene, texels=20_000, tile=tile))
+        assert tile > 8 or lightmap.tiles > PLACES_WIDTH, "pixels look in more than one row of the table of places"
         surfaces = lightmap.nodes.surfaces
         H = np.where((surfaces.area > 0)[..., None], light * (1.0 + surfaces.position - scene.bounds[0]), 0.0)
         image = lightmap.nodes.image_from_tiles(np.concatenate([H, H[..., :1]], -1) / lightmap.unit)
@@ -69,7 +69,6 @@ def pictures(gpu: Gpu, display: DisplayOptions, light: float) -> list[NDArray[np
         camera = scene.cameras[0]
         distance = float(np.linalg.norm(camera.world_from_camera[:3, 3] - lightmap.frame.centre))
         made.append(render_image(gpu, lightmap, CameraView.from_camera(camera, distance), display, SIZE))
-        release_targets(gpu)
         lightmap.release()
     return made
 

@@ -12,12 +12,14 @@ from app.atlas.collapse import collapse
 from app.gpu import Gpu
 from app.scene.load import load_scene
 from app.scene.model import Scene
+from app.solvers.shooting.adaptive import MERGE
 
 pytestmark = pytest.mark.long
 
 DENSITY = 4.0  # of the roots [1/m]
 ROUGH = 0.1  # a threshold that splits about half of a room with shadows
 FEW_STEPS = 1500
+FORM_FACTORS = 0.005  # what they are off by, see test_energy.py
 
 
 def grown(gpu: Gpu, scene: Scene, **options: object) -> Solution:
@@ -61,7 +63,7 @@ def test_furnace(planted: Callable[..., Solution]) -> None:
     material = scene.materials[0]
     glow = np.pi * np.array(material.emission) / (1 - np.array(material.albedo))
     mean = (box.B * box.area[:, None]).sum(0) / box.area.sum()
-    np.testing.assert_allclose(mean, glow, rtol=0.01)
+    np.testing.assert_allclose(mean, glow, rtol=FORM_FACTORS + box.solver.options.residual)  # which is not shot
     assert set(box.solver.tree.slots) == leaves  # type: ignore[attr-defined]
 
 
@@ -86,8 +88,17 @@ def finest_light(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     return collapse(solution.lightmap.nodes, solution.lightmap.irradiance())
 
 
+def levels(solution: Solution) -> np.ndarray:
+    """Of the leaves, on the finest level of the atlas; beside a finer leaf between both."""
+    nodes = solution.lightmap.nodes
+    level = np.broadcast_to(nodes.leaves.level[:, None, None, None], (*nodes.surfaces.area.shape, 1))
+    return collapse(nodes, level.astype(np.float32))[0][..., 0]
+
+
 def test_it_does_not_matter_when_the_tree_grows(planted: Callable[..., Solution]) -> None:
-    """From the start, or after 800 shots onto the roots."""
+    """From the start, or after 800 shots onto the roots. Where both trees have leaves of one level, light differs by no more than
+    form factors are off, from the patches of other leaves; where only one was split, which bends by less than the threshold, by
+    what linear interpolation misses, 1/8 of a second difference."""
     early = planted(table_room(), **(SHADOW | {"depth": 2}))
     early.settle()
     late = planted(table_room(), **(SHADOW | {"depth": 0}))
@@ -99,7 +110,10 @@ def test_it_does_not_matter_when_the_tree_grows(planted: Callable[..., Solution]
     assert min(early.lightmap.texel_count, late.lightmap.texel_count) > 3 * roots, "nothing grew"
     (a, here), (b, there) = finest_light(early), finest_light(late)
     both = here & there
-    assert np.sqrt(((a - b)[both] ** 2).mean() / (a[both] ** 2).mean()) < 0.01
+    alike = levels(early) == levels(late)
+    for where, most in ((both & alike, FORM_FACTORS), (both & ~alike, early.solver.options.gradient / 8)):
+        assert where.sum() > both.sum() / 4
+        assert np.sqrt(((a - b)[where] ** 2).mean() / (a[both] ** 2).mean()) < most
     assert max(abs(early.book.imbalance_share), abs(late.book.imbalance_share)) < CONTACTS
 
 
@@ -155,16 +169,18 @@ def test_leaves_follow_threshold_depth_and_budget(planted: Callable[..., Solutio
         return len(box.solver.tree)  # type: ignore[attr-defined]
 
     few = settled()
+    stay = settled(gradient=5.0 * MERGE)  # leaves that do not merge where the threshold is 5
     many = settled(gradient=0.2)
-    assert many > 2 * few
+    assert few <= stay < many
     assert few < settled(depth=1) < many
-    assert settled(depth=2, gradient=5.0) <= 2 * few  # merging waits for an eighth of the threshold
+    assert few <= settled(depth=2, gradient=5.0) <= stay
     full = settled(depth=4, gradient=1e-3, budget=65_536)  # half of the room that is there from the start
     assert 65_536 // 256 - 3 <= full <= 65_536 // 256 and "65,536" in (box.solver.note or "")
 
 
 def test_an_edit_of_a_grown_tree(planted: Callable[..., Solution]) -> None:
-    """The log of shots is scaled with the light: what is made again into later leaves fits what is there."""
+    """The log of shots is scaled with the light: what is made again into later leaves fits what is there, within the error of
+    form factors."""
     options = SHADOW | {"depth": 1, "residual": 0.05}
     box = planted(table_room(), **options)
     box.settle()
@@ -179,5 +195,5 @@ def test_an_edit_of_a_grown_tree(planted: Callable[..., Solution]) -> None:
     box.settle()
     finer, covered = finest_light(box)
     coarse = H.repeat(2, 0).repeat(2, 1)[: finer.shape[0], : finer.shape[1]] if finer.shape != H.shape else H
-    assert finer[covered].mean() == pytest.approx(coarse[covered].mean() / 4, rel=5e-3)
+    assert finer[covered].mean() == pytest.approx(coarse[covered].mean() / 4, rel=FORM_FACTORS)
     assert abs(box.book.imbalance_share) < CONTACTS

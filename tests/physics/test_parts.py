@@ -20,12 +20,35 @@ def test_parts_add_up_to_the_shot(gpu: Gpu, bands: int) -> None:
         parts += 1
         while not cut.solver.step_part(bands):
             parts += 1
-    assert parts == SHOTS * (bands + 4)  # audit, choose, see, the bands, the rest
+    assert parts == SHOTS * (2 * bands + 4)  # patches, audit, zero, see, receivers, the rest
     assert cut.solver.shots == whole.solver.shots == SHOTS
     # bands share no texel: each gets the same numbers, added in the same order
     np.testing.assert_array_equal(cut.H, whole.H)
     np.testing.assert_array_equal(cut.r, whole.r)
     np.testing.assert_array_equal(cut.book.escaped, whole.book.escaped)
+    whole.release()
+    cut.release()
+
+
+def test_so_do_the_parts_of_a_growing_tree(gpu: Gpu) -> None:
+    """Leaves split, shots are made again into them, and leaves are judged: all in parts."""
+    options = {"density": 4.0, "level": 1, "resolution": 64, "residual": 0.05, "depth": 2, "gradient": 0.3}
+    whole, cut = (begin(gpu, table_room(), solver="adaptive", **options) for _ in range(2))
+    redone, most = 0, 0
+    for _ in range(400):
+        whole.solver.step(1)
+        parts = 1
+        while not cut.solver.step_part(3):
+            parts += 1
+        most = max(most, parts)
+        redone += cut.solver._redo_under_way is not None  # type: ignore[attr-defined]
+        whole.solver.poll(wait=True)
+        cut.solver.poll(wait=True)
+    assert redone > 3 and whole.lightmap.tiles > 20, "nothing grew"
+    assert most > 2 * 3 + 4, "leaves were judged in one part with something else"
+    assert cut.solver.shots == whole.solver.shots
+    np.testing.assert_array_equal(cut.H, whole.H)
+    np.testing.assert_array_equal(cut.r, whole.r)
     whole.release()
     cut.release()
 

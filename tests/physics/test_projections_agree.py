@@ -70,9 +70,9 @@ def test_small_triangles_do_not_vanish(gpu: Gpu, projection: str) -> None:
         height = abs(audit.shot.centre[2] - 0.6)
         if audit.shot.area < 1e-3 or height < 0.05:  # of the speck itself, or edge-on
             continue
-        seen = np.frombuffer(solution.solver.inspect()["items"].read(), np.float32)
+        seen = np.frombuffer(solution.solver.inspect(audit.shot)["items"].read(), np.float32)
         assert np.isin(seen, items).any()
-        vanished.append(solution.solver.vanished())
+        vanished.append(solution.solver.vanished(audit.shot))
     assert max(vanished) == 2 and np.mean(vanished) > 1.5  # of two triangles; a sample may hit one by chance
     solution.release()
 
@@ -81,6 +81,6 @@ def test_nothing_large_vanishes(gpu: Gpu) -> None:
     box = begin(gpu, load_scene("furnace"), texels=400)
     box.light_up()
     for x, y in box.patches():
-        box.solver.audit((int(x), int(y)))
-        assert box.solver.vanished() == 0
+        shot = box.solver.audit((int(x), int(y))).shot
+        assert box.solver.vanished(shot) == 0
     box.release()

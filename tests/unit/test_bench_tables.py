@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import pytest
 
 from app.atlas.options import AtlasOptions
 from app.bench import equal, measure, published, tables
+from app.bench.points import irradiance_of, random_points
 from app.bench.report import Column, csv_text, markdown_table
 from app.bench.rooms import FEWEST, room_of
 from app.cli import run
@@ -147,6 +149,7 @@ def test_ctrl_c_keeps_finished_rows(
     assert (tmp_path / "out/tables.md").read_text() == out
     assert "Nothing was measured." in out
     values = json.loads((tmp_path / "out/tables.json").read_text())
+    assert len(values["warnings"]) == 2 and "job 1: left out" in values["warnings"][0]
     assert values["interrupted"] and values["renderer"] and values["machine"]
     assert values["tables"] == {"coombe1": [{"scene": "a", "n": 7, "ms": 0.5}], "wallner1": []}
 
@@ -156,6 +159,29 @@ def test_only_the_tables_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(tables, "all_tables", lambda: named)
     assert run(["bench", "tables", "-o", str(tmp_path), "--only", "a,c", "--json"]) == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "c.csv", "tables.json", "tables.md"]
+
+
+def test_without_an_extra_all_but_its_columns_is_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    two = (table("plain", lambda gpu, seconds: {"n": 1}), table("wallner2", lambda gpu, seconds: {"n": 2}))
+    flip = tuple(c for t in tables.all_tables() for c in t.columns if c.needs)
+    assert [c.head for c in flip] == ["stereographic FLIP", "nonlinear FLIP"]
+    known = two[0], dataclasses.replace(two[1], columns=(*COLUMNS, *flip))
+    monkeypatch.setattr(tables, "all_tables", lambda: known)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert run(["bench", "tables", "-o", str(tmp_path)]) == 0
+    out, err = capfd.readouterr()
+    assert err == (
+        "glowtree: note: table wallner2: left out: stereographic FLIP, nonlinear FLIP: needs flip-evaluator: "
+        "pip install 'glowtree[bench]'\n"
+    )
+    assert "FLIP" not in out
+    assert (tmp_path / "wallner2.csv").read_text() == "scene,n,ms\n,2,\n"
+    values = json.loads((tmp_path / "tables.json").read_text())
+    assert values["tables"]["plain"] == [{"n": 1}] and values["warnings"] == [
+        err.removeprefix("glowtree: note: ").strip()
+    ]
 
 
 def test_flip_sees_what_has_changed(rng: np.random.Generator) -> None:
@@ -222,8 +248,8 @@ def test_a_lightmap_is_read_where_its_points_are(gpu: Gpu, adaptive: bool) -> No
         scene, nodes = lightmap.scene, lightmap.nodes
         height = nodes.image_from_tiles(nodes.surfaces.position[..., 1:2].astype(np.float32))
         lightmap.texture("t_irradiance").write(np.ascontiguousarray(height.repeat(4, -1) / lightmap.unit).tobytes())
-        points = equal.random_points(scene, lightmap.charts, 300, 3)
-        read, position = equal.irradiance_of(lightmap, points)[:, 0], points.positions_normals(scene)[0][:, 1]
+        points = random_points(scene, 300, 3)
+        read, position = irradiance_of(lightmap, points)[:, 0], points.positions_normals(scene)[0][:, 1]
         texel = 1 / lightmap.charts.density
     assert np.abs(read - position).max() < 0.51 * texel
     assert np.median(np.abs(read - position)) < 1e-4

@@ -10,14 +10,15 @@ import pytest
 
 APP = Path(__file__).parents[2] / "app"
 LAYERS = [
-    {"errors"},
-    {"options"},
+    {"errors", "parts"},
+    {"options", "cache"},
     {"scene", "gpu"},
     {"atlas"},
     {"projections"},
     {"solvers", "reference", "render", "metrics", "bake"},
-    {"bookkeeping", "history", "picking", "opening", "pacing", "stats"},
-    {"loading", "solving"},
+    {"bookkeeping", "history", "picking", "pacing", "stats"},
+    {"loading", "solving", "viewing"},
+    {"opening"},
     {"session"},
     {"ui"},
     {"headless_ui", "console"},

@@ -1,4 +1,4 @@
-"""Texture quadtrees: what may split and merge, what stays the same whatever the leaves, and their collapse to one texture."""
+"""Texture quadtrees: what may split and merge, and what stays the same whatever the leaves."""
 
 from __future__ import annotations
 
@@ -6,75 +6,18 @@ import dataclasses
 
 import numpy as np
 import pytest
-from atlas_scenes import box_room, own_cache, scene_of
-from solver_scenes import grey, quads_scene, room, table_room
+from atlas_scenes import own_cache
+from quadtrees import DEPTH, SCENES, UNEVEN, WITH_TILES, grow, shuffle, small_lamp_room, tree_of
+from solver_scenes import grey, quads_scene, room
 
-from app.atlas.charts import DEFAULT_TILE, TILES
-from app.atlas.collapse import collapse
 from app.atlas.node_set import NodeSet
 from app.atlas.parametrize import parametrize
-from app.atlas.quadtree import SMALLEST, WHOLE_CHART, Change, Quadtree, first_leaves, quadtree_nodes
-from app.scene import shapes
-from app.scene.model import F64, Material, Scene
+from app.atlas.quadtree import SMALLEST, WHOLE_CHART, Quadtree, first_leaves
+from app.scene.model import F64, Scene
 
 __all__ = ["own_cache"]
 
-UNEVEN = ("ball", "crumbs")  # charts that are no rectangles of whole texels: texels on a chart's border may be shared
-DEPTH = 3  # of the random trees
 AREA = 1e-9  # relative: texels are cut exactly, in double precision
-
-
-def ball_room() -> Scene:
-    return scene_of([box_room(), shapes.icosphere(1.0, 2).moved(2, 1.2, 2)])
-
-
-def small_lamp_room() -> Scene:
-    """Both far smaller than a tile."""
-    lamp = [[1.9, 2.9, 1.9], [2.1, 2.9, 1.9], [2.1, 2.9, 2.1], [1.9, 2.9, 2.1]]
-    panel = [[1.0, 1.0, 1.0], [1.0, 1.0, 1.1], [1.1, 1.0, 1.1], [1.1, 1.0, 1.0]]
-    return quads_scene([*room((4.0, 3.0, 4.0)), lamp, panel], [grey(0.5), grey(0.5, 5.0)], [0] * 6 + [1, 0])
-
-
-def crumbs_room() -> Scene:
-    """Charts of any outline, with tiny lamps between them: finer leaves in the middle of large charts from the start."""
-    lamps = [shapes.quad((1, 0.1 + 0.05 * k, 1), (0.07, 0, 0), (0, 0, 0.07)) for k in range(40)]
-    sails = [shapes.polygon([(0, 2 + 0.1 * k, 0), (2.3, 2 + 0.1 * k, 0.2), (0.4, 2 + 0.1 * k, 1.9)]) for k in range(8)]
-    return scene_of([box_room(), *sails, *lamps], [Material("grey")] * 9 + [Material("lamp", emission=(1, 1, 1))])
-
-
-SCENES = {
-    "walls": lambda: quads_scene(room((4.0, 3.0, 4.0)), [grey(0.5)]),
-    "table": table_room,
-    "ball": ball_room,
-    "small lamp": small_lamp_room,
-    "crumbs": crumbs_room,
-}
-OTHER_TILES = tuple(tile for tile in TILES if tile != DEFAULT_TILE)
-WITH_TILES = [*((name, DEFAULT_TILE) for name in SCENES), *(("small lamp", tile) for tile in OTHER_TILES)]
-
-
-def tree_of(name: str, density: float = 10.0, tile: int = DEFAULT_TILE) -> Quadtree:
-    scene = SCENES[name]()
-    return Quadtree(quadtree_nodes(scene, parametrize(scene, density=density, tile=tile)))
-
-
-def grow(tree: Quadtree, slots: list[int], depth: int = DEPTH) -> Change | None:
-    """Split these leaves and what must split with them, whatever room that takes."""
-    more = 4 * len(tree)
-    if tree.room < more:
-        tree.resize(tree.nodes.tiles + more)
-    splits = tree.splits(slots, depth)
-    return tree.split(splits) if splits else None
-
-
-def shuffle(tree: Quadtree, rng: np.random.Generator, rounds: int = 6) -> None:
-    """Random splits and merges, two rounds of splits for each of merges."""
-    for k in range(rounds):
-        used = np.flatnonzero(tree.nodes.used)
-        if k % 3 < 2:
-            grow(tree, used[rng.random(len(used)) < rng.uniform(0.1, 0.3)].tolist())
-        elif families := [family for family in tree.merges(used) if rng.random() < 0.5]:
-            tree.merge(families)
 
 
 def places(tree: Quadtree) -> set[tuple[int, int, int]]:
@@ -202,6 +145,14 @@ def test_a_change_says_who_took_whose_place() -> None:
         assert after[child] == (level + 1, 2 * x + corner[0], 2 * y + corner[1])
 
 
+def test_fields_of_a_change_are_as_long_as_each_other() -> None:
+    tree = tree_of("ball")
+    change = grow(tree, np.flatnonzero(tree.nodes.used).tolist())
+    assert change is not None
+    lengths = {len(getattr(change, f.name)) for f in dataclasses.fields(change) if f.name != "split"}
+    assert len(lengths) == 1 and change.corner.shape[1] == 2
+
+
 # -- room --------------------------------------------------------------------------------------------------------------
 
 
@@ -317,86 +268,3 @@ def test_lamps_and_small_charts_begin_with_enough_texels(tile: int) -> None:
 def unlit_walls() -> tuple[Scene, object]:
     scene = quads_scene(room((4.0, 3.0, 4.0)), [grey(0.5)])
     return scene, parametrize(scene, density=10)
-
-
-# -- collapse ----------------------------------------------------------------------------------------------------------
-
-
-def texel_places(nodes: NodeSet) -> F64:
-    """(slots, t, t, 2) middle of every texel in the atlas [texels of level 0]."""
-    inside = np.stack(np.meshgrid(*2 * [np.arange(nodes.tile)]), -1) + 0.5
-    corner = np.stack([nodes.leaves.x, nodes.leaves.y], -1)[:, None, None] * nodes.tile
-    return (corner + inside) * np.exp2(-nodes.leaves.level.astype(float))[:, None, None, None]
-
-
-def image_places(nodes: NodeSet, finest: int) -> F64:
-    width, height = (side << finest for side in nodes.charts.size)
-    return (np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1) + 0.5) / 2**finest
-
-
-def in_charts(nodes: NodeSet, uv: F64, margin: float) -> np.ndarray:
-    """Which places lie in a chart, so far from its border [texels of level 0]."""
-    inside = np.zeros(uv.shape[:-1], bool)
-    for x, y, w, h in nodes.charts.chart_rects:
-        low, high = np.array([x, y]) + margin, np.array([x + w, y + h]) - margin
-        inside |= ((uv > low) & (uv < high)).all(-1)
-    return inside
-
-
-@pytest.mark.parametrize(
-    ("seed", "tile"), [*((seed, DEFAULT_TILE) for seed in range(3)), *((0, t) for t in OTHER_TILES)]
-)
-def test_linear_light_collapses_to_linear_light(seed: int, tile: int) -> None:
-    """Means of linear light and its interpolation are linear: no step where levels change. From 1.5 texels of the coarsest level
-    on from where a chart ends, where nothing is there to interpolate with."""
-    tree = tree_of("walls", density=0.625 * tile, tile=tile)
-    shuffle(tree, np.random.default_rng(seed), rounds=3)
-    nodes = tree.nodes
-    finest = int(nodes.leaves.level.max())
-    assert finest > 1 and len(set(nodes.leaves.level[nodes.used])) > 2
-    slope = np.array([[0.7, -0.2], [0.1, 0.4], [-0.3, 1.0]])
-    image, covered = collapse(nodes, (texel_places(nodes) @ slope.T).astype(np.float32))
-    uv = image_places(nodes, finest)
-    assert covered.shape == uv.shape[:2]
-    inner = in_charts(nodes, uv, 1.5)
-    assert covered[inner].all() and inner.mean() > 0.3
-    # single precision of values of some hundred
-    np.testing.assert_allclose(image[inner], (uv @ slope.T)[inner], rtol=1e-5, atol=1e-4)
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_even_light_collapses_to_even_light_on_all_that_is_covered(name: str) -> None:
-    """Uncovered texels hold rubbish, and none of it may get in."""
-    tree = tree_of(name)
-    shuffle(tree, np.random.default_rng(5), rounds=3)
-    nodes = tree.nodes
-    values = np.where((nodes.surfaces.face >= 0)[..., None], 0.375, 1e6).astype(np.float32)
-    image, covered = collapse(nodes, values)
-    finest = int(nodes.leaves.level.max())
-    np.testing.assert_allclose(image[covered], 0.375, rtol=1e-6)
-    if name not in UNEVEN:  # rectangles of whole texels: what is covered is what the charts say
-        np.testing.assert_array_equal(covered, in_charts(nodes, image_places(nodes, finest), 0.0))
-
-
-def test_one_level_collapses_to_itself() -> None:
-    tree = tree_of("walls")
-    grow(tree, np.flatnonzero(tree.nodes.used).tolist(), depth=1)
-    nodes = tree.nodes
-    assert set(nodes.leaves.level[nodes.used]) == {1}
-    tile = nodes.tile
-    values = np.random.default_rng(1).random((nodes.tiles, tile, tile, 3), np.float32)
-    image, covered = collapse(nodes, values)
-    rows, columns = (side // tile for side in image.shape[:2])
-    tiled = image.reshape(rows, tile, columns, tile, 3).swapaxes(1, 2)
-    mine = nodes.used
-    seen = nodes.surfaces.face[mine] >= 0
-    np.testing.assert_array_equal(tiled[nodes.leaves.y[mine], nodes.leaves.x[mine]][seen], values[mine][seen])
-    assert covered.sum() == seen.sum()
-
-
-def test_fields_of_a_change_are_as_long_as_each_other() -> None:
-    tree = tree_of("ball")
-    change = grow(tree, np.flatnonzero(tree.nodes.used).tolist())
-    assert change is not None
-    lengths = {len(getattr(change, f.name)) for f in dataclasses.fields(change) if f.name != "split"}
-    assert len(lengths) == 1 and change.corner.shape[1] == 2

@@ -64,10 +64,6 @@ def test_parts_are_joined_and_unused_vertices_left_out() -> None:
     assert scene.warnings == () and scene.triangles.dtype == np.int32
 
 
-def test_exact_duplicates_are_kept() -> None:
-    assert len(made([Part(SQUARE, np.concatenate([TRIANGLES, TRIANGLES]))]).triangles) == 4
-
-
 def moved(index: int, value: float) -> np.ndarray:
     positions = SQUARE.copy()
     positions[index] = value
@@ -145,3 +141,16 @@ def test_cameras_are_rigid_and_their_names_unique() -> None:
     turn = scene.cameras[0].world_from_camera[:3, :3]
     assert np.allclose(turn @ turn.T, np.eye(3)) and np.isclose(np.linalg.det(turn), 1.0)
     assert scene.warnings == ("3 cameras were dropped: singular or without a field of view",)
+
+
+def test_triangles_listed_twice_are_dropped() -> None:
+    """The same corners from whichever on, of one material and, if it has one, the same front. Coplanar neighbours stay."""
+    positions = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [-0.0, 0, 0]]
+    triangles = [[0, 1, 2], [1, 2, 4], [0, 2, 1], [1, 3, 2], [0, 1, 2], [0, 1, 2], [2, 1, 0]]
+    ids = np.array([0, 0, 0, 0, 1, 2, 2])
+    materials = [Material("a"), Material("b"), Material("c", double_sided=True)]
+    part = Part(np.array(positions, float), np.array(triangles), 0, ids)
+    scene = validate("x", "x", [part], ["o"], materials)
+    assert scene.material_ids.tolist() == [0, 0, 0, 1, 2]
+    np.testing.assert_array_equal(scene.triangles[:3], [[0, 1, 2], [0, 2, 1], [1, 3, 2]])
+    assert scene.warnings == ("2 triangles were listed before and were dropped",)

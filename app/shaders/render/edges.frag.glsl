@@ -6,8 +6,8 @@
 // four texels that it covers, and the sum is c + h; the finer leaf follows with g = c + h - f, with c and h interpolated along the
 // edge. The sums are of what is shown, since that is what the sampler interpolates. Where light is linear, g goes on as f does.
 //
-// The texels of an instance of border.vert.glsl lie side by side here, and are brought to their places by border.frag.glsl: they are
-// dear, and a strip as thin as a border would leave most of a rasteriser's blocks of fragments empty.
+// The texels of an instance lie side by side here, and are brought to their places by border.frag.glsl: they are dear, and a strip as
+// thin as a border would leave most of a rasteriser's blocks of fragments empty.
 #include "common/atlas.glsl"
 #include "common/pages.glsl"
 #include "common/tile.glsl"

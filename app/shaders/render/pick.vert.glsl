@@ -4,15 +4,12 @@ uniform mat4 u_clip_from_local;
 in vec3 in_position;
 in vec2 in_uv_front;
 in vec2 in_uv_back;
-in uvec4 in_ids;
 
 out vec3 v_position;
 out vec4 v_uv;
-flat out uvec4 v_ids;
 
 void main() {
     v_position = in_position;
     v_uv = vec4(in_uv_front, in_uv_back);
-    v_ids = in_ids;
     gl_Position = u_clip_from_local * vec4(in_position, 1.0);
 }

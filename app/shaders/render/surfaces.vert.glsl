@@ -5,7 +5,7 @@ uniform sampler2D t_unlit;
 in vec3 in_position;
 in vec2 in_uv_front;
 in vec2 in_uv_back;
-in uvec4 in_ids;
+in uint in_material;
 
 out vec4 v_uv;  // atlas texels: front, back; negative without texels
 flat out vec3 v_unlit_front;
@@ -13,7 +13,7 @@ flat out vec3 v_unlit_back;
 
 void main() {
     v_uv = vec4(in_uv_front, in_uv_back);
-    v_unlit_front = texelFetch(t_unlit, ivec2(in_ids.z, 0), 0).rgb;
-    v_unlit_back = texelFetch(t_unlit, ivec2(in_ids.z, 1), 0).rgb;
+    v_unlit_front = texelFetch(t_unlit, ivec2(in_material, 0), 0).rgb;
+    v_unlit_back = texelFetch(t_unlit, ivec2(in_material, 1), 0).rgb;
     gl_Position = u_clip_from_local * vec4(in_position, 1.0);
 }

@@ -15,7 +15,6 @@ const float UNLIT = 0.01;   // a texel under 1 % of the leading one's residual c
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
 uniform sampler2D t_residual;
-uniform sampler2D t_facets;
 uniform sampler2D t_runs;
 
 layout(location = 0) out vec4 out_row;
@@ -37,12 +36,6 @@ vec4 ranked_run(int rank) {
         last_index = best_index;
     }
     return last;
-}
-
-vec3 facet_tangent(uint facet, int which) {
-    int entry = 2 * int(facet) + which;
-    int width = textureSize(t_facets, 0).x;
-    return texelFetch(t_facets, ivec2(entry % width, entry / width), 0).xyz;
 }
 
 Texel texel_at(ivec2 px) { return load_texel(t_position_area, t_normal_ids, px); }
@@ -89,11 +82,11 @@ Shooter shooter_from_patch(ivec2 corner_px) {
     Shooter s;
     s.size_px = 0;
     if (lead.area <= 0.0) return s;
-    vec3 dpdu = facet_tangent(lead.facet, 0), dpdv = facet_tangent(lead.facet, 1);
+    vec3 dpdu = facet_entry(lead.facet, 0).xyz, dpdv = facet_entry(lead.facet, 1).xyz;
     float texel_size = texelFetch(t_leaves, corner_px / TILE, 0).z;
     dpdu *= texel_size;
     dpdv *= texel_size;
-    float reach = patch_reach(dpdu, dpdv, size);
+    s.chart = chart_of(lead.facet);
     // the facet's own normal: the texels' packed ones tilt by 2^-15, enough to see what lies in the same plane
     s.normal = normalize(cross(dpdu, dpdv));
     if (dot(s.normal, lead.normal) < 0.0) s.normal = -s.normal;
@@ -105,7 +98,7 @@ Shooter shooter_from_patch(ivec2 corner_px) {
     for (int i = 0; i < size * size; ++i) {
         ivec2 at = ivec2(i % size, i / size), px = corner_px + at;
         Texel texel = texel_at(px);
-        if (!belongs(texel, s.normal, lead.position, reach)) continue;
+        if (!belongs(texel, s.normal, s.chart)) continue;
         vec3 r = texelFetch(t_residual, px, 0).rgb;
         area += texel.area;
         flux += r * texel.area;
@@ -122,8 +115,6 @@ Shooter shooter_from_patch(ivec2 corner_px) {
     s.facet = lead.facet;
     s.patch_px = corner_px;
     s.size_px = size;
-    s.lead = lead.position;
-    s.reach = reach;
 
     // see from the middle of the residual, or where that may lie inside or under something, from the texel that leads
     s.origin = whole ? power_centre / power : lead.position;

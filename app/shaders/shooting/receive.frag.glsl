@@ -17,6 +17,7 @@ flat in vec3 v_normal;
 flat in float v_facet;
 flat in vec3 v_albedo;
 #else
+#include "shooting/belongs.glsl"
 uniform int u_own;  // whether patches are still where they shot from
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
@@ -45,7 +46,7 @@ void main() {
     Texel texel = load_texel(t_position_area, t_normal_ids, texel_px);
     vec3 position = texel.position, normal = texel.normal;
     vec3 albedo = albedo_of(t_materials, texel.material, texel_px);
-    float facet = float(texel.facet);
+    float facet = float(texel.facet), chart = chart_of(texel.facet);
 #endif
     vec3 light = vec3(0.0);
     vec2 share = vec2(0.0);
@@ -56,9 +57,9 @@ void main() {
         Shooter s = shooter_of(shot);
         vec2 FV = received(position, normal, facet, s, shot);
 #if !FLAT
-        // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it
-        bool own = u_own != 0 && all(lessThan(uvec2(texel_px - s.patch_px), uvec2(s.size_px)));
-        FV = own || texel.area <= 0.0 ? vec2(0.0) : FV;
+        // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it. Another chart in it is no part of it.
+        bool within = u_own != 0 && all(lessThan(uvec2(texel_px - s.patch_px), uvec2(s.size_px)));
+        FV = within && chart == s.chart || texel.area <= 0.0 ? vec2(0.0) : FV;
 #endif
         light += s.exitance * FV.x * FV.y;
         share += dot(abs(s.exitance), vec3(1.0)) * FV.x * vec2(FV.y, 1.0);

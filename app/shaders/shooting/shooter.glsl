@@ -10,11 +10,10 @@ struct Shooter {
     vec3 exitance;   // mean residual r_i, stored units
     ivec2 patch_px;  // lower corner of the patch in the node set [texels]
     int size_px;     // edge of the patch [texels]; 0: no shot
-    vec3 lead;       // position of its strongest texel
-    float reach;     // texels further from it do not belong to the shooter
+    float chart;     // texels of others do not belong to the shooter
 };
 
-const int SHOOTER_ROWS = 7;
+const int SHOOTER_ROWS = 6;
 
 Shooter shooter_from_rows(vec4 rows[SHOOTER_ROWS]) {
     Shooter s;
@@ -23,24 +22,22 @@ Shooter shooter_from_rows(vec4 rows[SHOOTER_ROWS]) {
     s.normal = rows[1].xyz;
     s.facet = uint(rows[1].w);
     s.centre = rows[2].xyz;
+    s.chart = rows[2].w;
     s.edge_u = rows[3].xyz;
     s.edge_v = rows[4].xyz;
     s.patch_px = ivec2(rows[3].w, rows[4].w);
     s.exitance = rows[5].xyz;
     s.size_px = int(rows[5].w);
-    s.lead = rows[6].xyz;
-    s.reach = rows[6].w;
     return s;
 }
 
 vec4 shooter_row(Shooter s, int row) {
     if (row == 0) return vec4(s.origin, s.area);
     if (row == 1) return vec4(s.normal, float(s.facet));
-    if (row == 2) return vec4(s.centre, 0.0);
+    if (row == 2) return vec4(s.centre, s.chart);
     if (row == 3) return vec4(s.edge_u, float(s.patch_px.x));
     if (row == 4) return vec4(s.edge_v, float(s.patch_px.y));
-    if (row == 5) return vec4(s.exitance, float(s.size_px));
-    return vec4(s.lead, s.reach);
+    return vec4(s.exitance, float(s.size_px));
 }
 
 Shooter load_shooter(sampler2D shooters, int shot) {

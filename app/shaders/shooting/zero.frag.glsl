@@ -15,6 +15,6 @@ layout(location = 0) out vec4 out_residual;
 void main() {
     Shooter s = load_shooter(t_shooters, v_shot);
     Texel texel = load_texel(t_position_area, t_normal_ids, ivec2(gl_FragCoord.xy));
-    if (!belongs(texel, s.normal, s.lead, s.reach)) discard;
+    if (!belongs(texel, s.normal, s.chart)) discard;
     out_residual = vec4(0.0);
 }

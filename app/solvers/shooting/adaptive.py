@@ -10,7 +10,7 @@ A leaf that came late inherited interpolated light from earlier shots: reshootin
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from app.atlas.lightmap import Lightmap
 from app.atlas.quadtree import FIRST_ROOM, Change, Quadtree, Tile
 from app.atlas.regrow import Regrowth
-from app.gpu import Framebuffer, Gpu, Pass, ReadBack, Texture
+from app.gpu import Gpu, Pass, ReadBack
 from app.scene.model import Material
 from app.solvers.shooting.options import TREE, ShootingOptions
 from app.solvers.shooting.reshooting import Reshooting
-from app.solvers.shooting.stages import BATCH, ROOT_LEVEL
+from app.solvers.shooting.shot import rows_of
+from app.solvers.shooting.stages import ROOT_LEVEL
 
 # A second difference of smooth light grows fourfold when texels double: leaves merge below a quarter of the threshold, and half
 # of that again, so that what was merged is not split at once.
@@ -41,7 +42,6 @@ class AdaptiveShooting(Reshooting):
         self.tree = Quadtree(lightmap.nodes)
         self._regrowth = Regrowth(gpu, lightmap)
         self._judge = Pass(gpu, "shooting/judge", defines=lightmap.defines("TILE"))
-        self._roughness, self._roughness_target = self._slots(gpu, lightmap)
         self._judged: tuple[int, ReadBack] | None = None  # on its way, and the version of the leaves that it is of
         self._look_at = 0
         self._split_at: dict[Tile, int] = {}  # shots in the log when a leaf was split
@@ -50,6 +50,7 @@ class AdaptiveShooting(Reshooting):
             0,
         )  # whether the last look at the leaves found nothing to do; shots in the log then
         super().__init__(gpu, lightmap, options)
+        self._roughness, self._roughness_target = self._texels(per_slot=True)
 
     # -- the solver's interface ----------------------------------------------------------------------------------------
 
@@ -69,6 +70,7 @@ class AdaptiveShooting(Reshooting):
         self.options = options
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
+        self.finish()
         self._look_anew()
         super().set_materials(materials)
 
@@ -79,30 +81,27 @@ class AdaptiveShooting(Reshooting):
         judged = self._calm and not (done and self._calm_at < self._log.count)  # once more at the end
         return judged and not self._fresh and self._redo_under_way is None
 
-    def step(self, shots: int) -> int:
-        """First what there is to do for fresh leaves, a batch of earlier shots at a time, then shots while light is left."""
+    def _parts(self, shots: int, bands: int) -> Generator[None, None, int]:
+        """First what there is to do for fresh leaves, a batch of earlier shots at a time, then shots while light is left; not
+        until the leaves have followed a slider that was moved."""
         made = 0
         done = bool(self._log.count) and self.report.residual <= self.options.residual
         if self._redo_under_way is not None:
-            made = self._redo()
+            made = yield from self._redo(bands)
             if self._redo_under_way is None:
                 self._drop_judged()  # by the light that leaves had inherited
                 self._calm = False
         elif self._fresh and (self._calm if done or self._all_again else self._redo_pays):
-            made = self._begin_redo()
-        elif not done:
-            made = super().step(shots)
+            self._begin_redo()
+        elif not done and (self._calm or not self._all_again):
+            made = yield from super()._parts(shots, bands)
         if self._redo_under_way is None and (not self._calm or done or self._log.count >= self._look_at):
-            self._look(PER_SHOT * min(shots, BATCH))
+            yield
+            yield from self._look(PER_SHOT * shots, bands)
             if self._judged is None:
                 self._look_at = self._log.count + max(LOOK_AFTER, self._log.count // 4)
         self._all_again &= not self.settled
         return made or shots
-
-    def step_part(self, bands: int) -> bool:
-        """A whole step: leaves follow the light, and there are few."""
-        self.step(1)
-        return True
 
     def _patch_level(self, slot: int) -> int:
         """Patches are about as large in the scene in leaves of every level."""
@@ -122,11 +121,13 @@ class AdaptiveShooting(Reshooting):
 
     # -- judging and growing -------------------------------------------------------------------------------------------
 
-    def _look(self, most: int) -> None:
-        """Judge all leaves; at the next look act on the judgement, which has arrived, on so many of them at most. One look does
-        one of both: a frame has time for either."""
+    def _look(self, most: int, bands: int) -> Iterator[None]:
+        """Judge all leaves, in parts; at the next look act on the judgement, which has arrived, on so many of them at most. One
+        look does one of both: a frame has time for either."""
         if self._judged is None:
-            self._weigh_leaves()
+            for band in range(bands):
+                self._weigh_leaves(band, bands)
+                yield
             self._judged = self.lightmap.version, ReadBack(self.gpu, self._roughness_target)
             return
         (version, readback), self._judged = self._judged, None
@@ -143,9 +144,11 @@ class AdaptiveShooting(Reshooting):
         self._calm, self._look_at = False, 0
         self._split_at.clear()
 
-    def _weigh_leaves(self) -> None:
+    def _weigh_leaves(self, band: int = 0, bands: int = 1) -> None:
         self._judge.draw(
-            self._roughness_target, textures=self.lightmap.textures("t_position_area", "t_irradiance", "t_residual")
+            self._roughness_target,
+            textures=self.lightmap.textures("t_position_area", "t_irradiance", "t_residual"),
+            scissor=rows_of(self._roughness.size, band, bands),
         )
 
     def _grow_and_back(self) -> None:
@@ -212,15 +215,9 @@ class AdaptiveShooting(Reshooting):
         self.lightmap.resize(moves)
         self._resized(moves)
         self.gpu.release_all(self._roughness_target, self._roughness)
-        self._roughness, self._roughness_target = self._slots(self.gpu, self.lightmap)
+        self._roughness, self._roughness_target = self._texels(per_slot=True)
         self.buffers.resize(self.lightmap, moves)
         self.stages.resize(self.lightmap)
-
-    @staticmethod
-    def _slots(gpu: Gpu, lightmap: Lightmap) -> tuple[Texture, Framebuffer]:
-        """A texel for each slot of the node set."""
-        texture = gpu.texture((lightmap.columns, lightmap.rows), 4, "f4")
-        return texture, gpu.target(texture)
 
     def _opinion(self, judged: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which leaves should split, and which need not be as fine as they are."""

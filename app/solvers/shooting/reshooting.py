@@ -14,7 +14,7 @@ asked for other leaves, the weak ones follow: with H - S for H.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +26,7 @@ from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.scene.model import F64, Material
 from app.solvers.shooting.log import ShotLog
 from app.solvers.shooting.options import ShootingOptions
-from app.solvers.shooting.shot import powers_of
+from app.solvers.shooting.shot import powers_of, rows_of
 from app.solvers.shooting.stages import REPORT_HEAD, ChoiceStages
 from app.solvers.shooting.uniform import UniformShooting
 
@@ -76,11 +76,13 @@ class Reshooting(UniformShooting):
 
     def set_options(self, options: ShootingOptions) -> None:
         """As of any solver; a redo begins again, all with the same options."""
+        self.finish()
         self._end_redo()
         super().set_options(options)
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """As of any solver; shots of the difference may be strong again."""
+        self.finish()
         self._end_redo()
         self._forget_strong()
         super().set_materials(materials)
@@ -97,9 +99,9 @@ class Reshooting(UniformShooting):
         super()._scale_light(factor)
         self._log.scale(factor)
 
-    def _choose(self, shots: int) -> Iterator[None]:
+    def _choose(self, shots: int, bands: int) -> Iterator[None]:
         """The batch; once only weak ones are left, H is kept as S."""
-        yield from super()._choose(shots)
+        yield from super()._choose(shots, bands)
         if self._weak and self._strong is None and self.lightmap.storage != "fixed8":
             self._strong, self._strong_shots = self._texels(), self._log.count
             H = self.lightmap.texture("t_irradiance")
@@ -141,9 +143,10 @@ class Reshooting(UniformShooting):
         now = dict(zip(moves.old.tolist(), moves.new.tolist(), strict=True))
         self._fresh = {now.get(slot, slot) for slot in self._fresh}
 
-    def _texels(self) -> tuple[Texture, Framebuffer]:
-        """As large as the node set."""
-        texture = self.gpu.texture(self.lightmap.size, 4, "f4")
+    def _texels(self, *, per_slot: bool = False) -> tuple[Texture, Framebuffer]:
+        """As large as the node set, or one for each of its slots."""
+        size = (self.lightmap.columns, self.lightmap.rows) if per_slot else self.lightmap.size
+        texture = self.gpu.texture(size, 4, "f4")
         return texture, self.gpu.target(texture)
 
     def _forget_strong(self) -> None:
@@ -158,23 +161,34 @@ class Reshooting(UniformShooting):
         """Whether so many shots were made since the last time that it costs little beside them."""
         return self._log.count >= self._redone_at + REDO_AFTER * self._redone
 
-    def _begin_redo(self) -> int:
-        """Into all fresh leaves. How many shots."""
+    def _begin_redo(self) -> None:
+        """Into all fresh leaves."""
         slots = np.array(sorted(self._fresh), np.int64)
         end = self._log.count if self._strong is None else self._strong_shots
         self._redo_under_way = _Redo(self.gpu, self.lightmap, slots, end)
         self._take_back(self._redo_under_way)
-        return self._redo()
 
-    def _redo(self) -> int:
-        """One batch of the log once more, for fresh leaves only; after the last, its sum takes its place. How many shots."""
+    def _redo(self, bands: int) -> Generator[None, None, int]:
+        """One batch of the log once more, for fresh leaves only, in parts; after the last, its sum takes its place. How many
+        shots."""
         redo = self._redo_under_way
         assert redo is not None
         if redo.next < redo.end:
             shots = min(self._log.recall(self.buffers, redo.next), redo.end - redo.next)
             for first, some in self.stages.groups(shots):
                 self._see(first, some)
-                self._receive(self._correction_target, first, some, blend="add", meshes=redo.receivers, own=False)
+                yield
+                for band in range(bands):
+                    self._receive(
+                        self._correction_target,
+                        first,
+                        some,
+                        blend="add",
+                        meshes=redo.receivers,
+                        rows=rows_of(self.lightmap.size, band, bands),
+                        own=False,
+                    )
+                    yield
             redo.next += shots
             return shots
         self._put_right(redo)

@@ -21,8 +21,19 @@ from app.atlas.lightmap import Lightmap
 from app.gpu import Buffer, Framebuffer, Gpu, Mesh
 from app.scene.model import F64
 from app.solvers.shooting.options import ShootingOptions
-from app.solvers.shooting.stages import BATCH, BLOCK_BYTES, OPEN, SHOOTER_ROWS, ChoiceStages, ShotBuffers, ShotStages
+from app.solvers.shooting.stages import (
+    BATCH,
+    BLOCK_BYTES,
+    BLOCK_ROWS,
+    OPEN,
+    SHOOTER_ROWS,
+    ChoiceStages,
+    Maps,
+    ShotBuffers,
+    ShotStages,
+)
 
+Blocks = dict[str, tuple[Buffer, int, int]]  # what a pass binds: buffer, offset and size [bytes]
 # The shots of a batch that holds so large a share of the emitted power are audited before they shoot; where one would make or
 # lose more than this share of its own, its patch is split. Most light is shot by few patches: a hall under skylights in coffers
 # gains 5.8 % without.
@@ -32,7 +43,8 @@ AUDITED, SOUND = 0.02, 0.02
 @dataclass(frozen=True)
 class Shot:
     """The shooter of one shot: centre [m], unit normal, area [m²], lower corner (x, y) and edge of its patch in the node set as
-    it is then [texels], and (u, v, u, v) of it in the virtual atlas [texels of level 0]."""
+    it is then [texels], and (u, v, u, v) of it in the virtual atlas [texels of level 0]; rows (SHOOTER_ROWS, 4): all of it, see
+    shooter.glsl."""
 
     centre: F64
     normal: F64
@@ -40,6 +52,7 @@ class Shot:
     corner: tuple[int, int]
     size: int
     rect: tuple[float, float, float, float]
+    rows: F64
 
 
 @dataclass(frozen=True)
@@ -78,6 +91,13 @@ def powers_of(rows: F64) -> F64:
     return np.asarray(rows[:, 0, 3] * np.abs(rows[:, 5, :3]).sum(-1))
 
 
+def rows_of(size: tuple[int, int], band: int, bands: int) -> tuple[int, int, int, int] | None:
+    """One of so many bands of a target of this size as a scissor (x, y, width, height) [px]; None for all of it."""
+    width, height = size
+    lower, upper = (height * nth // bands for nth in (band, band + 1))
+    return None if bands == 1 else (0, lower, width, upper - lower)
+
+
 class ShotPasses:
     """What a shot is made of. Whoever shoots owns the lightmap's light, sets these and says when."""
 
@@ -95,14 +115,18 @@ class ShotPasses:
         for first, some in self.stages.groups(shots):
             part(first, some)
 
-    def _choose(self, shots: int) -> Iterator[None]:
+    def _choose(self, shots: int, bands: int) -> Iterator[None]:
         """The strongest patches, those that fail their audit split; in parts. [Coombe03, 3.4]"""
-        self._pick(shots)
+        yield from self._pick(shots, bands)
         while self._audits and (yield from self._fails(shots)):
-            self._pick(shots)
+            yield from self._pick(shots, bands)
 
-    def _pick(self, shots: int) -> None:
-        self._weigh(self._choice)
+    def _pick(self, shots: int, bands: int = 1) -> Generator[None, None, None]:
+        """The strongest patches, all texels read in so many bands."""
+        for band in range(bands):
+            self._add_patches(self._choice, band, bands)
+            yield
+        self._add_runs(self._choice)
         self._describe(self._choice, shots)
 
     def _zero(self, shots: int) -> None:
@@ -110,7 +134,8 @@ class ShotPasses:
         lightmap, buffers = self.lightmap, self.buffers
         self.stages.zero.draw(
             lightmap.residual_target,
-            textures=lightmap.textures("t_position_area", "t_normal_ids") | {"t_shooters": buffers.shooters},
+            textures=lightmap.textures("t_position_area", "t_normal_ids", "t_facets")
+            | {"t_shooters": buffers.shooters},
             uniforms={"u_size": lightmap.size},
             vertices=4,
             instances=shots,
@@ -153,10 +178,17 @@ class ShotPasses:
         rows = np.frombuffer(self.buffers.shooters.read(), np.float32).reshape(BATCH, -1, 4)
         return rows[:shots, :SHOOTER_ROWS].astype(np.float64)
 
-    def _weigh(self, choice: ChoiceStages) -> None:
-        """Residual power of every patch of this level, and the strongest of each run of slots."""
+    def _add_patches(self, choice: ChoiceStages, band: int = 0, bands: int = 1) -> None:
+        """Residual power of every patch of this level, or of those in one of so many bands."""
         textures = self.lightmap.textures("t_position_area", "t_residual", "t_leaves")
-        choice.add_patches.draw(choice.patch_target, textures=textures | {"t_finer": self.buffers.finer})
+        choice.add_patches.draw(
+            choice.patch_target,
+            textures=textures | {"t_finer": self.buffers.finer},
+            scissor=rows_of(choice.patches.size, band, bands),
+        )
+
+    def _add_runs(self, choice: ChoiceStages) -> None:
+        """The strongest patch of each run of slots, and the power of all."""
         choice.add_runs.draw(
             self.buffers.run_target,
             textures={"t_patches": choice.patches},
@@ -173,9 +205,10 @@ class ShotPasses:
         )
         self.buffers.shooter_target.read_into(self.buffers.shooter_blocks, components=4, dtype="f4")
 
-    def _see(self, first: int, shots: int) -> None:
-        """Item buffer and depth from so many shooters of the batch, all views in one draw. [Coombe03, 3.2; Cohen85]"""
-        maps = self.stages.maps
+    def _see(self, first: int, shots: int, maps: Maps | None = None, shooters: Blocks | None = None) -> None:
+        """Item buffer and depth from so many shooters of the batch, all views in one draw; or of others, into other maps.
+        [Coombe03, 3.2; Cohen85]"""
+        maps, shooters = maps or self.stages.maps, shooters or self._shooter_blocks
         used = None if shots == maps.count else (0, 0, maps.items.width, shots * maps.map_size[1])
         maps.target.clear(OPEN, depth=1.0, viewport=used)
         projection, occluders = self.stages.projection, self.buffers.occluders
@@ -184,7 +217,7 @@ class ShotPasses:
             maps.target,
             textures=casters.textures,
             uniforms={"u_maps": maps.count, "u_first": first},
-            blocks=self._shooter_blocks,
+            blocks=shooters,
             mesh=casters.mesh,
             vertices=casters.vertices,
             instances=projection.views * shots,
@@ -195,18 +228,16 @@ class ShotPasses:
             maps.target,
             textures={"t_triangles": occluders.texture},
             uniforms={"u_maps": maps.count, "u_first": first},
-            blocks=self._shooter_blocks,
+            blocks=shooters,
             vertices=occluders.count,
             instances=shots,
             points=True,
             depth=True,
         )
 
-    def _light(self, first: int, shots: int, start: float = 0.0, end: float = 1.0) -> None:
-        """Receive into the lightmap, in the rows between two shares of its height."""
-        width, height = self.lightmap.size
-        lower, upper = round(start * height), round(end * height)
-        rows = None if upper - lower == height else (0, lower, width, upper - lower)
+    def _light(self, first: int, shots: int, band: int = 0, bands: int = 1) -> None:
+        """Receive into the lightmap, or into one of so many bands."""
+        rows = rows_of(self.lightmap.size, band, bands)
         self._receive(self.lightmap.light_target, first, shots, blend="add", rows=rows)
 
     def _receive(
@@ -224,7 +255,7 @@ class ShotPasses:
 
         own: whether patches still are where they shot from, and do not light themselves."""
         lightmap = self.lightmap
-        shaped = lightmap.textures("t_position_area", "t_normal_ids")
+        shaped = lightmap.textures("t_position_area", "t_normal_ids", "t_facets")
         meshes = lightmap.receivers if meshes is None else meshes
         for (flat, _), receive in self.stages.receive.items():
             if flat not in meshes:
@@ -242,8 +273,15 @@ class ShotPasses:
             )
 
     @property
-    def _shooter_blocks(self) -> dict[str, tuple[Buffer, int, int]]:
+    def _shooter_blocks(self) -> Blocks:
         return {"ShooterBlock": (self.buffers.shooter_blocks, 0, BATCH * BLOCK_BYTES)}
+
+    def _shooter_alone(self, shot: Shot) -> Blocks:
+        """One shooter, in whatever batch it shot."""
+        rows = np.zeros((BLOCK_ROWS, 4), np.float32)
+        rows[: len(shot.rows)] = shot.rows
+        self.buffers.inspected_block.write(rows.tobytes())
+        return {"ShooterBlock": (self.buffers.inspected_block, 0, BATCH * BLOCK_BYTES)}
 
     def _look_out(self, first: int, shots: int) -> None:
         """Add up how much of the shooters' sight leaves the scene."""
@@ -270,16 +308,15 @@ class ShotPasses:
         frame, corner, edge = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3])), int(rows[5, 3])
         area = float(rows[0, 3]) * frame.scale**2
         rect = self.lightmap.nodes.atlas_rect(corner, edge)
-        return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, edge, rect)
+        return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, edge, rect, rows[:SHOOTER_ROWS])
 
     @property
     def _watt(self) -> float:
         """Watts in one stored unit of power: lightmap unit [W/m²] times solver area."""
         return self.lightmap.unit * self.lightmap.frame.scale**2
 
-    def vanished(self) -> int:
-        """Triangles that the first shooter of the last step sees, but between the samples of its map: each was drawn as one
-        sample. Waits for the GPU."""
+    def _count_vanished(self, shot: Shot) -> int:
+        """Triangles that it sees, but between the samples of its map. Waits for the GPU."""
         texture = self.gpu.texture((1, 1), 1, "f4")
         target = self.gpu.target(texture)
         target.clear()
@@ -287,7 +324,7 @@ class ShotPasses:
             target,
             textures={"t_triangles": self.buffers.occluders.texture},
             uniforms={"u_maps": 1, "u_first": 0},
-            blocks=self._shooter_blocks,
+            blocks=self._shooter_alone(shot),
             vertices=self.buffers.occluders.count,
             points=True,
             blend="add",

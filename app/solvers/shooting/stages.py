@@ -16,7 +16,7 @@ from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOption
 BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
 RUNS = 64  # at least, of slots: a batch is chosen from the strongest patch of each
 OPEN = 0.0  # item of the open background, see common/item.glsl
-SHOOTER_ROWS = 7  # texels that describe one shooter, see shooter.glsl
+SHOOTER_ROWS = 6  # texels that describe one shooter, see shooter.glsl
 BLOCK_BYTES = 256  # no driver asks for a coarser uniform block alignment
 BLOCK_ROWS = BLOCK_BYTES // 16  # texels in a row of t_shooters: one shooter, padded to a uniform block
 REPORT_HEAD = 2  # texels of the report before those of its first shooter, see report.frag.glsl
@@ -44,6 +44,7 @@ class ShotBuffers:
         self._gpu, self._tile = gpu, lightmap.nodes.tile
         self.shooters = gpu.texture((BLOCK_ROWS, BATCH), 4, "f4")
         self.shooter_blocks = gpu.buffer(BATCH * BLOCK_BYTES)  # the same, as uniforms
+        self.inspected_block = gpu.buffer(BATCH * BLOCK_BYTES)  # the first is a shooter that is looked at by itself
         self.ledger = gpu.texture((BATCH, 2), 4, "f4")
         self.occluders = Occluders(gpu, lightmap)
         self.report = gpu.texture((REPORT_HEAD + SHOOTER_ROWS, 1), 4, "f4")
@@ -186,6 +187,7 @@ class ShotStages:
         width, height = self.map_size = self.projection.size(self.resolution)
         self.most_maps = max(1, min(BATCH, MAPS_TEXELS // (width * height)))
         self.maps = Maps(gpu, self.map_size, 1)
+        self._inspected: Maps | None = None
         self.weights = gpu.texture((width // 4, height // 4), 4, "f4")  # see weights.frag.glsl
 
         resolution = {"RESOLUTION": self.resolution}
@@ -221,6 +223,12 @@ class ShotStages:
         """What a receiver looks its visibility up in."""
         items = {"t_items": self.maps.items}
         return items if self._visibility == "item-id" else items | {"t_depth": self.maps.depth}
+
+    @property
+    def inspected(self) -> Maps:
+        """One map beside those of a step, which may be under way."""
+        self._inspected = self._inspected or Maps(self._gpu, self.map_size, 1)
+        return self._inspected
 
     def groups(self, shots: int) -> list[tuple[int, int]]:
         """(first, count) of those shots of a batch that see the scene at once; makes room for their maps."""

@@ -14,18 +14,19 @@ Works badly where the middle of a patch sees something else than the rest of it 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import replace
 
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, ReadBack, Texture
+from app.parts import whole
 from app.scene.model import F64, Material
 from app.solvers.base import EnergyBook, StepReport
 from app.solvers.shooting.options import ShootingOptions, highest_level
 from app.solvers.shooting.shot import Audit, AuditTargets, Shot, ShotPasses, powers_of
-from app.solvers.shooting.stages import BATCH, REPORT_HEAD, ChoiceStages, ShotBuffers, ShotStages
+from app.solvers.shooting.stages import BATCH, OPEN, REPORT_HEAD, ChoiceStages, ShotBuffers, ShotStages
 
 # With ``coarsen``, a shot should carry this share of the emitted power: about 4096 shots for each time that all light is
 # reflected, whatever the scene's size. Measured on the Cornell box: a quarter of the shots, error 1.8 % -> 2.4 %.
@@ -47,7 +48,7 @@ class UniformShooting(ShotPasses):
         self.buffers = ShotBuffers(gpu, lightmap)
         self.stages = self._make_stages(options)
         self.last_shot: Shot | None = None
-        self._under_way: Iterator[None] | None = None
+        self._under_way: Generator[None, None, int] | None = None
         self._reports: deque[tuple[ChoiceStages, ReadBack]] = deque()
         self.reset()
 
@@ -120,7 +121,8 @@ class UniformShooting(ShotPasses):
     def unshot_share(self) -> float:
         """The residual now, Σ |r A| over patches, as a share of the emitted power. Waits for the GPU."""
         self.finish()
-        self._weigh(self._choice)
+        self._add_patches(self._choice)
+        self._add_runs(self._choice)
         runs = np.frombuffer(self.buffers.runs.read(), np.float32).reshape(-1, 4)[:, 3].astype(np.float64)
         emitted = self._emitted.sum()
         return float(runs.sum()) * self._watt / emitted if emitted > 0 else 0.0
@@ -129,18 +131,14 @@ class UniformShooting(ShotPasses):
         """Make up to ``shots`` shots (at most BATCH), the strongest patches first. Returns how many were issued: of a batch,
         those too weak beside its best are left for later, and not counted once ``poll`` has heard of it."""
         self.finish()
-        shots = min(shots, BATCH)
-        for _ in self._parts(shots, 1):
-            pass
-        return shots
+        return whole(self._parts(min(shots, BATCH), 1))
 
     def step_part(self, bands: int) -> bool:
         """A part of one shot, its receivers in so many bands; whether the shot is whole now. What needs whole shots finishes it
         first."""
-        if self._under_way is None:
-            self._under_way = self._parts(1, bands)
-        if next(self._under_way, WHOLE) is WHOLE:
-            self._under_way = None
+        parts, self._under_way = self._under_way or self._parts(1, bands), None  # a part may itself need what is whole
+        if next(parts, WHOLE) is not WHOLE:
+            self._under_way = parts
         return self._under_way is None
 
     def finish(self) -> None:
@@ -192,7 +190,7 @@ class UniformShooting(ShotPasses):
         """Each part of a step by itself, to be timed. They leave the light wrong: reset afterwards."""
         shots = min(shots, BATCH)
         return {
-            "choose": lambda: self._pick(shots),
+            "choose": lambda: whole(self._pick(shots)),
             "zero": lambda: self._zero(shots),
             "see": lambda: self._for_groups(self._see, shots),
             "receive": lambda: self._for_groups(self._light, shots),
@@ -215,9 +213,21 @@ class UniformShooting(ShotPasses):
     def resolution(self) -> int:
         return self.stages.resolution
 
-    def inspect(self) -> dict[str, Texture]:
-        """What the first shot of the last step saw, in the lowest of the maps that lie above each other."""
-        return {"items": self.stages.maps.items, "depth": self.stages.maps.depth}
+    def inspect(self, shot: Shot | None = None) -> dict[str, Texture]:
+        """What ``last_shot`` or another one sees. Drawn for this: the maps of a step are those of whatever it did last, and in
+        use while it is under way."""
+        maps, shot = self.stages.inspected, shot or self.last_shot
+        if shot is None:
+            maps.target.clear(OPEN, depth=1.0)
+        else:
+            self._see(0, 1, maps, self._shooter_alone(shot))
+        return {"items": maps.items, "depth": maps.depth}
+
+    def vanished(self, shot: Shot | None = None) -> int:
+        """Triangles that ``last_shot`` or another one sees, but between the samples of its map: each is drawn as one sample.
+        Waits for the GPU."""
+        shot = shot or self.last_shot
+        return 0 if shot is None else self._count_vanished(shot)
 
     def release(self) -> None:
         self._drop_reports()
@@ -226,21 +236,22 @@ class UniformShooting(ShotPasses):
 
     # -- one shot ------------------------------------------------------------------------------------------------------
 
-    def _parts(self, shots: int, bands: int) -> Iterator[None]:
-        """A step, from choosing to the report. [Coombe03, 3]"""
-        yield from self._choose(shots)
+    def _parts(self, shots: int, bands: int) -> Generator[None, None, int]:
+        """A step, from choosing to the report, its longest passes in so many bands; how many shots. [Coombe03, 3]"""
+        yield from self._choose(shots, bands)
         self._zero(shots)
         yield
         for first, some in self.stages.groups(shots):
             self._see(first, some)
             yield
             for band in range(bands):
-                self._light(first, some, band / bands, (band + 1) / bands)
+                self._light(first, some, band, bands)
                 yield
             self._look_out(first, some)
         self._book(shots)
         self.shots += shots
         self._tell()
+        return shots
 
     # -- what the host hears -------------------------------------------------------------------------------------------
 

@@ -1,0 +1,29 @@
+"""What measurements were made on."""
+
+from __future__ import annotations
+
+import os
+import platform
+from pathlib import Path
+
+
+def machine() -> str:
+    """Processor, cores and system."""
+    return f"{processor()}, {os.cpu_count()} cores, {platform.platform()}"
+
+
+def processor() -> str:
+    """Its name, as far as the system says."""
+    model = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.is_file():
+        names = [
+            line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if line[:10] == "model name"
+        ]
+        model = names[0] if names else model
+    return model
+
+
+def load() -> float | None:
+    """How many processes wanted a core in the minute before this run; None where the system does not say."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None

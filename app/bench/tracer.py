@@ -1,0 +1,195 @@
+"""Irradiance at points by path tracing; the one module that needs mitsuba, which only the extra ``peers`` installs.
+
+    E(x) = ∫ L(x, ω) cos θ dω = π · mean of L(x, ω) over directions with density cos θ / π
+
+L by a path of diffuse bounces. At each of its points a lamp is sampled too, and the two ways of finding light are weighed by the
+balance heuristic [Veach95]; Russian roulette ends paths without bias. Mitsuba 3 intersects rays, samples lamps and looks up
+textures; the scene is ours, sides and all. Works badly where light arrives only through small gaps or by way of a lit corner.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from app.atlas.sides import scene_size
+from app.errors import UserError
+from app.scene.model import F64, RGB, Material, Scene, Texture
+
+__all__ = ["GAP", "Tracer", "description"]
+
+LLVM = (16, 0, 0)  # older ones end the process at minima and maxima of single floats
+SIZE = 100.0  # diagonal of the scene as it is traced
+GAP = 5e-6  # share of the diagonal by which rays start above their surface: 40 units in the last place at the scene's edge
+RAYS = 1 << 20  # at a time
+ROULETTE = 5  # bounces, after which paths may end by chance
+SURVIVES = 0.95  # at most, then
+
+
+def description() -> str:
+    """Name, version and variant. Raises UserError where no variant runs here."""
+    return f"Mitsuba {mi.__version__} ({_variant()})"
+
+
+class Tracer:
+    """A scene to trace paths in. Raises UserError for what cannot be traced."""
+
+    def __init__(self, scene: Scene) -> None:
+        _variant()
+        low, high = scene.bounds
+        self._centre, self._scale = (low + high) / 2, SIZE / scene_size(scene)
+        shapes = [
+            shape
+            for k, material in enumerate(scene.materials)
+            if (scene.material_ids == k).any()
+            for shape in self._shapes(scene, k, material)
+        ]
+        self._scene = mi.load_dict({"type": "scene"} | {f"shape{i}": shape for i, shape in enumerate(shapes)})
+        self._sampler = mi.load_dict({"type": "independent"})
+
+    def irradiance(self, positions: F64, normals: F64, samples: int, seed: int) -> F64:
+        """(n, 3) [W/m²]: the mean of so many paths from each point (n, 3) [m] with normal (n, 3); the first directions of a
+        square number of them are stratified."""
+        side = int(np.sqrt(samples))
+        strata = side if side * side == samples else 1
+        points = mi.Point3f(((positions - self._centre) * self._scale).astype(np.float32).T)
+        point_normals = mi.Normal3f(normals.astype(np.float32).T)
+        out = np.empty((len(positions), 3))
+        most = max(1, RAYS // samples)
+        for first in range(0, len(positions), most):
+            count = min(most, len(positions) - first)
+            self._sampler.seed((seed * 1_000_003 + first) & 0xFFFFFFFF, count * samples)
+            # numbers opaque and arrays evaluated, else each call compiles another kernel
+            before, each, across = (dr.opaque(mi.UInt32, number) for number in (first, samples, strata))
+            path = dr.arange(mi.UInt32, count * samples)
+            x = dr.gather(mi.Point3f, points, before + path // each)
+            n = dr.gather(mi.Normal3f, point_normals, before + path // each)
+            corner = mi.Point2f(mi.Float(path % across), mi.Float(path // across % across))
+            u = (corner + self._sampler.next_2d()) / mi.Float(across)
+            dr.eval(x, n, u)
+            L = _trace(self._scene, self._sampler, x, n, u)
+            dr.eval(L)
+            for k, component in enumerate((L.x, L.y, L.z)):
+                estimates = np.array(component, np.float64).reshape(count, samples)
+                out[first : first + count, k] = np.pi * estimates.mean(axis=1)
+        return out
+
+    def _shapes(self, scene: Scene, k: int, material: Material) -> list[Any]:
+        """Meshes of one material. What emits on both sides is two sheets with a front each, closer than rays start above them."""
+        if not (material.emits and material.double_sided):
+            return [self._mesh(scene, k, material, double_sided=material.double_sided)]
+        return [self._mesh(scene, k, material, double_sided=False, sheet=sheet) for sheet in (1, -1)]
+
+    def _mesh(self, scene: Scene, k: int, material: Material, *, double_sided: bool, sheet: int = 0) -> Any:
+        mine = scene.material_ids == k
+        corners = (scene.corners[mine] - self._centre) * self._scale
+        corners += sheet * 0.5 * GAP * SIZE * scene.normals_areas[0][mine][:, None]
+        order = slice(None, None, -1 if sheet < 0 else 1)
+        props = mi.Properties()
+        bsdf = {"type": "diffuse", "reflectance": _colours(material.albedo, material.albedo_texture)}
+        props["bsdf"] = mi.load_dict({"type": "twosided", "bsdf": bsdf} if double_sided else bsdf)
+        if material.emits:
+            radiance = _colours(material.emission, material.emission_texture)
+            props["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
+        props["face_normals"] = True
+        count = int(mine.sum())
+        mesh = mi.Mesh("", vertex_count=3 * count, face_count=count, has_vertex_texcoords=True, props=props)
+        parameters = mi.traverse(mesh)
+        parameters["vertex_positions"] = corners[:, order].astype(np.float32).ravel()
+        parameters["vertex_texcoords"] = _texcoords(scene, material)[mine][:, order].astype(np.float32).ravel()
+        parameters["faces"] = np.arange(3 * count, dtype=np.uint32)
+        parameters.update()
+        return mesh
+
+
+def _variant() -> str:
+    """Select a variant of mitsuba that runs here. Raises UserError."""
+    if dr.has_backend(dr.JitBackend.LLVM) and dr.detail.llvm_version() >= LLVM:
+        name = "llvm_ad_rgb"
+    elif dr.has_backend(dr.JitBackend.CUDA):
+        name = "cuda_ad_rgb"
+    else:
+        raise UserError(
+            f"mitsuba needs LLVM {LLVM[0]} or newer: install it, or set DRJIT_LIBLLVM_PATH to the file of its library"
+        )
+    mi.set_variant(name)
+    return name
+
+
+def _colours(factor: RGB, texture: Texture | None) -> dict[str, Any]:
+    """A colour, or a picture times a factor, as mitsuba takes it."""
+    if texture is None or max(factor) == 0.0:
+        return {"type": "rgb", "value": [float(x) for x in factor]}
+    if texture.wrap[0] != texture.wrap[1]:
+        raise UserError(f"texture {texture.name}: mitsuba repeats along u as along v, not {' and '.join(texture.wrap)}")
+    return {
+        "type": "bitmap",
+        "bitmap": mi.Bitmap(np.ascontiguousarray(texture.pixels * np.array(factor), np.float32)),
+        "raw": True,
+        "wrap_mode": texture.wrap[0],
+        "filter_type": "bilinear" if texture.bilinear else "nearest",
+    }
+
+
+def _texcoords(scene: Scene, material: Material) -> F64:
+    """(m, 3, 2), v = 0 at a picture's top."""
+    used = [t for t in (material.albedo_texture, material.emission_texture) if t is not None]
+    if not used:
+        return np.zeros((len(scene.triangles), 3, 2))
+    if any((t.uv_transform != used[0].uv_transform).any() or t.texcoord != used[0].texcoord for t in used):
+        raise UserError(f"material {material.name}: mitsuba takes one set of texture coordinates for all its textures")
+    uv = (scene.uv0, scene.uv1)[used[0].texcoord]
+    assert uv is not None, "a texture without coordinates"
+    return np.asarray(uv @ used[0].uv_transform[:, :2].T + used[0].uv_transform[:, 2])
+
+
+@dr.syntax
+def _trace(scene, sampler, x, n, u):  # type: ignore[no-untyped-def]  # runs on arrays that only mitsuba has types for
+    """Estimates of E/π at points x with normals n; u: what chooses the first direction."""
+    L, throughput = mi.Color3f(0), mi.Color3f(1)
+    x, n, u = mi.Point3f(x), mi.Normal3f(n), mi.Point2f(u)
+    bounces, active = mi.UInt32(0), mi.Bool(True)
+    while active:
+        origin = x + n * (GAP * SIZE)
+
+        # A point on a lamp
+        here = dr.zeros(mi.Interaction3f)
+        here.p, here.n = x, n
+        lamp, radiance = scene.sample_emitter_direction(here, sampler.next_2d(active), False, active)
+        towards = lamp.p + lamp.n * (GAP * SIZE) - origin
+        distance = dr.norm(towards)
+        cosine = dr.dot(n, lamp.d)
+        lit = active & (lamp.pdf > 0) & (cosine > 0) & (dr.dot(n, towards) > 0)
+        lit &= ~scene.ray_test(mi.Ray3f(origin, towards / distance, distance, 0.0, mi.Color0f()), lit)
+        density = cosine / dr.pi
+        L[lit] += throughput * radiance * density * lamp.pdf / (lamp.pdf + density)
+
+        # A direction by its cosine
+        local = mi.warp.square_to_cosine_hemisphere(u)
+        direction = mi.Frame3f(n).to_world(local)
+        hit = scene.ray_intersect(mi.Ray3f(origin, direction), active)
+        active &= hit.is_valid()
+        front = dr.dot(hit.n, direction) < 0
+        emitter = hit.emitter(scene, active)
+        glows = active & (emitter != None)  # noqa: E711  # an array of pointers
+        other = scene.pdf_emitter_direction(here, mi.DirectionSample3f(scene, hit, here), glows)
+        density = local.z / dr.pi
+        L[glows] += throughput * emitter.eval(hit, glows) * density / (density + other)
+
+        # What the surface there reflects
+        bsdf = hit.bsdf()
+        active &= front | mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
+        throughput *= bsdf.eval_diffuse_reflectance(hit, active)
+        bounces += 1
+        strongest = dr.max(throughput)
+        survives = dr.minimum(strongest, SURVIVES)
+        chance = bounces >= ROULETTE
+        active &= (strongest > 0) & (~chance | (sampler.next_1d(active) < survives))
+        throughput[chance] *= dr.rcp(survives)
+
+        x, n = mi.Point3f(hit.p), mi.Normal3f(dr.select(front, hit.n, -hit.n))
+        u = sampler.next_2d(active)
+    return L

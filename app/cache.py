@@ -1,0 +1,60 @@
+"""Answers that took long, kept as .npz files in the user's cache directory under a digest of all that they follow from."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import platformdirs
+from numpy.typing import NDArray
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def digest(label: bytes, arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Of a label and named arrays: shapes, types and contents. The label changes when the answer's format or its maker does."""
+    whole = hashlib.sha256(label)
+    for name, array in arrays.items():
+        whole.update(f"{name} {array.shape} {array.dtype}".encode() + np.ascontiguousarray(array).tobytes())
+    return whole.hexdigest()
+
+
+def entry(kind: str, name: str) -> Path:
+    """Where the answer of this digest is, or would be."""
+    return Path(platformdirs.user_cache_dir("glowtree")) / kind / f"{name}.npz"
+
+
+def read(path: Path) -> Arrays | None:
+    """The arrays of a file, or None where there is no such file or it is not whole."""
+    try:
+        with np.load(path) as data:
+            return dict(data)
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def content(arrays: Arrays) -> bytes:
+    """An .npz file of them."""
+    file = io.BytesIO()
+    np.savez(file, allow_pickle=False, **arrays)
+    return file.getvalue()
+
+
+def store(file: bytes, path: Path, files: int) -> None:
+    """Keep an .npz file for next time, and of its kind the newest so many; a cache that cannot be written is none."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_suffix(f".{os.getpid()}.tmp")
+        partial.write_bytes(file)
+        partial.replace(path)
+        by_age = sorted(path.parent.glob("*.npz"), key=lambda p: p.stat().st_mtime, reverse=True)
+        for old in by_age[files:]:
+            old.unlink()
+    except OSError:
+        return

@@ -1,0 +1,17 @@
+"""Long work as a generator that yields between its parts, so that a frame can make one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import TypeVar
+
+ResultT = TypeVar("ResultT")
+
+
+def whole(parts: Generator[None, None, ResultT]) -> ResultT:
+    """Do all parts of something; what it returns."""
+    while True:
+        try:
+            next(parts)
+        except StopIteration as end:
+            return end.value  # type: ignore[no-any-return]  # StopIteration does not know it

@@ -1,0 +1,83 @@
+"""False colour and exposure: numbers that come from the light."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from boxes import SIZE, STEP, box, cornell, even, picture, put
+
+from app.atlas.lightmap import Lightmap
+from app.gpu import Gpu
+from app.render.exposure import exposure_of
+from app.render.false_colour import LUMINANCE, colour_map, false_colour_scale
+from app.render.options import DisplayOptions
+
+__all__ = ["box", "cornell"]
+
+
+@pytest.mark.parametrize("logarithmic", [False, True])
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 1.0])
+def test_false_colour_is_the_colour_of_the_value(gpu: Gpu, box: Lightmap, logarithmic: bool, share: float) -> None:
+    """A share of the top of the scale has the colour of the legend there, whatever the exposure."""
+    high = 500.0
+    put(box, "t_irradiance", even(box, (1, 1, 1)) * (share * high / 179.0))
+    display = DisplayOptions(
+        false_colour="illuminance", false_colour_max=high, false_colour_log=logarithmic, exposure=7
+    )
+    scale = false_colour_scale(display, box)
+    assert scale.high == high and scale.unit == "lx"
+    assert (0 < scale.low < high) if logarithmic else scale.low == 0
+    low = scale.low
+    place = np.log(max(share * high, low) / low) / np.log(high / low) if logarithmic else share
+    expected = colour_map(1001)[round(place * 1000)]
+    x, y = SIZE[0] // 2, SIZE[1] // 3
+    # the legend is sampled in steps of 1/1000 here, less than half a step of 8 bits
+    assert picture(gpu, box, display)[y, x] / 255 == pytest.approx(expected, abs=STEP + 0.5 / 255)
+
+
+def mean_residual(lightmap: Lightmap) -> np.ndarray:
+    """r̄ over all texels, RGB [W/m²]."""
+    area = lightmap.nodes.surfaces.area
+    return np.einsum("tijc,tij->c", lightmap.residual().astype(np.float64), area) / area.sum()
+
+
+def test_a_logarithmic_scale_spans_what_is_lit(box: Lightmap) -> None:
+    """From what is nearly the darkest to nearly the brightest of what does not emit, however bright a lamp is."""
+    rng = np.random.default_rng(7)
+    lux = 10 ** rng.uniform(1, 3, box.nodes.surfaces.area.shape)
+    emits = np.array([m.emits for m in box.scene.materials])
+    face = box.nodes.surfaces.face
+    lamp = emits[box.scene.material_ids[box.charts.face_triangle[face]]] & (face >= 0)
+    assert lamp.any()
+    lux[lamp] = 1e6
+    put(box, "t_irradiance", np.repeat((lux / 179)[..., None], 3, -1))
+    low, high, _ = false_colour_scale(DisplayOptions(false_colour="illuminance"), box)
+    assert 8 <= low <= 12 and 900 <= high <= 1200  # 1 % and 99 % of two decades, rounded outwards to short numbers
+
+
+def test_scale_and_exposure_come_from_the_light(box: Lightmap) -> None:
+    H = (1.0, 2.0, 0.5)
+    put(box, "t_irradiance", even(box, H))
+    put(box, "t_residual", even(box, (0.0, 0.0, 0.0)))
+    lux = 179 * np.array(H) @ LUMINANCE
+    scale = false_colour_scale(DisplayOptions(false_colour="illuminance", false_colour_log=False), box)
+    assert lux <= scale.high <= 1.5 * lux
+    luminance = false_colour_scale(DisplayOptions(false_colour="luminance", false_colour_log=False), box)
+    brightest = max(np.array(m.albedo) * H @ LUMINANCE for m in box.scene.materials if not m.emits)
+    assert 179 / np.pi * brightest <= luminance.high <= 1.5 * 179 / np.pi * brightest
+    assert luminance.unit == "cd/m²"
+
+    exposure = exposure_of(box, mean_residual(box))
+    area = box.nodes.surfaces.area
+    mean = np.average(np.log((box.albedo() * H @ LUMINANCE)[area > 0] / np.pi), weights=area[area > 0])
+    assert 2.0**exposure * np.exp(mean) == pytest.approx(0.18, rel=1e-5)
+    put(box, "t_irradiance", even(box, H) * 8)
+    assert exposure_of(box, mean_residual(box)) == pytest.approx(exposure - 3, abs=1e-5)
+
+
+def test_a_scene_just_opened_is_exposed_for_the_light_to_come(box: Lightmap) -> None:
+    exposure = exposure_of(box, mean_residual(box))
+    assert np.isfinite(exposure)
+    assert abs(exposure) < 4, "the lamp of the Cornell box gives about as much light as the exposure of 0 is for"
+    put(box, "t_residual", even(box, (0.0, 0.0, 0.0)))
+    assert exposure_of(box, mean_residual(box)) == 0.0, "no light at all"

@@ -1,0 +1,95 @@
+"""Panels side by side, the view in its place, and pictures with the interface."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from desks import SIZE, Desk, desk, session
+from fake_session import FakeSession
+from imgui_bundle import imgui
+
+from app.errors import UserError
+from app.gpu import Gpu
+from app.headless_ui import ui_image
+from app.ui import layout
+from app.ui.app import Ui
+
+__all__ = ["desk", "session"]
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1920, 1080), (2560, 1440)], ids=str)
+def test_panels_stand_side_by_side(gpu: Gpu, size: tuple[int, int]) -> None:
+    desk = Desk(gpu, FakeSession(), size)
+    taken = np.zeros((size[1], size[0]), int)
+    for panel in layout.PANELS:
+        window = imgui.internal.find_window_by_name(panel.title)
+        assert window.dock_id and window.size.x >= 280 and window.size.y >= 150, panel.title
+        left, top = int(window.pos.x), int(window.pos.y)
+        taken[top : top + int(window.size.y), left : left + int(window.size.x)] += 1
+    left, top, width, height = (int(v) for v in desk.ui.state.view_px)
+    taken[top : top + height, left : left + width] += 1
+    assert taken.max() == 1  # nothing overlaps
+    assert (taken == 1).mean() > 0.9  # the rest is bars and separators
+    assert width * height > 0.3 * size[0] * size[1]
+    desk.release()
+
+
+def test_the_layout_is_kept_and_can_be_reset(gpu: Gpu, tmp_path: Path) -> None:
+    places = []
+    for change in ("drag a separator", "", "reset"):
+        ui = Ui(layout_file=tmp_path / "layout.ini")
+        desk = Desk(gpu, FakeSession(), ui=ui)
+        if change == "reset":
+            ui.state.rebuild_layout = True
+            desk.frames(3)
+        places.append(ui.state.view_px)
+        if change == "drag a separator":
+            left, top, _, height = ui.state.view_px
+            desk.drag((left - 1, top + height / 2), (left + 49, top + height / 2))
+            desk.frames(2)
+            places.append(ui.state.view_px)
+        desk.release()
+    first, dragged, again, reset = places
+    assert dragged[0] == pytest.approx(first[0] + 50, abs=2)  # where in the separator it was taken
+    assert again == dragged
+    assert reset == first
+
+
+@pytest.mark.parametrize("size", [(320, 240), (640, 480)], ids=str)
+def test_a_small_window_still_works(gpu: Gpu, size: tuple[int, int]) -> None:
+    desk = Desk(gpu, FakeSession(), size)
+    left, bottom, width, height = desk.ui.view_rect
+    assert left >= 0 and bottom >= 0 and width >= 1 and height >= 1
+    desk.release()
+
+
+def test_hidden_interface_leaves_the_view_alone(desk: Desk) -> None:
+    desk.key(imgui.Key.f2)
+    assert desk.ui.view_rect == (0, 0, *SIZE)
+    assert (
+        np.abs(desk.image().astype(int) - np.array([51, 76, 102])).max() <= 1
+    )  # the fake session's colour, everywhere
+
+
+def test_the_view_is_drawn_in_its_place(desk: Desk) -> None:
+    image = desk.image()
+    left, bottom, width, height = desk.ui.view_rect
+    top = SIZE[1] - bottom - height
+    inside = image[top : top + height, left : left + width]
+    assert np.abs(inside.astype(int) - np.array([51, 76, 102])).max() <= 1
+    assert (np.abs(image[:, : left - 4].astype(int) - np.array([51, 76, 102])).max(axis=-1) > 1).all()
+
+
+def test_pictures_of_the_same_state_are_the_same(gpu: Gpu) -> None:
+    first, second = (ui_image(gpu, FakeSession(), (640, 400), measured=False) for _ in range(2))
+    assert first.shape == (400, 640, 3)
+    assert (first == second).all()
+    assert first.std() > 10
+
+
+@pytest.mark.parametrize("size", [(0, 100), (100, 10**6)], ids=str)
+def test_a_picture_of_a_size_that_cannot_be(gpu: Gpu, size: tuple[int, int]) -> None:
+    with pytest.raises(UserError, match=f"{size[0]}×{size[1]}"):
+        ui_image(gpu, FakeSession(), size)
