@@ -2,7 +2,8 @@
 
 Every leaf is judged on the GPU, and the host hears of it one step later: how much the gradient of H jumps in it, or how many of
 its texels lie in shadow [Wallner10, 5]. Light is pushed down to children and pulled up to parents. While leaves change they are
-judged at every second step, else when a quarter more shots have been made, and at the end.
+judged at every second step, else when a quarter more shots have been made, and at the end. The node set grows with the tree,
+and gives back what it has too much of once the tree rests.
 
 A leaf that came late inherited interpolated light from earlier shots: reshooting.py makes them again into fresh leaves.
 """
