@@ -27,7 +27,7 @@ from app.scene.model import RGB
 
 # Texels around each tile: as many as interpolation at its edge reaches beyond it
 BORDER = {"nearest": 1, "bilinear": 1, "bicubic": 2}
-TEXELS_PER_FRAME = 1 << 17  # that are brought up to date in one frame, where not all must be
+TEXELS_PER_FRAME = 1 << 16  # that are brought up to date in one frame, where not all must be
 LAYER_TABLES = ("t_normal_ids", "t_materials", "t_albedo", "t_emission", "t_facets", "t_leaves")
 PLACES_WIDTH = 256  # of the table of places; pixels divide by it: a constant, a power of two
 T = TypeVar("T")
