@@ -21,6 +21,7 @@ from app.options import Options, specs
 from app.render.options import DisplayOptions
 from app.solvers import ShootingOptions
 from app.ui import overlays, widgets
+from app.ui.app import Ui
 from app.ui.file_dialog import readable
 from app.ui.keys import SHORTCUTS
 from app.ui.state import Legend, Pace, Request
@@ -116,6 +117,27 @@ def test_a_slider_changes_its_option_and_goes_back(desk: Desk, where: dict[str, 
     desk.click(x, y)
     desk.click(x, y)  # within Dear ImGui's double-click time
     assert desk.session.display.exposure == 0.0
+
+
+@pytest.mark.parametrize(
+    ("control", "button"), [("exposure", 0), ("Pause", 0), ("view", 0), ("view", 1), ("view", 2)], ids=str
+)
+def test_a_hand_holds_from_press_to_release(
+    desk: Desk, where: dict[str, tuple[float, float]], control: str, button: int
+) -> None:
+    desk.frames()
+    desk.point(*(where | {"view": VIEW})[control])
+    desk.frames(2)
+    assert not desk.ui.held, "to point is not to hold"
+    desk.press(button, True)
+    desk.frames(2)
+    assert desk.ui.held, "though nothing moves"
+    other = Ui(native_dialog=False)
+    assert desk.ui.held and not other.held, "each asks its own context"
+    other.release()
+    desk.ui.use()
+    desk.press(button, False)
+    assert not desk.ui.held
 
 
 def test_an_error_becomes_a_toast(gpu: Gpu, where: dict[str, tuple[float, float]]) -> None:
