@@ -65,3 +65,9 @@ def gpu(_gpu: Gpu) -> Iterator[Gpu]:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(2003)
+
+
+@pytest.fixture
+def undivided(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lamp shoots from patches as large as any other: as one of so many lamps that none holds much of the light."""
+    monkeypatch.setattr("app.solvers.shooting.uniform.MOST", 1.0)

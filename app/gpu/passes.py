@@ -21,6 +21,7 @@ GL_CLIP_DISTANCE0 = 0x3000
 BLEND: dict[str, Any] = {
     "add": (moderngl.ONE, moderngl.ONE),
     "multiply": (moderngl.ZERO, moderngl.SRC_COLOR),
+    "keep": (moderngl.ONE, moderngl.SRC_ALPHA),
     "over": (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA),
 }
 

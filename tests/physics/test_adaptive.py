@@ -20,6 +20,7 @@ DENSITY = 4.0  # of the roots [1/m]
 ROUGH = 0.1  # a threshold that splits about half of a room with shadows
 FEW_STEPS = 1500
 FORM_FACTORS = 0.005  # what they are off by, see test_energy.py
+PATCHES = 0.012  # of the light of patches that are as large as their distance
 
 
 def grown(gpu: Gpu, scene: Scene, **options: object) -> Solution:
@@ -78,7 +79,7 @@ def test_no_shadow_no_split(planted: Callable[..., Solution]) -> None:
 
 # -- the table's shadow ------------------------------------------------------------------------------------------------
 
-SHADOW: dict[str, object] = {"density": 5.0, "level": 1, "resolution": 128, "residual": 0.01, "gradient": 0.3}
+SHADOW: dict[str, object] = {"density": 5.0, "level": 1, "resolution": 128, "residual": 0.01, "gradient": 0.15}
 # Energy that patches of a quarter of a metre make or lose where the table's feet stand on them: 0.3 to 0.6 %
 CONTACTS = 0.01
 
@@ -96,9 +97,10 @@ def levels(solution: Solution) -> np.ndarray:
 
 
 def test_it_does_not_matter_when_the_tree_grows(planted: Callable[..., Solution]) -> None:
-    """From the start, or after 800 shots onto the roots. Where both trees have leaves of one level, light differs by no more than
-    form factors are off, from the patches of other leaves; where only one was split, which bends by less than the threshold, by
-    what linear interpolation misses, 1/8 of a second difference."""
+    """From the start, or after 800 shots onto the roots. Where both trees have leaves of one level, light differs by what the
+    patches of other leaves make of it: by a hundredth, most of it on the lamp's back, a fifth of which sees one patch of the
+    ceiling; where only one was split, which bends by less than the threshold, by what linear interpolation misses, 1/8 of a
+    second difference."""
     early = planted(table_room(), **(SHADOW | {"depth": 2}))
     early.settle()
     late = planted(table_room(), **(SHADOW | {"depth": 0}))
@@ -107,11 +109,11 @@ def test_it_does_not_matter_when_the_tree_grows(planted: Callable[..., Solution]
     roots = late.lightmap.texel_count
     late.solver.set_options(late.solver.options.replace(depth=2))
     late.settle()
-    assert min(early.lightmap.texel_count, late.lightmap.texel_count) > 3 * roots, "nothing grew"
+    assert min(early.lightmap.texel_count, late.lightmap.texel_count) > 2 * roots, "nothing grew"
     (a, here), (b, there) = finest_light(early), finest_light(late)
     both = here & there
     alike = levels(early) == levels(late)
-    for where, most in ((both & alike, FORM_FACTORS), (both & ~alike, early.solver.options.gradient / 8)):
+    for where, most in ((both & alike, PATCHES), (both & ~alike, early.solver.options.gradient / 8)):
         assert where.sum() > both.sum() / 4
         assert np.sqrt(((a - b)[where] ** 2).mean() / (a[both] ** 2).mean()) < most
     assert max(abs(early.book.imbalance_share), abs(late.book.imbalance_share)) < CONTACTS
@@ -137,7 +139,7 @@ def test_a_tree_grows_as_deep_late_as_early(planted: Callable[..., Solution]) ->
 
 def test_a_restart_after_a_slider_was_moved_is_a_restart(planted: Callable[..., Solution]) -> None:
     """An edit, other options and a restart while shots are made again leave nothing of that behind."""
-    box = planted(table_room(), **(SHADOW | {"depth": 0, "residual": 0.1, "resolution": 64}))
+    box = planted(table_room(), **(SHADOW | {"depth": 0, "residual": 0.1, "resolution": 64, "gradient": 0.03}))
     box.settle()
     for disturb in (
         lambda: box.solver.set_options(box.solver.options.replace(resolution=192)),

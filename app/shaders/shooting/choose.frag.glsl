@@ -1,25 +1,30 @@
 // The shooters of a batch: row k describes the k-th strongest of the runs' strongest patches. [Coombe03, 3.4]
 //
 // The polygon is the patch's own parallelogram, so that neighbouring patches tile their surface exactly. Visibility is
-// sampled from the middle of the residual; where part of the patch holds none (something stands on it), or the patch is not
+// sampled from the middle of what is shot; where part of the patch shoots nothing (something stands on it), or the patch is not
 // flat, from its leading texel.
 #include "common/atlas.glsl"
 #include "common/tile.glsl"
-#include "shooting/patch_level.glsl"
+#include "common/albedo.glsl"
+#include "common/leaves.glsl"
+#include "shooting/candidate.glsl"
+#include "shooting/expected.glsl"
 #include "shooting/shooter.glsl"
 #include "shooting/belongs.glsl"
 
 const float WEAKEST = 0.1;  // a shot under a tenth of the batch's best waits for a later batch
-const float UNLIT = 0.01;   // a texel under 1 % of the leading one's residual counts as covered by something
+const float UNLIT = 0.01;   // a texel that shoots under 1 % of what the leading one does counts as covered by something
 
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
+uniform sampler2D t_materials;
+uniform sampler2D t_irradiance;
 uniform sampler2D t_residual;
 uniform sampler2D t_runs;
 
 layout(location = 0) out vec4 out_row;
 
-// The (power, x, y, Σ) of the rank-th strongest run; equal powers rank by index.
+// The candidate of the rank-th strongest run; equal powers rank by index.
 vec4 ranked_run(int rank) {
     int runs = textureSize(t_runs, 0).x;
     vec4 last = vec4(3e38);
@@ -40,45 +45,46 @@ vec4 ranked_run(int rank) {
 
 Texel texel_at(ivec2 px) { return load_texel(t_position_area, t_normal_ids, px); }
 
-float residual_at(ivec2 px) {
-    return dot(abs(texelFetch(t_residual, px, 0).rgb), vec3(1.0));
+vec3 shoots(ivec2 px, Texel texel) {
+    vec3 H = texelFetch(t_irradiance, px, 0).rgb;
+    return texelFetch(t_residual, px, 0).rgb + light_ahead(H, albedo_of(t_materials, texel.material, px));
 }
 
-// The strongest texel near the middle of the patch's residual: its plane is the shooter's. On a convex surface no other part of
+// The strongest texel near the middle of what the patch shoots: its plane is the shooter's. On a convex surface no other part of
 // the patch then lies above that plane.
-Texel leading_texel(ivec2 corner_px, int size, out float lead_residual) {
+Texel leading_texel(ivec2 corner_px, int size, out float leading) {
     vec3 middle = vec3(0.0);
     float power = 0.0, strongest = 0.0;
     for (int i = 0; i < size * size; ++i) {
         ivec2 px = corner_px + ivec2(i % size, i / size);
         Texel texel = texel_at(px);
-        float own = residual_at(px) * texel.area;
+        float own = texel.area > 0.0 ? power_of(shoots(px, texel)) * texel.area : 0.0;
         middle += own * texel.position;
         power += own;
         strongest = max(strongest, own);
     }
     middle /= max(power, 1e-30);
     Texel lead;
-    lead.area = lead_residual = 0.0;
+    lead.area = leading = 0.0;
     float nearest = 3e38;
     for (int i = 0; i < size * size; ++i) {
         ivec2 px = corner_px + ivec2(i % size, i / size);
         Texel texel = texel_at(px);
         vec3 offset = texel.position - middle;
-        bool strong = residual_at(px) * texel.area > 0.5 * strongest;
-        if (strong && dot(offset, offset) < nearest) {
+        if (texel.area <= 0.0) continue;
+        float own = power_of(shoots(px, texel));
+        if (own * texel.area > 0.5 * strongest && dot(offset, offset) < nearest) {
             nearest = dot(offset, offset);
             lead = texel;
-            lead_residual = residual_at(px);
+            leading = own;
         }
     }
     return lead;
 }
 
-Shooter shooter_from_patch(ivec2 corner_px) {
-    int size = 1 << patch_level(corner_px);
-    float lead_residual;
-    Texel lead = leading_texel(corner_px, size, lead_residual);
+Shooter shooter_from_patch(ivec2 corner_px, int size) {
+    float leading;
+    Texel lead = leading_texel(corner_px, size, leading);
     Shooter s;
     s.size_px = 0;
     if (lead.area <= 0.0) return s;
@@ -93,20 +99,23 @@ Shooter shooter_from_patch(ivec2 corner_px) {
 
     vec3 area_centre = vec3(0.0), power_centre = vec3(0.0), flux = vec3(0.0);
     float area = 0.0, power = 0.0;
-    bool whole = true;
+    bool whole = true, alone = true;
     ivec2 lower = ivec2(size), upper = ivec2(-1);
     for (int i = 0; i < size * size; ++i) {
         ivec2 at = ivec2(i % size, i / size), px = corner_px + at;
         Texel texel = texel_at(px);
-        if (!belongs(texel, s.normal, s.chart)) continue;
-        vec3 r = texelFetch(t_residual, px, 0).rgb;
+        if (!belongs(texel, s.normal, s.chart)) {
+            alone = alone && texel.area <= 0.0;
+            continue;
+        }
+        vec3 r = shoots(px, texel);
         area += texel.area;
         flux += r * texel.area;
         area_centre += texel.position * texel.area;
-        float own = residual_at(px);
+        float own = power_of(r);
         power_centre += texel.position * texel.area * own;
         power += texel.area * own;
-        whole = whole && texel.facet == lead.facet && own > UNLIT * lead_residual;
+        whole = whole && texel.facet == lead.facet && own > UNLIT * leading;
         lower = min(lower, at);
         upper = max(upper, at);
     }
@@ -115,8 +124,9 @@ Shooter shooter_from_patch(ivec2 corner_px) {
     s.facet = lead.facet;
     s.patch_px = corner_px;
     s.size_px = size;
+    s.even = whole && alone;
 
-    // see from the middle of the residual, or where that may lie inside or under something, from the texel that leads
+    // see from the middle of what is shot, or where that may lie inside or under something, from the texel that leads
     s.origin = whole ? power_centre / power : lead.position;
     s.centre = area_centre / area;
     s.centre -= s.normal * dot(s.centre - s.origin, s.normal);
@@ -137,6 +147,6 @@ void main() {
     Shooter s;
     s.size_px = 0;
     if (run.x > 0.0 && (shot == 0 || run.x >= WEAKEST * ranked_run(0).x))
-        s = shooter_from_patch(ivec2(run.yz));
+        s = shooter_from_patch(corner_of(run), 1 << level_of(run));
     out_row = s.size_px > 0 ? shooter_row(s, int(gl_FragCoord.x)) : vec4(0.0);
 }

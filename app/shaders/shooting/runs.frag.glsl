@@ -1,35 +1,25 @@
-// The strongest patch of each run of slots, and the run's power: (power, corner x, y [texels], Σ power). One texel per run.
-#define TILE_BLOCKS 4
+// The strongest candidate of each run of squares, and what all of the run hold. One texel per run.
+//
+// The squares of a tile are dealt to as many runs, each tile's beginning elsewhere, so that a lamp in one tile fills half a batch.
+#define TILE_SQUARES 2
 
-#include "shooting/block.glsl"
-
-uniform sampler2D t_patches;
-uniform int u_runs;
+uniform sampler2D t_candidates;
+uniform sampler2D t_unshot;
+uniform int u_runs;   // a multiple of the squares of a tile
 uniform int u_slots;  // up to the last that is used
 
-layout(location = 0) out vec4 out_run;
-
-// (power, corner, Σ) of the patches that begin in a block
-vec4 begins_in(ivec2 block) {
-    vec4 one = texelFetch(t_patches, block, 0);
-    if (one.a >= 0.0) return one;
-    int edge = 1 << max(int(-1.0 - one.a) - 2, 0);  // of the patch [blocks]
-    if (any(notEqual(block & (edge - 1), ivec2(0)))) return vec4(0.0);
-    vec3 flux = one.rgb;
-    for (int k = 1; k < edge * edge; ++k) flux += texelFetch(t_patches, block + ivec2(k % edge, k / edge), 0).rgb;
-    float power = dot(abs(flux), vec3(1.0));
-    return vec4(power, block * BLOCK, power);
-}
+layout(location = 0) out vec4 out_run;     // candidate of greatest power; a: power of all
+layout(location = 1) out vec4 out_unshot;  // Σ r A, and Σ of its absolute values over tiles
 
 void main() {
-    int run = int(gl_FragCoord.x), columns = textureSize(t_patches, 0).x / TILE_BLOCKS;
-    out_run = vec4(0.0);
-    for (int slot = run * u_slots / u_runs; slot < (run + 1) * u_slots / u_runs; ++slot) {
-        ivec2 corner = ivec2(slot % columns, slot / columns) * TILE_BLOCKS;
-        for (int k = 0; k < TILE_BLOCKS * TILE_BLOCKS; ++k) {
-            vec4 patch_ = begins_in(corner + ivec2(k % TILE_BLOCKS, k / TILE_BLOCKS));
-            out_run.w += patch_.w;
-            if (patch_.x > out_run.x) out_run.xyz = patch_.xyz;
-        }
+    const int SQUARES = TILE_SQUARES * TILE_SQUARES;
+    int run = int(gl_FragCoord.x), columns = textureSize(t_candidates, 0).x / TILE_SQUARES, stride = u_runs / SQUARES;
+    out_run = out_unshot = vec4(0.0);
+    for (int slot = run / SQUARES, turn = run; slot < u_slots; slot += stride, ++turn) {
+        ivec2 tile = ivec2(slot % columns, slot / columns) * TILE_SQUARES;
+        ivec2 square = tile + ivec2(turn % TILE_SQUARES, turn / TILE_SQUARES % TILE_SQUARES);
+        vec4 one = texelFetch(t_candidates, square, 0);
+        out_unshot += texelFetch(t_unshot, square, 0);
+        out_run = vec4(one.x > out_run.x ? one.xyz : out_run.xyz, out_run.w + one.w);
     }
 }

@@ -7,9 +7,10 @@ struct Shooter {
     vec3 centre;     // of the polygon
     vec3 edge_u;     // the polygon is the parallelogram centre ± edge_u/2 ± edge_v/2, with area A_i
     vec3 edge_v;
-    vec3 exitance;   // mean residual r_i, stored units
+    vec3 exitance;   // mean of what is shot, stored units
     ivec2 patch_px;  // lower corner of the patch in the node set [texels]
     int size_px;     // edge of the patch [texels]; 0: no shot
+    bool even;       // whether all its texels shoot the mean, and keep what they have above or below it
     float chart;     // texels of others do not belong to the shooter
 };
 
@@ -27,7 +28,8 @@ Shooter shooter_from_rows(vec4 rows[SHOOTER_ROWS]) {
     s.edge_v = rows[4].xyz;
     s.patch_px = ivec2(rows[3].w, rows[4].w);
     s.exitance = rows[5].xyz;
-    s.size_px = int(rows[5].w);
+    s.size_px = abs(int(rows[5].w));
+    s.even = rows[5].w > 0.0;
     return s;
 }
 
@@ -37,7 +39,7 @@ vec4 shooter_row(Shooter s, int row) {
     if (row == 2) return vec4(s.centre, s.chart);
     if (row == 3) return vec4(s.edge_u, float(s.patch_px.x));
     if (row == 4) return vec4(s.edge_v, float(s.patch_px.y));
-    return vec4(s.exitance, float(s.size_px));
+    return vec4(s.exitance, float(s.even ? s.size_px : -s.size_px));
 }
 
 Shooter load_shooter(sampler2D shooters, int shot) {

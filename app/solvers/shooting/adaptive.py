@@ -77,15 +77,20 @@ class AdaptiveShooting(Reshooting):
     @property
     def settled(self) -> bool:
         """Whether the tree has stopped growing and all its leaves hold what the shots gave them."""
-        done = self.report.residual <= self.options.residual
+        done = self._done
         judged = self._calm and not (done and self._calm_at < self._log.count)  # once more at the end
-        return judged and not self._fresh and self._redo_under_way is None
+        return super().settled and judged and not self._fresh and self._redo_under_way is None
+
+    @property
+    def _done(self) -> bool:
+        """Whether no shots are left to make."""
+        return super().settled and self.report.residual <= self.options.residual
 
     def _parts(self, shots: int, bands: int) -> Generator[None, None, int]:
         """First what there is to do for fresh leaves, a batch of earlier shots at a time, then shots while light is left; not
         until the leaves have followed a slider that was moved."""
         made = 0
-        done = bool(self._log.count) and self.report.residual <= self.options.residual
+        done = bool(self._log.count) and self._done
         if self._redo_under_way is not None:
             made = yield from self._redo(bands)
             if self._redo_under_way is None:
@@ -103,9 +108,9 @@ class AdaptiveShooting(Reshooting):
         self._all_again &= not self.settled
         return made or shots
 
-    def _patch_level(self, slot: int) -> int:
+    def _levels_above(self, slots: NDArray[np.int64]) -> NDArray[np.int64]:
         """Patches are about as large in the scene in leaves of every level."""
-        return self._choice.level - ROOT_LEVEL + int(self.lightmap.nodes.leaves.level[slot])
+        return ROOT_LEVEL - self.lightmap.nodes.leaves.level[slots].astype(np.int64)
 
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
         return super().passes(shots) | {

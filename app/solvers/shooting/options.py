@@ -26,10 +26,13 @@ class ShootingOptions(Options):
     """Only ``storage`` restarts the solution when it changes; the rest acts on the next shot."""
 
     level: int = option(
-        2, "mip level that shoots: patches of 2^level texels squared, at most a leaf", minimum=0, maximum=MAX_LEVEL
+        2,
+        "mip level that shoots in the end: patches of 2^level texels squared, at most a leaf",
+        minimum=0,
+        maximum=MAX_LEVEL,
     )
     coarsen: bool = option(
-        True, "shoot from a level higher once the strongest patch is weak: faint light needs no fine patches"
+        True, "shoot from larger patches first, and in large scenes to the end, as many as show the light soon"
     )
     residual: float = option(
         1e-3, "converged when this share of the emitted power is unshot", minimum=1e-9, maximum=1, logarithmic=True

@@ -16,6 +16,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.atlas.lightmap import Lightmap
 from app.gpu import Buffer, Framebuffer, Gpu, Mesh
@@ -25,6 +26,7 @@ from app.solvers.shooting.stages import (
     BATCH,
     BLOCK_BYTES,
     BLOCK_ROWS,
+    LEDGER_ROWS,
     OPEN,
     SHOOTER_ROWS,
     ChoiceStages,
@@ -34,10 +36,10 @@ from app.solvers.shooting.stages import (
 )
 
 Blocks = dict[str, tuple[Buffer, int, int]]  # what a pass binds: buffer, offset and size [bytes]
-# The shots of a batch that holds so large a share of the emitted power are audited before they shoot; where one would make or
-# lose more than this share of its own, its patch is split. Most light is shot by few patches: a hall under skylights in coffers
-# gains 5.8 % without.
-AUDITED, SOUND = 0.02, 0.02
+# Shots of so large a share of the emitted power are audited before they are made; where one would make or lose more than this
+# share of its own, its patch is split. Most light is shot by few patches: a hall under skylights in coffers gains 5.8 % without.
+# A patch of two texels along its edge sees what its texels see.
+AUDITED, SOUND, SMALL = 0.005, 0.02, 2
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,11 @@ def powers_of(rows: F64) -> F64:
     return np.asarray(rows[:, 0, 3] * np.abs(rows[:, 5, :3]).sum(-1))
 
 
+def edges_of(rows: F64) -> NDArray[np.int64]:
+    """Edges of their patches [texels], 0 for no shot."""
+    return np.abs(rows[..., 5, 3]).astype(np.int64)
+
+
 def rows_of(size: tuple[int, int], band: int, bands: int) -> tuple[int, int, int, int] | None:
     """One of so many bands of a target of this size as a scissor (x, y, width, height) [px]; None for all of it."""
     width, height = size
@@ -106,9 +113,19 @@ class ShotPasses:
     options: ShootingOptions
     buffers: ShotBuffers
     stages: ShotStages
-    _choice: ChoiceStages  # among the patches of the level that shoots now
     _audits: bool  # whether batches are still strong enough to be audited
     _emitted: F64  # RGB [W]
+    _albedo: tuple[float, ...]  # mean, RGB
+    _area: float  # of all texels, solver frame
+
+    @property
+    def _choice(self) -> ChoiceStages:
+        """Among the patches that shoot now."""
+        raise NotImplementedError
+
+    def _finest_of(self, shot: Shot) -> tuple[int, int, int, int]:
+        """Its patch, and the finest level of patches there, as buffers.shoot_finer takes them."""
+        raise NotImplementedError
 
     def _for_groups(self, part: Callable[[int, int], None], shots: int) -> None:
         """Do this part of a step for all its shots, as many at once as there are maps for."""
@@ -130,34 +147,36 @@ class ShotPasses:
         self._describe(self._choice, shots)
 
     def _zero(self, shots: int) -> None:
-        """r_i = 0 for all of the batch, before the first of them shoots."""
+        """r_i -= what is about to be shot, for all of the batch, before the first of them shoots."""
         lightmap, buffers = self.lightmap, self.buffers
         self.stages.zero.draw(
             lightmap.residual_target,
-            textures=lightmap.textures("t_position_area", "t_normal_ids", "t_facets")
-            | {"t_shooters": buffers.shooters},
+            textures=lightmap.textures(
+                "t_position_area", "t_normal_ids", "t_facets", "t_materials", "t_albedo", "t_irradiance"
+            )
+            | {"t_shooters": buffers.shooters, "t_ambient": buffers.ambient},
             uniforms={"u_size": lightmap.size},
             vertices=4,
             instances=shots,
+            blend="keep",
             strip=True,
         )
 
     def _fails(self, shots: int) -> Generator[None, None, bool]:
-        """Whether a chosen shooter would make or lose light and can shoot from finer patches: it will. Only strong batches are
-        worth asking: after the first weak one, none is. In parts; waits for the GPU."""
+        """Whether a chosen shooter would make or lose light and can shoot from finer patches: it will. Only strong ones are worth
+        asking: after the first batch without any, none is. In parts; waits for the GPU."""
         rows = self._shooter_rows(shots)
         power = powers_of(rows)
-        if power.sum() * self._watt <= AUDITED * self._emitted.sum():
-            self._audits = False
-            return False
+        strong = power * self._watt > AUDITED * self._emitted.sum()
+        self._audits = bool(strong.any())
         failed = []
         with AuditTargets(self.gpu, self.lightmap) as targets:
-            for shot in np.flatnonzero((power > 0) & (rows[:, 5, 3] > 1)).tolist():  # of more than one texel
+            for shot in np.flatnonzero(strong & (edges_of(rows) > SMALL)).tolist():
                 if abs(sum(self._hand_out(targets, shot, power[shot])) - 1) > SOUND:
                     failed.append(shot)
                 yield
         if failed:
-            self.buffers.shoot_finer(rows[failed, 3:6, 3].astype(int).tolist())
+            self.buffers.shoot_finer(self._finest_of(self._shot_from_rows(row)) for row in rows[failed])
         return bool(failed)
 
     def _hand_out(self, targets: AuditTargets, shot: int, power: float) -> tuple[float, float, float]:
@@ -180,18 +199,25 @@ class ShotPasses:
 
     def _add_patches(self, choice: ChoiceStages, band: int = 0, bands: int = 1) -> None:
         """Residual power of every patch of this level, or of those in one of so many bands."""
-        textures = self.lightmap.textures("t_position_area", "t_residual", "t_leaves")
+        reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_irradiance", "t_residual", "t_leaves"
         choice.add_patches.draw(
             choice.patch_target,
-            textures=textures | {"t_finer": self.buffers.finer},
-            scissor=rows_of(choice.patches.size, band, bands),
+            textures=self.lightmap.textures(*reads)
+            | {"t_finer": self.buffers.finer, "t_ambient": self.buffers.ambient},
+            scissor=rows_of(choice.patches[0].size, band, bands),
         )
 
     def _add_runs(self, choice: ChoiceStages) -> None:
         """The strongest patch of each run of slots, and the power of all."""
+        patches, unshot, lit = choice.patches
+        choice.begin.draw(
+            choice.candidate_target,
+            textures={"t_patches": patches, "t_unshot": unshot, "t_lit": lit},
+        )
+        candidates, unshot = choice.candidates
         choice.add_runs.draw(
             self.buffers.run_target,
-            textures={"t_patches": choice.patches},
+            textures={"t_candidates": candidates, "t_unshot": unshot},
             uniforms={"u_runs": self.buffers.runs.width, "u_slots": self.lightmap.nodes.slots_in_use},
         )
 
@@ -199,8 +225,11 @@ class ShotPasses:
         """Write the shooters of the batch from the strongest patches of the runs."""
         choice.choose.draw(
             self.buffers.shooter_target,
-            textures=self.lightmap.textures("t_position_area", "t_normal_ids", "t_residual", "t_facets", "t_leaves")
-            | {"t_runs": self.buffers.runs, "t_finer": self.buffers.finer},
+            textures=self.lightmap.textures(
+                "t_position_area", "t_normal_ids", "t_irradiance", "t_residual", "t_facets", "t_leaves"
+            )
+            | self.lightmap.textures("t_materials", "t_albedo")
+            | {"t_runs": self.buffers.runs, "t_ambient": self.buffers.ambient},
             viewport=(0, 0, SHOOTER_ROWS, shots),
         )
         self.buffers.shooter_target.read_into(self.buffers.shooter_blocks, components=4, dtype="f4")
@@ -295,17 +324,24 @@ class ShotPasses:
         )
 
     def _book(self, shots: int) -> None:
-        """Enter in the ledger what the batch sent out of the scene."""
+        """Enter in the ledger what the batch sent out of the scene, and see what all that is unshot will make come back."""
         self.stages.enter.draw(
             self.buffers.ledger_target,
             textures={"t_open": self.stages.maps.open, "t_shooters": self.buffers.shooters},
             uniforms={"u_blocks": self.stages.maps.open_size[1]},
             blend="add",
-            viewport=(0, 0, shots, 2),
+            viewport=(0, 0, shots, LEDGER_ROWS),
+        )
+        if self.lightmap.storage == "fixed8":  # which cannot owe light
+            return
+        self.stages.expect.draw(
+            self.buffers.ambient_target,
+            textures={"t_unshot": self.buffers.unshot, "t_ledger": self.buffers.ledger},
+            uniforms={"u_albedo": self._albedo, "u_area": self._area},
         )
 
     def _shot_from_rows(self, rows: F64) -> Shot:
-        frame, corner, edge = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3])), int(rows[5, 3])
+        frame, corner, edge = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3])), int(edges_of(rows))
         area = float(rows[0, 3]) * frame.scale**2
         rect = self.lightmap.nodes.atlas_rect(corner, edge)
         return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, edge, rect, rows[:SHOOTER_ROWS])

@@ -5,22 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.atlas.lightmap import Lightmap
 from app.atlas.node_set import Moves
 from app.gpu import Gpu, Pass, Texture
 from app.projections import PROJECTIONS, Occluders
-from app.scene.model import F32
+from app.scene.model import F32, F64
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions, highest_level
 
 BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
-RUNS = 64  # at least, of slots: a batch is chosen from the strongest patch of each
+RUNS = 64  # at least, of squares: a batch is chosen from the strongest patch of each
 OPEN = 0.0  # item of the open background, see common/item.glsl
 SHOOTER_ROWS = 6  # texels that describe one shooter, see shooter.glsl
 BLOCK_BYTES = 256  # no driver asks for a coarser uniform block alignment
 BLOCK_ROWS = BLOCK_BYTES // 16  # texels in a row of t_shooters: one shooter, padded to a uniform block
 REPORT_HEAD = 2  # texels of the report before those of its first shooter, see report.frag.glsl
+LEVELS = 8  # of patches: a candidate has its level in units of its row, see candidate.glsl
+SQUARE_LEVEL = 3  # a batch takes one patch at most of each square of so many texels, as a power of 2
 BLOCK_LEVEL = 2  # blocks of so many texels along each edge, as a power of 2, are summed once, see patches.frag.glsl
+LEDGER_ROWS = 3  # see ledger.frag.glsl
+# Patches of a scene, where they may be coarser: about so many show the light first, and more than the most gain little.
+FIRST_PATCHES, MOST_PATCHES = 400, 4096
 ROOT_LEVEL = 2  # quadtrees: at this level a texel of the root shoots by itself
 # px, of maps that follow from the scene. Below, shadows of few texels get coarse too: 128 for 256 makes 2.2 % error 2.6 % in the
 # Cornell box of 32,000 texels. Above, there is little to gain: 512 for 256 takes 181,000 texels of an other scene half as long
@@ -37,6 +43,20 @@ def fitting_resolution(lightmap: Lightmap, *, adaptive: bool) -> int:
     return int(np.clip(64 * round(2.0 / texel / 64), *RESOLUTIONS))
 
 
+def patch_levels(lightmap: Lightmap, options: ShootingOptions, *, adaptive: bool) -> range:
+    """Of the patches that shoot, from those that begin to the finest, as powers of 2 of texels; in quadtrees, of uniform ones."""
+    top = MAX_LEVEL if adaptive else highest_level(lightmap.nodes.tile)
+    first = last = min(options.level, top)
+    if options.coarsen:
+        texels = lightmap.nodes.surfaces.area.sum() * lightmap.charts.density**2 * (4**ROOT_LEVEL if adaptive else 1)
+        while last < top and texels / 4**last > MOST_PATCHES:
+            last += 1
+        first = last
+        while first < top and texels / 4 ** (first + 1) >= FIRST_PATCHES:
+            first += 1
+    return range(first, last - 1, -1)
+
+
 class ShotBuffers:
     """What a shot writes besides the lightmap and does not depend on the options."""
 
@@ -45,11 +65,13 @@ class ShotBuffers:
         self.shooters = gpu.texture((BLOCK_ROWS, BATCH), 4, "f4")
         self.shooter_blocks = gpu.buffer(BATCH * BLOCK_BYTES)  # the same, as uniforms
         self.inspected_block = gpu.buffer(BATCH * BLOCK_BYTES)  # the first is a shooter that is looked at by itself
-        self.ledger = gpu.texture((BATCH, 2), 4, "f4")
+        self.ledger = gpu.texture((BATCH, LEDGER_ROWS), 4, "f4")
+        self.ambient = gpu.texture((1, 1), 4, "f4")
         self.occluders = Occluders(gpu, lightmap)
         self.report = gpu.texture((REPORT_HEAD + SHOOTER_ROWS, 1), 4, "f4")
         self.shooter_target = gpu.target(self.shooters)
         self.ledger_target = gpu.target(self.ledger)
+        self.ambient_target = gpu.target(self.ambient)
         self.report_target = gpu.target(self.report)
         self._fit(lightmap)
         self.all_alike()
@@ -57,31 +79,46 @@ class ShotBuffers:
     def _fit(self, lightmap: Lightmap) -> None:
         """Make what is as large as the node set."""
         gpu, (width, height) = self._gpu, lightmap.size
-        self.runs = gpu.texture((max(RUNS, lightmap.rows), 1), 4, "f4")
+        squares = (self._tile >> SQUARE_LEVEL) ** 2
+        self.runs = gpu.texture((-(-max(RUNS, lightmap.rows) // squares) * squares, 1), 4, "f4")
+        self.unshot = gpu.texture(self.runs.size, 4, "f4")  # of the same runs
         self.books = [gpu.texture((lightmap.columns, lightmap.rows), 4, "f4") for _ in range(3)]
         self.finer = gpu.texture((width >> BLOCK_LEVEL, height >> BLOCK_LEVEL), 1, "f4")
         self.finer_levels = np.zeros(self.finer.size[::-1], np.float32)  # the same, see patch_level.glsl
-        self.run_target = gpu.target(self.runs)
+        self.run_target = gpu.target(self.runs, self.unshot)
         self.books_target = gpu.target(*self.books)
 
     def resize(self, lightmap: Lightmap, moves: Moves) -> None:
         """For a lightmap that has got another number of slots: all leaves shoot as fine as before, and the ledger stays."""
         held = moves.array(self._tiles.reshape(-1, *self._tiles.shape[2:]), 0)
-        self._gpu.release_all(self.run_target, self.books_target, self.runs, *self.books, self.finer)
+        self._gpu.release_all(self.run_target, self.books_target, self.runs, self.unshot, *self.books, self.finer)
         self._fit(lightmap)
         place = np.divmod(np.arange(moves.slots), lightmap.columns)
         self._tiles[place] = held
         self.finer.write(self.finer_levels.tobytes())
 
-    def shoot_finer(self, patches: Iterable[tuple[int, int, int]]) -> None:
-        """Let what is in these patches, column and row of the lower texel and edge, shoot from patches a level finer."""
-        blocks = {
-            (row, column)
-            for x, y, edge in patches
-            for row in range(y >> BLOCK_LEVEL, (y + edge - 1 >> BLOCK_LEVEL) + 1)
-            for column in range(x >> BLOCK_LEVEL, (x + edge - 1 >> BLOCK_LEVEL) + 1)
-        }
-        self.finer_levels[tuple(np.array(sorted(blocks)).T)] += 1
+    def shoot_finer(self, patches: Iterable[tuple[int, int, int, int]]) -> None:
+        """Let what is in these patches shoot from patches at least a level finer: column and row of the lower texel, edge, and
+        the finest level of patches there."""
+        for x, y, edge, finest in patches:
+            columns, rows = (slice(c >> BLOCK_LEVEL, (c + edge - 1 >> BLOCK_LEVEL) + 1) for c in (x, y))
+            finer = max(finest + 2 - (edge.bit_length() - 1), 1)
+            self.finer_levels[rows, columns] = np.maximum(self.finer_levels[rows, columns], finer)
+        self.finer.write(self.finer_levels.tobytes())
+
+    def divide(self, power: F64, most: float, largest: NDArray[np.int64], finest: NDArray[np.int64]) -> None:
+        """Let no patch hold more than so much power (slots, t, t) of texels; largest, finest (slots,): levels of patches."""
+        edge, highest = self._tile, highest_level(self._tile)
+        level = np.full((len(power), edge, edge), highest)
+        for one in range(highest, 0, -1):
+            squares = power.reshape(-1, edge >> one, 1 << one, edge >> one, 1 << one).sum((2, 4)) > most
+            level[squares.repeat(1 << one, 1).repeat(1 << one, 2)] = one - 1
+        blocks = edge >> BLOCK_LEVEL
+        level = level.reshape(-1, blocks, 1 << BLOCK_LEVEL, blocks, 1 << BLOCK_LEVEL).min((2, 4))
+        largest, finest = largest[:, None, None], finest[:, None, None]
+        finer = np.where(level < largest, np.maximum(finest + 1 - level, 1), 0)
+        place = np.divmod(np.arange(len(power)), self._tiles.shape[1])
+        self._tiles[place] = np.maximum(self._tiles[place], finer)
         self.finer.write(self.finer_levels.tobytes())
 
     def hand_down(self, old: Sequence[tuple[int, int]], new: Sequence[tuple[int, int]]) -> None:
@@ -95,15 +132,8 @@ class ShotBuffers:
             self._blocks(corner)[:] = marks.get(corner, 0.0)
         self.finer.write(self.finer_levels.tobytes())
 
-    def level_out(self) -> None:
-        """Let each tile shoot all over as finely as it does anywhere: for patches of another level."""
-        if not self.finer_levels.any():
-            return
-        self._tiles[:] = self._tiles.max((2, 3), keepdims=True)
-        self.finer.write(self.finer_levels.tobytes())
-
     def finer_at(self, texel: tuple[int, int]) -> int:
-        """Levels by which the patch of this texel is finer than others."""
+        """0, or 1 and the levels by which the patch of this texel is finer than the finest of others."""
         return int(self.finer_levels[texel[1] >> BLOCK_LEVEL, texel[0] >> BLOCK_LEVEL])
 
     @property
@@ -128,28 +158,35 @@ class ShotBuffers:
 
 
 class ChoiceStages:
-    """Choosing among the patches of one level; in quadtrees, of that level at the root and of finer ones below."""
+    """Choosing among patches of one level and smaller ones; in quadtrees, of that level at the root and of finer ones below.
+    finest: the level that will shoot in the end."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, level: int, *, adaptive: bool) -> None:
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, level: int, finest: int, *, adaptive: bool) -> None:
         self._gpu, self.level = gpu, level
         self._fit(lightmap)
         tile = lightmap.nodes.tile
-        kind = lightmap.defines("TILE") | {"LEVEL": level - ROOT_LEVEL if adaptive else level}
-        kind |= {"HIGHEST": highest_level(tile), "BLOCK": 1 << BLOCK_LEVEL}
-        self.add_patches = Pass(gpu, "shooting/patches", defines=kind)
-        self.add_runs = Pass(
-            gpu, "shooting/runs", defines={"TILE_BLOCKS": tile >> BLOCK_LEVEL, "BLOCK": 1 << BLOCK_LEVEL}
-        )
-        self.choose = Pass(gpu, "shooting/choose", defines=kind | lightmap.defines("MATERIAL_BITS"))
+        root, top = ROOT_LEVEL if adaptive else 0, {"HIGHEST": highest_level(tile)}
+        of_block = {"BLOCK": 1 << BLOCK_LEVEL, "BLOCK_LEVEL": BLOCK_LEVEL}
+        of_tile = {"TILE_SQUARES": tile >> SQUARE_LEVEL}
+        reads = lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE")
+        levels = {"LEVEL": level - root, "FINEST": finest - root}
+        self.add_patches = Pass(gpu, "shooting/patches", defines=reads | of_block | levels | top)
+        self.begin = Pass(gpu, "shooting/begin", defines=of_block | of_tile | top | {"SQUARE_LEVEL": SQUARE_LEVEL})
+        self.add_runs = Pass(gpu, "shooting/runs", defines=of_tile)
+        self.choose = Pass(gpu, "shooting/choose", defines=reads | of_block)
 
     def _fit(self, lightmap: Lightmap) -> None:
         width, height = lightmap.size
-        self.patches = self._gpu.texture((width >> BLOCK_LEVEL, height >> BLOCK_LEVEL), 4, "f4")
-        self.patch_target = self._gpu.target(self.patches)
+        size = width >> BLOCK_LEVEL, height >> BLOCK_LEVEL
+        self.patches = [self._gpu.texture(size, components, "f4") for components in (4, 4, 2)]
+        self.patch_target = self._gpu.target(*self.patches)
+        squares = width >> SQUARE_LEVEL, height >> SQUARE_LEVEL
+        self.candidates = [self._gpu.texture(squares, 4, "f4") for _ in range(2)]
+        self.candidate_target = self._gpu.target(*self.candidates)
 
     def resize(self, lightmap: Lightmap) -> None:
         """For a lightmap that has got another number of slots."""
-        self._gpu.release_all(self.patch_target, self.patches)
+        self._gpu.release_all(self.patch_target, *self.patches, self.candidate_target, *self.candidates)
         self._fit(lightmap)
 
     def release(self) -> None:
@@ -179,10 +216,8 @@ class ShotStages:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, adaptive: bool = False) -> None:
         self._gpu, self.projection, self._visibility = gpu, PROJECTIONS[options.projection], options.visibility
-        top = MAX_LEVEL if adaptive else highest_level(lightmap.nodes.tile)
-        first = min(options.level, top)
-        levels = range(first, (top if options.coarsen else first) + 1)
-        self.choices = [ChoiceStages(gpu, lightmap, level, adaptive=adaptive) for level in levels]
+        levels = patch_levels(lightmap, options, adaptive=adaptive)
+        self.choices = [ChoiceStages(gpu, lightmap, level, levels[-1], adaptive=adaptive) for level in levels]
         self.resolution = options.resolution or fitting_resolution(lightmap, adaptive=adaptive)
         width, height = self.map_size = self.projection.size(self.resolution)
         self.most_maps = max(1, min(BATCH, MAPS_TEXELS // (width * height)))
@@ -191,9 +226,9 @@ class ShotStages:
         self.weights = gpu.texture((width // 4, height // 4), 4, "f4")  # see weights.frag.glsl
 
         resolution = {"RESOLUTION": self.resolution}
-        bits = lightmap.defines("MATERIAL_BITS")
         reads = {"projection": self.projection.glsl}
-        self.zero = Pass(gpu, "shooting/zero", defines=bits)
+        keeps = {"KEEPS": options.storage != "fixed8"}
+        self.zero = Pass(gpu, "shooting/zero", defines=keeps | lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"))
         self.see = Pass(
             gpu,
             "shooting/visibility",
@@ -211,6 +246,7 @@ class ShotStages:
         self.audit = Pass(gpu, "shooting/audit", defines=lightmap.defines("TILE"))
         self.enter = Pass(gpu, "shooting/ledger")
         self.tell = Pass(gpu, "shooting/report")
+        self.expect = Pass(gpu, "shooting/ambient")
         weights_target = gpu.target(self.weights)
         Pass(gpu, "shooting/weights", defines=resolution, slots=reads).draw(weights_target)
         gpu.release_all(weights_target)

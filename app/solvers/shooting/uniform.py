@@ -1,10 +1,10 @@
 """Progressive refinement radiosity over uniform texels [Coombe03, 3; Cohen88].
 
     while not converged:
-        i    = patch with the largest residual power r_i A_i
+        i    = patch with the largest power to shoot, R_i A_i: residual and what will come back [Feda92], R_i = r_i + ρ_i a_i
         see the scene from i (item buffer and depth on a hemicube)
-        r_i  = 0
-        for every texel j:  ΔH_j = r_i F_ji V_ji;  H_j += ΔH_j;  r_j += ρ_j ΔH_j
+        r_i -= R_i
+        for every texel j:  ΔH_j = R_i F_ji V_ji;  H_j += ΔH_j;  r_j += ρ_j ΔH_j
 
 The host only hears, a few steps late, how much is still unshot: see shot.py for what is done on the GPU.
 
@@ -18,6 +18,7 @@ from collections.abc import Callable, Generator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, ReadBack, Texture
@@ -26,11 +27,21 @@ from app.scene.model import F64, Material
 from app.solvers.base import EnergyBook, StepReport
 from app.solvers.shooting.options import ShootingOptions, highest_level
 from app.solvers.shooting.shot import Audit, AuditTargets, Shot, ShotPasses, powers_of
-from app.solvers.shooting.stages import BATCH, OPEN, REPORT_HEAD, ChoiceStages, ShotBuffers, ShotStages
+from app.solvers.shooting.stages import (
+    BATCH,
+    LEDGER_ROWS,
+    LEVELS,
+    OPEN,
+    REPORT_HEAD,
+    ChoiceStages,
+    ShotBuffers,
+    ShotStages,
+)
 
-# With ``coarsen``, a shot should carry this share of the emitted power: about 4096 shots for each time that all light is
-# reflected, whatever the scene's size. Measured on the Cornell box: a quarter of the shots, error 1.8 % -> 2.4 %.
-FAINT = 2.0**-12
+# Large patches shoot first, and finer ones what those leave once so little of the emitted power is unshot. What is left then is
+# more here and less there: light that hardly leaves its corner. So they end once they hold so many times the residual asked for.
+COARSE_LEAVE, FINE_LEAVE = 5e-3, 10
+MOST = 0.02  # of the emitted power: emitters of more are divided, a lamp in 50 patches at least: shadows add up to soft ones
 WHOLE = object()  # no part is left
 REPORT_LAG = 2  # read-backs in flight before the oldest is looked at
 
@@ -64,9 +75,10 @@ class UniformShooting(ShotPasses):
         self.buffers.ledger_target.clear()
         self._drop_reports()
         self.buffers.all_alike()
-        self._choice, self._audits = self.stages.choices[0], True
+        self._phase, self._audits, self._even = 0, True, False
         self.shots, self.last_shot = 0, None
-        self._emitted = self.lightmap.emitted
+        self.buffers.ambient_target.clear()
+        self._weigh_scene()
         self.report = StepReport(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
 
     def set_options(self, options: ShootingOptions) -> None:
@@ -82,8 +94,9 @@ class UniformShooting(ShotPasses):
         fresh = self._make_stages(options)
         self.stages.release()
         self.stages, self.options = fresh, options
-        self._choice, self._audits = fresh.choices[0], True
-        self.buffers.level_out()
+        self._phase, self._audits, self._even = min(self._phase, len(fresh.choices) - 1), True, False
+        self.buffers.all_alike()
+        self._weigh_scene()
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light that is there stays, and the difference is shot, negative too [Chen90]. Begins
@@ -104,8 +117,8 @@ class UniformShooting(ShotPasses):
         if (factor != 1).any():
             self._scale_light(factor)
         self.lightmap.edit_materials(materials, factor)
-        self._emitted, self._audits = self.lightmap.emitted, True
-        self._choice = self.stages.choices[0]
+        self._phase, self._audits, self._even = 0, True, False
+        self._weigh_scene()
         self.report = replace(self.report, residual=self.unshot_share())
 
     def _scale_light(self, factor: F64) -> None:
@@ -113,17 +126,33 @@ class UniformShooting(ShotPasses):
         self.lightmap.scale(factor)
         self.lightmap.scale(factor, self.buffers.ledger_target)
 
+    def _weigh_scene(self) -> None:
+        """What its emitters send out and its surfaces reflect."""
+        self._emitted = self.lightmap.emitted
+        sums, _, reflectance = self._tile_sums()
+        self._area = float(sums[3]) / self._watt
+        self._albedo = tuple((reflectance[:3] / max(sums[3], 1e-300)).tolist())
+        power = self.lightmap.emission().sum(-1, dtype=np.float64) * self.lightmap.nodes.surfaces.area
+        slots = np.arange(len(power))
+        largest, finest = (self._levels_of(slots, choice) for choice in (self._choice, self.stages.choices[-1]))
+        self.buffers.divide(power, MOST * self._emitted.sum(), largest, finest)
+
+    @property
+    def _choice(self) -> ChoiceStages:
+        """Among the patches that shoot now."""
+        return self.stages.choices[self._phase]
+
     @property
     def settled(self) -> bool:
-        """Always: only shots are left to do."""
-        return True
+        """Whether the finest patches have shot, and hold little."""
+        return self._even
 
     def unshot_share(self) -> float:
-        """The residual now, Σ |r A| over patches, as a share of the emitted power. Waits for the GPU."""
+        """The residual now, Σ |Σ r A| over tiles, as a share of the emitted power. Waits for the GPU."""
         self.finish()
         self._add_patches(self._choice)
         self._add_runs(self._choice)
-        runs = np.frombuffer(self.buffers.runs.read(), np.float32).reshape(-1, 4)[:, 3].astype(np.float64)
+        runs = np.frombuffer(self.buffers.unshot.read(), np.float32).reshape(-1, 4)[:, 3].astype(np.float64)
         emitted = self._emitted.sum()
         return float(runs.sum()) * self._watt / emitted if emitted > 0 else 0.0
 
@@ -161,8 +190,8 @@ class UniformShooting(ShotPasses):
         """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
         self.finish()
         absorbed, unshot, reflectance = self._tile_sums()
-        ledger = np.frombuffer(self.buffers.ledger.read(), np.float32).reshape(2, BATCH, 4)
-        escaped, blackened = ledger[..., :3].astype(np.float64).sum(1) * self._watt
+        ledger = np.frombuffer(self.buffers.ledger.read(), np.float32).reshape(LEDGER_ROWS, BATCH, 4)
+        escaped, blackened, _ = ledger[..., :3].astype(np.float64).sum(1) * self._watt
         area = absorbed[3] / self.lightmap.unit
         return EnergyBook(
             self._emitted,
@@ -178,7 +207,8 @@ class UniformShooting(ShotPasses):
         The patch must hold some residual."""
         self.finish()
         runs = np.zeros((self.buffers.runs.width, 4), np.float32)
-        runs[0] = 1.0, *corner, 0.0
+        level = self.patch_edge(corner).bit_length() - 1
+        runs[0] = 1.0, corner[0], corner[1] * LEVELS + level, 0.0
         self.buffers.runs.write(runs.tobytes())
         self._describe(self._choice, 1)
         row = self._shooter_rows(1)
@@ -199,15 +229,30 @@ class UniformShooting(ShotPasses):
         }
 
     def patch_edge(self, texel: tuple[int, int]) -> int:
-        """Texels along the edge of the patch that a texel (column, row) of the node set would shoot from now: its level, and how
-        much finer an audit made it."""
-        nodes = self.lightmap.nodes
-        slot = texel[1] // nodes.tile * nodes.columns + texel[0] // nodes.tile
-        level = min(self._patch_level(slot), highest_level(nodes.tile)) - self.buffers.finer_at(texel)
-        return 1 << max(level, 0)
+        """Texels along the edge of the largest patch that a texel (column, row) of the node set may shoot from now: the level, or
+        as much finer as an audit made it."""
+        slot, finer = self._slot_at(texel), self.buffers.finer_at(texel)
+        if finer > 0:
+            return 1 << max(self._level_of(slot, self.stages.choices[-1]) + 1 - finer, 0)
+        return 1 << self._level_of(slot, self._choice)
 
-    def _patch_level(self, slot: int) -> int:
-        return self._choice.level
+    def _slot_at(self, texel: tuple[int, int]) -> int:
+        nodes = self.lightmap.nodes
+        return texel[1] // nodes.tile * nodes.columns + texel[0] // nodes.tile
+
+    def _level_of(self, slot: int, choice: ChoiceStages) -> int:
+        return int(self._levels_of(np.array([slot]), choice)[0])
+
+    def _levels_of(self, slots: NDArray[np.int64], choice: ChoiceStages) -> NDArray[np.int64]:
+        """The largest that patches of leaves have by this choice."""
+        return np.clip(choice.level - self._levels_above(slots), 0, highest_level(self.lightmap.nodes.tile))
+
+    def _levels_above(self, slots: NDArray[np.int64]) -> NDArray[np.int64]:
+        """By how much patches of leaves are finer, as their texels are coarser."""
+        return np.zeros_like(slots)
+
+    def _finest_of(self, shot: Shot) -> tuple[int, int, int, int]:
+        return *shot.corner, shot.size, self._level_of(self._slot_at(shot.corner), self.stages.choices[-1])
 
     @property
     def resolution(self) -> int:
@@ -259,7 +304,8 @@ class UniformShooting(ShotPasses):
         buffers = self.buffers
         self.stages.tell.draw(
             buffers.report_target,
-            textures={"t_runs": buffers.runs, "t_ledger": buffers.ledger, "t_shooters": buffers.shooters},
+            textures={"t_runs": buffers.runs, "t_unshot": buffers.unshot, "t_ledger": buffers.ledger}
+            | {"t_shooters": buffers.shooters},
         )
         self._reports.append((self._choice, ReadBack(self.gpu, buffers.report_target)))
 
@@ -267,12 +313,12 @@ class UniformShooting(ShotPasses):
         """report (REPORT_HEAD + SHOOTER_ROWS, 4), see report.frag.glsl; choice: the level that it is about."""
         emitted = self._emitted.sum()
         residual = report[0, 0] * self._watt / emitted if emitted > 0 else 0.0
-        faint = report[0, 1] * self._watt < FAINT * emitted
-        if faint and choice is self._choice and choice is not self.stages.choices[-1]:
-            self._choice = self.stages.choices[self.stages.choices.index(choice) + 1]
-            self.buffers.level_out()
+        if choice is self._choice and residual <= max(COARSE_LEAVE, self.options.residual):
+            finest = choice is self.stages.choices[-1]
+            self._even = finest and report[0, 2] * self._watt <= FINE_LEAVE * self.options.residual * emitted
+            self._phase += not finest
         self.report = StepReport(int(report[1, 3]), float(residual), report[1, :3] * self._watt)
-        if report[REPORT_HEAD + 5, 3] > 0:
+        if report[REPORT_HEAD + 5, 3] != 0:
             self.last_shot = self._shot_from_rows(report[REPORT_HEAD:])
 
     def _tile_sums(self) -> tuple[F64, F64, F64]:

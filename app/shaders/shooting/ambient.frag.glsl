@@ -1,0 +1,23 @@
+// The irradiance that all unshot light will make on average, after all its reflections [Cohen88, eq. 9], in an open scene:
+//
+//   Φ f (1 + ρf + ρ²f² + …) / A = Φ f / (A (1 - ρf))
+//
+// Φ: unshot power; ρ: mean albedo; f: share of what was shot until now that stayed in the scene; A: area of all texels.
+uniform sampler2D t_unshot;  // of runs: Σ r A
+uniform sampler2D t_ledger;
+uniform vec3 u_albedo;
+uniform float u_area;  // solver frame
+
+layout(location = 0) out vec4 out_ambient;
+
+void main() {
+    vec3 unshot = vec3(0.0), shot = vec3(0.0), gone = vec3(0.0);
+    for (int i = 0; i < textureSize(t_unshot, 0).x; ++i) unshot += texelFetch(t_unshot, ivec2(i, 0), 0).rgb;
+    for (int i = 0; i < textureSize(t_ledger, 0).x; ++i) {
+        gone += texelFetch(t_ledger, ivec2(i, 0), 0).rgb + texelFetch(t_ledger, ivec2(i, 1), 0).rgb;
+        shot += texelFetch(t_ledger, ivec2(i, 2), 0).rgb;
+    }
+    vec3 stays = clamp(1.0 - gone / max(shot, vec3(1e-30)), 0.0, 1.0);
+    stays = mix(vec3(0.0), stays, greaterThan(shot, vec3(0.0)));
+    out_ambient = vec4(unshot * stays / (u_area * max(1.0 - u_albedo * stays, vec3(1e-3))), 0.0);
+}
