@@ -39,7 +39,7 @@ Blocks = dict[str, tuple[Buffer, int, int]]  # what a pass binds: buffer, offset
 # Shots of so large a share of the emitted power are audited before they are made; where one would make or lose more than this
 # share of its own, its patch is split. Most light is shot by few patches: a hall under skylights in coffers gains 5.8 % without.
 # A patch of two texels along its edge sees what its texels see.
-AUDITED, SOUND, SMALL = 0.005, 0.02, 2
+AUDITED, SOUND, SMALL = 0.0025, 0.02, 2
 
 
 @dataclass(frozen=True)
