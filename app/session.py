@@ -297,7 +297,8 @@ class Session(Viewing):
     @property
     def parameters(self) -> dict[str, Any]:
         """Every knob that shaped the solution."""
-        shooting = self.shooting.as_dict() | {"resolution": self.solver.resolution}
+        chosen = {"level": self.solver.level, "resolution": self.solver.resolution}
+        shooting = self.shooting.as_dict() | chosen
         return {"shooting": shooting, "atlas": self.atlas.as_dict(), "light": self.default_light}
 
 

@@ -40,6 +40,7 @@ class Stats:
     triangles: int
     charts: int
     memory_mib: float
+    level: int  # of the patches that shoot in the end
     resolution: int  # of a full face of the visibility map [px]
 
 
@@ -66,5 +67,6 @@ def stats_of(session: Session) -> Stats:
         triangles=len(session.scene.triangles),
         charts=session.charts.chart_count,
         memory_mib=sum(lightmap.memory.values()) / 2**20,
+        level=session.solver.level,
         resolution=session.solver.resolution,
     )

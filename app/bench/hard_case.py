@@ -17,7 +17,7 @@ from app.projections import PROJECTIONS
 from app.scene.model import F32, F64, Scene
 from app.solvers import DEFAULT_SOLVER, SOLVERS, EnergyBook, ShootingOptions
 from app.solvers.shooting.options import MAX_LEVEL
-from app.solvers.shooting.stages import BATCH, ROOT_LEVEL
+from app.solvers.shooting.stages import BATCH, LEVEL, ROOT_LEVEL
 
 SIZES = ("small", "large")
 ENOUGH = 2_000_000  # shots: a solve that needs more does not converge
@@ -193,7 +193,7 @@ class HardCase:
             residual=max(least, LEAST),  # quadtrees shoot no further
         )
         if adaptive:  # levels count from the root, whose texels are those of a uniform lightmap
-            options = options.replace(level=min(options.level + ROOT_LEVEL, MAX_LEVEL))
+            options = options.replace(level=min(LEVEL + ROOT_LEVEL, MAX_LEVEL))
         start = time.perf_counter()
         nodes = load(scene, AtlasOptions(density=self.density[i] / scale, adaptive=adaptive)).nodes
         lightmap = Lightmap(gpu, nodes, storage=way.storage)

@@ -91,8 +91,12 @@ class Solver(Protocol[OptionsT]):
         """Other albedos and emissions of the scene, from the next step on; solves for the difference if it can."""
 
     @property
+    def grown(self) -> bool:
+        """Whether no leaves come or go, and all hold what the shots gave them."""
+
+    @property
     def settled(self) -> bool:
-        """Whether nothing but shots is left to do."""
+        """Whether the solution is as even as it will be: once the residual is small as well, it is solved."""
 
     def unshot_share(self) -> float:
         """The residual as a share of the emitted power, now. Waits for the GPU."""
@@ -115,7 +119,11 @@ class Solver(Protocol[OptionsT]):
         """Each part of a step of so many shots by itself, to be timed and warmed up. They spoil the light: reset afterwards."""
 
     def patch_edge(self, texel: tuple[int, int]) -> int:
-        """Texels along the edge of the patch that a texel (column, row) of the node set would shoot from now."""
+        """Texels along the edge of the largest patch that a texel (column, row) of the node set may shoot from now."""
+
+    @property
+    def level(self) -> int:
+        """Mip level that shoots in the end: as set, or as the scene asks for."""
 
     @property
     def resolution(self) -> int:

@@ -3,21 +3,25 @@
 //   Φ f (1 + ρf + ρ²f² + …) / A = Φ f / (A (1 - ρf))
 //
 // Φ: unshot power; ρ: mean albedo; f: share of what was shot until now that stayed in the scene; A: area of all texels.
-uniform sampler2D t_unshot;  // of runs: Σ r A
+uniform sampler2D t_unshot;  // of runs: Σ r A, and Σ |Σ r A| over tiles, summed over RGB
 uniform sampler2D t_ledger;
 uniform vec3 u_albedo;
 uniform float u_area;  // solver frame
 
 layout(location = 0) out vec4 out_ambient;
 
+const float CANCELS = 1e-6;  // under this share of Σ |Σ r A| over tiles, Σ r A is what rounding leaves
+
 void main() {
-    vec3 unshot = vec3(0.0), shot = vec3(0.0), gone = vec3(0.0);
-    for (int i = 0; i < textureSize(t_unshot, 0).x; ++i) unshot += texelFetch(t_unshot, ivec2(i, 0), 0).rgb;
+    vec4 sum = vec4(0.0);
+    for (int i = 0; i < textureSize(t_unshot, 0).x; ++i) sum += texelFetch(t_unshot, ivec2(i, 0), 0);
+    vec3 unshot = mix(vec3(0.0), sum.rgb, greaterThan(abs(sum.rgb), vec3(CANCELS * sum.a)));
+    vec3 shot = vec3(0.0), gone = vec3(0.0);
     for (int i = 0; i < textureSize(t_ledger, 0).x; ++i) {
         gone += texelFetch(t_ledger, ivec2(i, 0), 0).rgb + texelFetch(t_ledger, ivec2(i, 1), 0).rgb;
         shot += texelFetch(t_ledger, ivec2(i, 2), 0).rgb;
     }
     vec3 stays = clamp(1.0 - gone / max(shot, vec3(1e-30)), 0.0, 1.0);
     stays = mix(vec3(0.0), stays, greaterThan(shot, vec3(0.0)));
-    out_ambient = vec4(unshot * stays / (u_area * max(1.0 - u_albedo * stays, vec3(1e-3))), 0.0);
+    out_ambient = vec4(unshot * stays / max(u_area * max(1.0 - u_albedo * stays, 1e-3), 1e-30), 0.0);
 }

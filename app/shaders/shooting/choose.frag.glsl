@@ -1,19 +1,19 @@
 // The shooters of a batch: row k describes the k-th strongest of the runs' strongest patches. [Coombe03, 3.4]
 //
 // The polygon is the patch's own parallelogram, so that neighbouring patches tile their surface exactly. Visibility is
-// sampled from the middle of what is shot; where part of the patch shoots nothing (something stands on it), or the patch is not
-// flat, from its leading texel.
+// sampled from the middle of what is shot; where part of the patch is dark (something stands on it), or the patch is not flat, from
+// its leading texel.
 #include "common/atlas.glsl"
 #include "common/tile.glsl"
 #include "common/albedo.glsl"
-#include "common/leaves.glsl"
+#include "shooting/patch_level.glsl"
 #include "shooting/candidate.glsl"
 #include "shooting/expected.glsl"
 #include "shooting/shooter.glsl"
 #include "shooting/belongs.glsl"
 
-const float WEAKEST = 0.1;  // a shot under a tenth of the batch's best waits for a later batch
-const float UNLIT = 0.01;   // a texel that shoots under 1 % of what the leading one does counts as covered by something
+const float WEAKEST = 0.1;       // a shot under a tenth of the batch's best waits for a later batch
+const float CANCELS = 1.0 / 256;  // under this share of Σ |R| A, Σ R A is what rounding leaves: no mean is taken from texels for it
 
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
@@ -45,14 +45,16 @@ vec4 ranked_run(int rank) {
 
 Texel texel_at(ivec2 px) { return load_texel(t_position_area, t_normal_ids, px); }
 
+vec3 irradiance_at(ivec2 px) { return texelFetch(t_irradiance, px, 0).rgb; }
+
 vec3 shoots(ivec2 px, Texel texel) {
-    vec3 H = texelFetch(t_irradiance, px, 0).rgb;
+    vec3 H = irradiance_at(px);
     return texelFetch(t_residual, px, 0).rgb + light_ahead(H, albedo_of(t_materials, texel.material, px));
 }
 
 // The strongest texel near the middle of what the patch shoots: its plane is the shooter's. On a convex surface no other part of
 // the patch then lies above that plane.
-Texel leading_texel(ivec2 corner_px, int size, out float leading) {
+ivec2 leading_texel(ivec2 corner_px, int size, out Texel lead) {
     vec3 middle = vec3(0.0);
     float power = 0.0, strongest = 0.0;
     for (int i = 0; i < size * size; ++i) {
@@ -64,8 +66,8 @@ Texel leading_texel(ivec2 corner_px, int size, out float leading) {
         strongest = max(strongest, own);
     }
     middle /= max(power, 1e-30);
-    Texel lead;
-    lead.area = leading = 0.0;
+    ivec2 lead_px = corner_px;
+    lead.area = 0.0;
     float nearest = 3e38;
     for (int i = 0; i < size * size; ++i) {
         ivec2 px = corner_px + ivec2(i % size, i / size);
@@ -76,15 +78,15 @@ Texel leading_texel(ivec2 corner_px, int size, out float leading) {
         if (own * texel.area > 0.5 * strongest && dot(offset, offset) < nearest) {
             nearest = dot(offset, offset);
             lead = texel;
-            leading = own;
+            lead_px = px;
         }
     }
-    return lead;
+    return lead_px;
 }
 
 Shooter shooter_from_patch(ivec2 corner_px, int size) {
-    float leading;
-    Texel lead = leading_texel(corner_px, size, leading);
+    Texel lead;
+    leading_texel(corner_px, size, lead);
     Shooter s;
     s.size_px = 0;
     if (lead.area <= 0.0) return s;
@@ -99,7 +101,8 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
 
     vec3 area_centre = vec3(0.0), power_centre = vec3(0.0), flux = vec3(0.0);
     float area = 0.0, power = 0.0;
-    bool whole = true, alone = true;
+    bool flat_patch = true, alone = true;
+    vec2 lit = UNLIT_YET;
     ivec2 lower = ivec2(size), upper = ivec2(-1);
     for (int i = 0; i < size * size; ++i) {
         ivec2 at = ivec2(i % size, i / size), px = corner_px + at;
@@ -115,7 +118,8 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
         float own = power_of(r);
         power_centre += texel.position * texel.area * own;
         power += texel.area * own;
-        whole = whole && texel.facet == lead.facet && own > UNLIT * leading;
+        flat_patch = flat_patch && texel.facet == lead.facet;
+        lit = lit_with(lit, irradiance_at(px));
         lower = min(lower, at);
         upper = max(upper, at);
     }
@@ -124,7 +128,8 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
     s.facet = lead.facet;
     s.patch_px = corner_px;
     s.size_px = size;
-    s.even = whole && alone;
+    bool whole = flat_patch && !partly_covered(lit);
+    s.even = whole && alone && power_of(flux) > CANCELS * power;
 
     // see from the middle of what is shot, or where that may lie inside or under something, from the texel that leads
     s.origin = whole ? power_centre / power : lead.position;
@@ -141,12 +146,37 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
     return s;
 }
 
+// Whether all of a patch could shoot with a part of it; their flux
+bool is_family(ivec2 corner_px, int size, Shooter part, out vec3 flux) {
+    bool all = true;
+    flux = vec3(0.0);
+    for (int i = 0; i < size * size; ++i) {
+        ivec2 px = corner_px + ivec2(i % size, i / size);
+        Texel texel = texel_at(px);
+        all = all && (texel.area <= 0.0 || belongs(texel, part.normal, part.chart));
+        if (texel.area > 0.0) flux += shoots(px, texel) * texel.area;
+    }
+    return all;
+}
+
+// The patch itself, or the one in the middle of a family, which shoots for all and owes the others.
+Shooter shooter_for(ivec2 corner_px, int level) {
+    int one = min(level, patch_levels(corner_px).shoots), size = 1 << level;
+    if (one == level) return shooter_from_patch(corner_px, size);
+    Texel lead;
+    ivec2 middle_px = leading_texel(corner_px, size, lead) >> one << one;
+    Shooter s = shooter_from_patch(middle_px, 1 << one);
+    vec3 flux;
+    if (s.size_px > 0 && s.even && is_family(corner_px, size, s, flux)) s.exitance = flux / s.area;
+    return s;
+}
+
 void main() {
     int shot = int(gl_FragCoord.y);
     vec4 run = ranked_run(shot);
     Shooter s;
     s.size_px = 0;
     if (run.x > 0.0 && (shot == 0 || run.x >= WEAKEST * ranked_run(0).x))
-        s = shooter_from_patch(corner_of(run), 1 << level_of(run));
+        s = shooter_for(corner_of(run), level_of(run));
     out_row = s.size_px > 0 ? shooter_row(s, int(gl_FragCoord.x)) : vec4(0.0);
 }

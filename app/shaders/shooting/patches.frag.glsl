@@ -8,6 +8,7 @@
 #include "common/albedo.glsl"
 #include "shooting/patch_level.glsl"
 #include "shooting/candidate.glsl"
+#include "shooting/rank.glsl"
 #include "shooting/expected.glsl"
 
 uniform sampler2D t_position_area;
@@ -40,7 +41,8 @@ vec4 strongest_of(ivec2 block_px, int level) {
     for (int nth = 0; nth < across * across; ++nth) {
         ivec2 corner_px = block_px + ivec2(nth % across, nth / across) * edge;
         float power = power_of(flux_of(corner_px, edge));
-        best = power > best.x ? candidate(power, corner_px, level, best.w + power) : best + vec4(0.0, 0.0, 0.0, power);
+        float rank = rank_of(power, corner_px, level), all = best.w + power;
+        best = rank > best.x ? candidate(rank, corner_px, level, all) : vec4(best.xyz, all);
     }
     return best;
 }
@@ -58,7 +60,7 @@ void main() {
         vec3 albedo = albedo_of(t_materials, material_from_ids(texelFetch(t_normal_ids, px, 0).y), px);
         out_unshot.rgb += r * area;
         out_patch.rgb += light_ahead(H, albedo) * area;
-        if (area > 0.0) out_lit = lit_with(out_lit, vec2(dot(H, vec3(1.0))));
+        if (area > 0.0) out_lit = lit_with(out_lit, H);
     }
     out_patch.rgb += out_unshot.rgb;
     int level = partly_covered(out_lit) ? levels.finest : levels.largest;

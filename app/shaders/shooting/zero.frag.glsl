@@ -2,7 +2,7 @@
 // erased. Blended: r_i = r_i a + rgb.
 //
 // A patch shoots its mean. Where its texels are alike but for their light, they keep what they have above or below the mean, which
-// finer patches shoot later; else, r_i = 0. What was shot ahead is owed.
+// finer patches shoot later; else nothing is left of r_i. What was shot ahead is owed.
 #include "common/atlas.glsl"
 #include "common/albedo.glsl"
 #include "shooting/shooter.glsl"

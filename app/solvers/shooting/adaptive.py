@@ -45,10 +45,8 @@ class AdaptiveShooting(Reshooting):
         self._judged: tuple[int, ReadBack] | None = None  # on its way, and the version of the leaves that it is of
         self._look_at = 0
         self._split_at: dict[Tile, int] = {}  # shots in the log when a leaf was split
-        self._calm, self._calm_at = (
-            False,
-            0,
-        )  # whether the last look at the leaves found nothing to do; shots in the log then
+        self._calm = False  # whether the last look at the leaves found nothing to do
+        self._calm_at = 0  # shots in the log then
         super().__init__(gpu, lightmap, options)
         self._roughness, self._roughness_target = self._texels(per_slot=True)
 
@@ -76,10 +74,14 @@ class AdaptiveShooting(Reshooting):
 
     @property
     def settled(self) -> bool:
+        """Whether the finest patches have shot, and the tree has stopped growing."""
+        return super().settled and self.grown
+
+    @property
+    def grown(self) -> bool:
         """Whether the tree has stopped growing and all its leaves hold what the shots gave them."""
-        done = self._done
-        judged = self._calm and not (done and self._calm_at < self._log.count)  # once more at the end
-        return super().settled and judged and not self._fresh and self._redo_under_way is None
+        judged = self._calm and not (self._done and self._calm_at < self._log.count)  # once more at the end
+        return judged and not self._fresh and self._redo_under_way is None
 
     @property
     def _done(self) -> bool:
@@ -105,7 +107,7 @@ class AdaptiveShooting(Reshooting):
             yield from self._look(PER_SHOT * shots, bands)
             if self._judged is None:
                 self._look_at = self._log.count + max(LOOK_AFTER, self._log.count // 4)
-        self._all_again &= not self.settled
+        self._all_again &= not self.grown
         return made or shots
 
     def _levels_above(self, slots: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -239,8 +241,7 @@ class AdaptiveShooting(Reshooting):
         self._regrowth.apply(change, self._carried)
         self._emitted = self.lightmap.emitted
         gone, came = (change.parents, change.children) if change.split else (change.children, change.parents)
-        corners = self.lightmap.nodes.corners
-        self.buffers.hand_down(*([(x, y) for x, y in corners(at).tolist()] for at in (gone, came)))
+        self.buffers.hand_down(change)
         self._exchange(gone, came, inherit=change.split)
 
     def _drop_judged(self) -> None:

@@ -25,15 +25,14 @@ def highest_level(tile: int) -> int:
 class ShootingOptions(Options):
     """Only ``storage`` restarts the solution when it changes; the rest acts on the next shot."""
 
-    level: int = option(
-        2,
-        "mip level that shoots in the end: patches of 2^level texels squared, at most a leaf",
+    level: int | None = option(
+        None,
+        "mip level that shoots in the end: patches of 2^level texels squared, at most a leaf; unset: 2, in large scenes as many "
+        "patches as matter",
         minimum=0,
         maximum=MAX_LEVEL,
     )
-    coarsen: bool = option(
-        True, "shoot from larger patches first, and in large scenes to the end, as many as show the light soon"
-    )
+    coarsen: bool = option(True, "shoot from larger patches first: as many as show all of the light soon")
     residual: float = option(
         1e-3, "converged when this share of the emitted power is unshot", minimum=1e-9, maximum=1, logarithmic=True
     )

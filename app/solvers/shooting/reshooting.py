@@ -112,6 +112,12 @@ class Reshooting(UniformShooting):
         power = float(powers_of(report[None, REPORT_HEAD:])[0]) * self._watt
         self._weak = self._weak or (power < STRONG * self._emitted.sum() and self.report.residual < MOSTLY_SHOT)
 
+    def _next_phase(self) -> None:
+        """Lamps shoot once more then, from all their patches: strong shots again."""
+        super()._next_phase()
+        self._forget_strong()
+        self._weak = False
+
     def _book(self, shots: int) -> None:
         super()._book(shots)
         self._log.add(self.buffers, shots)

@@ -1,10 +1,10 @@
 """One batch of shots, pass by pass [Coombe03, 3]: choose, zero, see, receive, look out, book.
 
-    i = patch with the largest |Σ r A|;  see the scene from i;  H_j += r_i F_ji V_ji;  r_j += ρ_j r_i F_ji V_ji
+    i = patch with the largest |Σ R A|;  see the scene from i;  r_i -= R_i;  H_j += R_i F_ji V_ji;  r_j += ρ_j R_i F_ji V_ji
 
-The chosen shooters never leave the GPU: ``choose`` writes one row of t_shooters per shot of a batch, and every later pass
-reads it there. All chosen residuals are zeroed before the first of the batch shoots, or what one gives to another would be
-lost.
+R: the residual and what will come back, see expected.glsl. The chosen shooters never leave the GPU: ``choose`` writes one row of
+t_shooters per shot of a batch, and every later pass reads it there. What they shoot is taken from them before the first of the
+batch shoots, or what one gives to another would be lost.
 
 Σ_j A_j F_ji V_ji plus what leaves should be A_i: where a patch sees from its middle what its edges do not, in a coffer or beside
 a box, it is not. So strong batches are audited before they shoot, and shoot from finer patches where they fail.
@@ -39,7 +39,7 @@ Blocks = dict[str, tuple[Buffer, int, int]]  # what a pass binds: buffer, offset
 # Shots of so large a share of the emitted power are audited before they are made; where one would make or lose more than this
 # share of its own, its patch is split. Most light is shot by few patches: a hall under skylights in coffers gains 5.8 % without.
 # A patch of two texels along its edge sees what its texels see.
-AUDITED, SOUND, SMALL = 0.0025, 0.02, 2
+AUDITED, SOUND, SMALL = 0.005, 0.02, 2
 
 
 @dataclass(frozen=True)
@@ -117,6 +117,7 @@ class ShotPasses:
     _emitted: F64  # RGB [W]
     _albedo: tuple[float, ...]  # mean, RGB
     _area: float  # of all texels, solver frame
+    _most_power: float  # beyond which it does not matter who shoots first, see rank.glsl [stored units · solver area]
 
     @property
     def _choice(self) -> ChoiceStages:
@@ -169,9 +170,12 @@ class ShotPasses:
         power = powers_of(rows)
         strong = power * self._watt > AUDITED * self._emitted.sum()
         self._audits = bool(strong.any())
+        tried = np.flatnonzero(strong & (edges_of(rows) > SMALL)).tolist()
+        if not tried:
+            return False
         failed = []
         with AuditTargets(self.gpu, self.lightmap) as targets:
-            for shot in np.flatnonzero(strong & (edges_of(rows) > SMALL)).tolist():
+            for shot in tried:
                 if abs(sum(self._hand_out(targets, shot, power[shot])) - 1) > SOUND:
                     failed.append(shot)
                 yield
@@ -204,6 +208,7 @@ class ShotPasses:
             choice.patch_target,
             textures=self.lightmap.textures(*reads)
             | {"t_finer": self.buffers.finer, "t_ambient": self.buffers.ambient},
+            uniforms={"u_most": self._most_power},
             scissor=rows_of(choice.patches[0].size, band, bands),
         )
 
@@ -213,6 +218,7 @@ class ShotPasses:
         choice.begin.draw(
             choice.candidate_target,
             textures={"t_patches": patches, "t_unshot": unshot, "t_lit": lit},
+            uniforms={"u_most": self._most_power},
         )
         candidates, unshot = choice.candidates
         choice.add_runs.draw(
@@ -229,7 +235,7 @@ class ShotPasses:
                 "t_position_area", "t_normal_ids", "t_irradiance", "t_residual", "t_facets", "t_leaves"
             )
             | self.lightmap.textures("t_materials", "t_albedo")
-            | {"t_runs": self.buffers.runs, "t_ambient": self.buffers.ambient},
+            | {"t_runs": self.buffers.runs, "t_ambient": self.buffers.ambient, "t_finer": self.buffers.finer},
             viewport=(0, 0, SHOOTER_ROWS, shots),
         )
         self.buffers.shooter_target.read_into(self.buffers.shooter_blocks, components=4, dtype="f4")
@@ -324,7 +330,7 @@ class ShotPasses:
         )
 
     def _book(self, shots: int) -> None:
-        """Enter in the ledger what the batch sent out of the scene, and see what all that is unshot will make come back."""
+        """Enter in the ledger what the batch shot and sent out of the scene."""
         self.stages.enter.draw(
             self.buffers.ledger_target,
             textures={"t_open": self.stages.maps.open, "t_shooters": self.buffers.shooters},
@@ -332,6 +338,10 @@ class ShotPasses:
             blend="add",
             viewport=(0, 0, shots, LEDGER_ROWS),
         )
+        self._expect()
+
+    def _expect(self) -> None:
+        """See what all that is unshot will make come back."""
         if self.lightmap.storage == "fixed8":  # which cannot owe light
             return
         self.stages.expect.draw(

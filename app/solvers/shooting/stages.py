@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.lightmap import Lightmap
 from app.atlas.node_set import Moves
+from app.atlas.quadtree import Change
 from app.gpu import Gpu, Pass, Texture
 from app.projections import PROJECTIONS, Occluders
 from app.scene.model import F32, F64
@@ -21,12 +22,14 @@ SHOOTER_ROWS = 6  # texels that describe one shooter, see shooter.glsl
 BLOCK_BYTES = 256  # no driver asks for a coarser uniform block alignment
 BLOCK_ROWS = BLOCK_BYTES // 16  # texels in a row of t_shooters: one shooter, padded to a uniform block
 REPORT_HEAD = 2  # texels of the report before those of its first shooter, see report.frag.glsl
+EMITTER = 16  # marks a patch, see patch_level.glsl
 LEVELS = 8  # of patches: a candidate has its level in units of its row, see candidate.glsl
 SQUARE_LEVEL = 3  # a batch takes one patch at most of each square of so many texels, as a power of 2
 BLOCK_LEVEL = 2  # blocks of so many texels along each edge, as a power of 2, are summed once, see patches.frag.glsl
 LEDGER_ROWS = 3  # see ledger.frag.glsl
-# Patches of a scene, where they may be coarser: about so many show the light first, and more than the most gain little.
-FIRST_PATCHES, MOST_PATCHES = 400, 4096
+# Patches of a scene: about so many show the light first, and unless a level is set, the finest are no more than the most, since
+# more gain little, nor finer than a level.
+FIRST_PATCHES, MOST_PATCHES, LEVEL = 400, 4096, 2
 ROOT_LEVEL = 2  # quadtrees: at this level a texel of the root shoots by itself
 # px, of maps that follow from the scene. Below, shadows of few texels get coarse too: 128 for 256 makes 2.2 % error 2.6 % in the
 # Cornell box of 32,000 texels. Above, there is little to gain: 512 for 256 takes 181,000 texels of an other scene half as long
@@ -46,15 +49,19 @@ def fitting_resolution(lightmap: Lightmap, *, adaptive: bool) -> int:
 def patch_levels(lightmap: Lightmap, options: ShootingOptions, *, adaptive: bool) -> range:
     """Of the patches that shoot, from those that begin to the finest, as powers of 2 of texels; in quadtrees, of uniform ones."""
     top = MAX_LEVEL if adaptive else highest_level(lightmap.nodes.tile)
-    first = last = min(options.level, top)
-    if options.coarsen:
-        texels = lightmap.nodes.surfaces.area.sum() * lightmap.charts.density**2 * (4**ROOT_LEVEL if adaptive else 1)
-        while last < top and texels / 4**last > MOST_PATCHES:
-            last += 1
-        first = last
-        while first < top and texels / 4 ** (first + 1) >= FIRST_PATCHES:
-            first += 1
+    texels = lightmap.nodes.surfaces.area.sum() * lightmap.charts.density**2 * (4**ROOT_LEVEL if adaptive else 1)
+    last = min(LEVEL if options.level is None else options.level, top)
+    while options.level is None and last < top and texels / 4**last > MOST_PATCHES:
+        last += 1
+    first = last
+    while options.coarsen and first < top and texels / 4 ** (first + 1) >= FIRST_PATCHES:
+        first += 1
     return range(first, last - 1, -1)
+
+
+def _mark(marks: F32, finer: int | NDArray[np.int64]) -> None:
+    """Let patches be so much finer at least, see patch_level.glsl; what emits stays marked so."""
+    marks[:] = marks // EMITTER * EMITTER + np.maximum(marks % EMITTER, finer)
 
 
 class ShotBuffers:
@@ -102,12 +109,14 @@ class ShotBuffers:
         the finest level of patches there."""
         for x, y, edge, finest in patches:
             columns, rows = (slice(c >> BLOCK_LEVEL, (c + edge - 1 >> BLOCK_LEVEL) + 1) for c in (x, y))
-            finer = max(finest + 2 - (edge.bit_length() - 1), 1)
-            self.finer_levels[rows, columns] = np.maximum(self.finer_levels[rows, columns], finer)
+            _mark(self.finer_levels[rows, columns], max(finest + 2 - (edge.bit_length() - 1), 1))
         self.finer.write(self.finer_levels.tobytes())
 
-    def divide(self, power: F64, most: float, largest: NDArray[np.int64], finest: NDArray[np.int64]) -> None:
-        """Let no patch hold more than so much power (slots, t, t) of texels; largest, finest (slots,): levels of patches."""
+    def divide(
+        self, power: F64, most: float, largest: NDArray[np.int64], finest: NDArray[np.int64], *, families: bool
+    ) -> None:
+        """Let no patch hold more than so much power (slots, t, t) of texels; largest, finest (slots,): levels of patches;
+        families: whether one may shoot for several, and owe the others."""
         edge, highest = self._tile, highest_level(self._tile)
         level = np.full((len(power), edge, edge), highest)
         for one in range(highest, 0, -1):
@@ -118,23 +127,31 @@ class ShotBuffers:
         largest, finest = largest[:, None, None], finest[:, None, None]
         finer = np.where(level < largest, np.maximum(finest + 1 - level, 1), 0)
         place = np.divmod(np.arange(len(power)), self._tiles.shape[1])
-        self._tiles[place] = np.maximum(self._tiles[place], finer)
+        tiles = self._tiles[place]
+        _mark(tiles, finer)
+        self._tiles[place] = tiles % EMITTER + EMITTER * (families & (finer > 0))
         self.finer.write(self.finer_levels.tobytes())
 
-    def hand_down(self, old: Sequence[tuple[int, int]], new: Sequence[tuple[int, int]]) -> None:
-        """Let each of the new tiles that begin at these texels shoot as fine as the old one in its place; places may recur."""
+    def hand_down(self, change: Change) -> None:
+        """Let leaves that came shoot as fine as what was in their place."""
         if not self.finer_levels.any():
             return
-        marks: dict[tuple[int, int], float] = {}
-        for gone, came in zip(old, new, strict=True):
-            marks[came] = max(marks.get(came, 0.0), float(self._blocks(gone).max()))
-        for corner in (*old, *new):
-            self._blocks(corner)[:] = marks.get(corner, 0.0)
+        tiles, columns = self._tiles, self._tiles.shape[1]
+        parents, children = (np.divmod(slots, columns) for slots in (change.parents, change.children))
+        blocks = np.arange(tiles.shape[-1])
+        across, up = (side * len(blocks) // 2 + blocks // 2 for side in change.corner.T[..., None])
+        held, gone = tiles[parents if change.split else children], parents if change.split else children
+        tiles[gone] = 0
+        place = up[:, :, None], across[:, None, :]
+        if change.split:
+            tiles[children] = held[np.arange(len(held))[:, None, None], *place]
+        else:
+            np.maximum.at(tiles, tuple(at[:, None, None] for at in parents) + place, held)
         self.finer.write(self.finer_levels.tobytes())
 
     def finer_at(self, texel: tuple[int, int]) -> int:
         """0, or 1 and the levels by which the patch of this texel is finer than the finest of others."""
-        return int(self.finer_levels[texel[1] >> BLOCK_LEVEL, texel[0] >> BLOCK_LEVEL])
+        return int(self.finer_levels[texel[1] >> BLOCK_LEVEL, texel[0] >> BLOCK_LEVEL]) % EMITTER
 
     @property
     def _tiles(self) -> F32:
@@ -149,7 +166,7 @@ class ShotBuffers:
         return self.finer_levels[row : row + edge, column : column + edge]
 
     def all_alike(self) -> None:
-        """Let all shoot from patches of one level."""
+        """Let nothing shoot from finer patches than other things."""
         self.finer_levels[:] = 0
         self.finer.write(self.finer_levels.tobytes())
 
@@ -167,13 +184,14 @@ class ChoiceStages:
         tile = lightmap.nodes.tile
         root, top = ROOT_LEVEL if adaptive else 0, {"HIGHEST": highest_level(tile)}
         of_block = {"BLOCK": 1 << BLOCK_LEVEL, "BLOCK_LEVEL": BLOCK_LEVEL}
+        of_block["LEVELS"] = LEVELS
         of_tile = {"TILE_SQUARES": tile >> SQUARE_LEVEL}
         reads = lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE")
         levels = {"LEVEL": level - root, "FINEST": finest - root}
         self.add_patches = Pass(gpu, "shooting/patches", defines=reads | of_block | levels | top)
         self.begin = Pass(gpu, "shooting/begin", defines=of_block | of_tile | top | {"SQUARE_LEVEL": SQUARE_LEVEL})
         self.add_runs = Pass(gpu, "shooting/runs", defines=of_tile)
-        self.choose = Pass(gpu, "shooting/choose", defines=reads | of_block)
+        self.choose = Pass(gpu, "shooting/choose", defines=reads | of_block | levels | top)
 
     def _fit(self, lightmap: Lightmap) -> None:
         width, height = lightmap.size

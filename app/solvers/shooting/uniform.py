@@ -42,6 +42,7 @@ from app.solvers.shooting.stages import (
 # more here and less there: light that hardly leaves its corner. So they end once they hold so many times the residual asked for.
 COARSE_LEAVE, FINE_LEAVE = 5e-3, 10
 MOST = 0.02  # of the emitted power: emitters of more are divided, a lamp in 50 patches at least: shadows add up to soft ones
+ALIKE = 0.25  # of that: among patches that hold more, each has its turn, see rank.glsl
 WHOLE = object()  # no part is left
 REPORT_LAG = 2  # read-backs in flight before the oldest is looked at
 
@@ -79,6 +80,7 @@ class UniformShooting(ShotPasses):
         self.shots, self.last_shot = 0, None
         self.buffers.ambient_target.clear()
         self._weigh_scene()
+        self._divide_emitters()
         self.report = StepReport(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
 
     def set_options(self, options: ShootingOptions) -> None:
@@ -96,7 +98,7 @@ class UniformShooting(ShotPasses):
         self.stages, self.options = fresh, options
         self._phase, self._audits, self._even = min(self._phase, len(fresh.choices) - 1), True, False
         self.buffers.all_alike()
-        self._weigh_scene()
+        self._divide_emitters()
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light that is there stays, and the difference is shot, negative too [Chen90]. Begins
@@ -116,31 +118,44 @@ class UniformShooting(ShotPasses):
         factor = self.lightmap.common_factor(materials)
         if (factor != 1).any():
             self._scale_light(factor)
+        before, self._phase, self._audits, self._even = self.lightmap.scene.materials, 0, True, False
         self.lightmap.edit_materials(materials, factor)
-        self._phase, self._audits, self._even = 0, True, False
-        self._weigh_scene()
+        self._weigh_scene(at_least=self._most_power * float(factor.max()))
+        if not np.allclose([m.emission for m in materials], [m.emission * factor for m in before]):
+            self._divide_emitters()
         self.report = replace(self.report, residual=self.unshot_share())
+        self._expect()
 
     def _scale_light(self, factor: F64) -> None:
         """Multiply all light that was shot by a factor (3,)."""
         self.lightmap.scale(factor)
         self.lightmap.scale(factor, self.buffers.ledger_target)
 
-    def _weigh_scene(self) -> None:
-        """What its emitters send out and its surfaces reflect."""
+    def _weigh_scene(self, at_least: float = 0.0) -> None:
+        """What its emitters send out and its surfaces reflect; at_least: power that counts as much, for what is dimmed."""
         self._emitted = self.lightmap.emitted
         sums, _, reflectance = self._tile_sums()
         self._area = float(sums[3]) / self._watt
         self._albedo = tuple((reflectance[:3] / max(sums[3], 1e-300)).tolist())
+        self._most_power = max(ALIKE * MOST * float(self._emitted.sum()) / self._watt, at_least)
+
+    def _divide_emitters(self) -> None:
+        """Let no patch hold much of the light. What was divided stays so: others may be owed light there."""
         power = self.lightmap.emission().sum(-1, dtype=np.float64) * self.lightmap.nodes.surfaces.area
         slots = np.arange(len(power))
         largest, finest = (self._levels_of(slots, choice) for choice in (self._choice, self.stages.choices[-1]))
-        self.buffers.divide(power, MOST * self._emitted.sum(), largest, finest)
+        most = MOST * self._emitted.sum()
+        self.buffers.divide(power, most, largest, finest, families=self.lightmap.storage != "fixed8")
 
     @property
     def _choice(self) -> ChoiceStages:
         """Among the patches that shoot now."""
         return self.stages.choices[self._phase]
+
+    @property
+    def grown(self) -> bool:
+        """Always: no leaves come or go."""
+        return True
 
     @property
     def settled(self) -> bool:
@@ -255,6 +270,10 @@ class UniformShooting(ShotPasses):
         return *shot.corner, shot.size, self._level_of(self._slot_at(shot.corner), self.stages.choices[-1])
 
     @property
+    def level(self) -> int:
+        return self.stages.choices[-1].level
+
+    @property
     def resolution(self) -> int:
         return self.stages.resolution
 
@@ -316,10 +335,15 @@ class UniformShooting(ShotPasses):
         if choice is self._choice and residual <= max(COARSE_LEAVE, self.options.residual):
             finest = choice is self.stages.choices[-1]
             self._even = finest and report[0, 2] * self._watt <= FINE_LEAVE * self.options.residual * emitted
-            self._phase += not finest
+            if not finest:
+                self._next_phase()
         self.report = StepReport(int(report[1, 3]), float(residual), report[1, :3] * self._watt)
         if report[REPORT_HEAD + 5, 3] != 0:
             self.last_shot = self._shot_from_rows(report[REPORT_HEAD:])
+
+    def _next_phase(self) -> None:
+        """Finer patches shoot from now on."""
+        self._phase += 1
 
     def _tile_sums(self) -> tuple[F64, F64, F64]:
         """Absorbed and unshot power [W] and Σ ρA, RGB and in the first Σ A, as books.frag.glsl adds them per tile."""

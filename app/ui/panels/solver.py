@@ -34,7 +34,9 @@ def draw(session: Session, state: State) -> None:
     _energy(state)
     widgets.section("Shooting")
     assert state.stats is not None
-    edited = widgets.edit_options(edited, skip=TREE, starts={"resolution": state.stats.resolution})
+    edited = widgets.edit_options(
+        edited, skip=TREE, starts={"level": state.stats.level, "resolution": state.stats.resolution}
+    )
     if edited is not session.shooting:
         state.act(lambda: session.set_shooting(edited))
 
@@ -48,7 +50,7 @@ def _leaves(session: Session, state: State) -> None:
     imgui.same_line()
     right(widgets.percent(share), theme.DIM)
     widgets.tooltip(f"Of the {stats.uniform_texels:,} texels that the finest level everywhere would take")
-    if not session.solver.settled:
+    if not session.solver.grown:
         widgets.dim("leaves are changing")
     elif session.solver.note is not None:
         widgets.wrapped(session.solver.note, theme.AMBER)
