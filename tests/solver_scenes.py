@@ -21,7 +21,7 @@ from app.scene.model import F32, F64, Material, Scene
 from app.solvers import SOLVERS, EnergyBook, ShootingOptions, UniformShooting
 from app.solvers.shooting.options import MAX_LEVEL
 from app.solvers.shooting.shot import Audit
-from app.solvers.shooting.stages import BATCH, ROOT_LEVEL
+from app.solvers.shooting.stages import BATCH, LEVEL, ROOT_LEVEL
 
 UNIT_SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])  # faces +z
 ENOUGH = 20_000  # shots: a solve that needs more does not converge
@@ -199,7 +199,9 @@ def begin(
     shooting = ShootingOptions(depth=1).replace(**options)
     nodes = quadtree_nodes(scene, charts) if SOLVERS[solver].adaptive else NodeSet(scene, charts)
     if SOLVERS[solver].adaptive:
-        shooting = shooting.replace(level=min(shooting.level + ROOT_LEVEL, MAX_LEVEL))
+        shooting = shooting.replace(
+            level=min((LEVEL if shooting.level is None else shooting.level) + ROOT_LEVEL, MAX_LEVEL)
+        )
     lightmap = Lightmap(gpu, nodes, storage=shooting.storage)
     return Solution(lightmap, SOLVERS[solver](gpu, lightmap, shooting))
 

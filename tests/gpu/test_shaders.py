@@ -22,7 +22,7 @@ from app.render.layers import LAYER_SHADERS
 from app.render.options import TONE_MAPS
 from app.render.resolve import BORDER, PLACES_WIDTH
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
-from app.solvers.shooting.stages import OPEN_BLOCK
+from app.solvers.shooting.stages import BLOCK_LEVEL, EMITTER, LEVELS, OPEN_BLOCK, SQUARE_LEVEL
 
 OPTION = {spec.name: spec for spec in specs(ShootingOptions)}
 FLAG = (False, True)
@@ -33,7 +33,14 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "HIGHEST": (MAX_LEVEL,),
     "TILE": (TILES[-1],),
     "TILE_BLOCKS": (TILES[-1],),
+    "TILE_SQUARES": (TILES[-1] >> SQUARE_LEVEL,),
+    "SQUARE_LEVEL": (SQUARE_LEVEL,),
     "BLOCK": (OPEN_BLOCK,),
+    "BLOCK_LEVEL": (BLOCK_LEVEL,),
+    "FINEST": (0, MAX_LEVEL),
+    "LEVELS": (LEVELS,),
+    "EMITTER": (EMITTER,),
+    "KEEPS": FLAG,
     "VIEWS": tuple({p.views for p in PROJECTIONS.values()}),
     "MATERIAL_BITS": (16,),
     "ALBEDO_TEXTURE": FLAG,

@@ -109,3 +109,29 @@ def test_what_is_partly_covered_shoots_from_its_finest_patches(gpu: Gpu, monkeyp
             assert shot.size <= 2
     assert largest > 2 and straddles > 0
     box.release()
+
+
+def test_a_patch_shoots_for_its_family_and_is_paid_back_evenly(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The room is lit long before all of the lamp has shot. When the others of each family shoot, and what was shot for them is
+    taken back, the light stays about as it is; in the end it is that of patches which shot for themselves only."""
+    monkeypatch.setattr("app.solvers.shooting.stages.FIRST_PATCHES", 100)
+    scene, options = load_scene("cornell-box"), {"texels": 8000, "residual": 2e-3, "resolution": 128}
+    alone = begin(gpu, scene, coarsen=False, **options)
+    alone.settle()
+    box = begin(gpu, scene, **options)
+    patches = np.count_nonzero(box.solver.buffers.finer_levels)
+    received, owed = [], 0.0
+    while not (box.solver.report.residual <= 2e-3 and box.solver.settled):
+        box.solver.step(8)
+        box.solver.poll(wait=True)
+        received.append((box.solver._phase, np.average(box.H.mean(1), weights=box.area)))
+        if box.solver._phase == 0 and not owed and received[-1][1] > 0.5 * np.average(alone.H.mean(1), weights=alone.area):
+            owed = -flux_of(box).min() / box.lightmap.emitted.sum()
+            assert patches
+    last = len(box.solver.stages.choices) - 1
+    fine = [light for phase, light in received if phase == last]
+    assert owed > 2 * MOST  # one patch holds no more
+    assert 0.8 * fine[-1] < min(fine) and max(fine) < 1.2 * fine[-1]
+    assert np.sqrt(((box.H - alone.H) ** 2).mean()) < 0.02 * alone.H.mean()
+    for one in (box, alone):
+        one.release()

@@ -52,8 +52,9 @@ def test_an_edit_ends_where_a_fresh_solve_ends(gpu: Gpu, name: str) -> None:
     assert room.solver.report.shots - before < fresh.solver.report.shots
     book = room.book
     np.testing.assert_allclose(book.emitted, fresh.book.emitted, rtol=1e-6)
-    # the books of both are off by the same form factors, as shares of the emitted power
-    assert abs(book.imbalance_share - fresh.book.imbalance_share) < 2e-3
+    # the books of both are off by the same form factors, as shares of the emitted power; the edited one
+    # shot more, from patches of 0.8 m beside a table: a solve is off by 0.7 %, and the edit moves up to half of its light
+    assert abs(book.imbalance_share - fresh.book.imbalance_share) < 4e-3
     room.release()
     fresh.release()
 

@@ -5,10 +5,11 @@
 #define FINEST 2   // where LEVEL will end
 #define HIGHEST 4  // no patch is larger than a tile
 #define EMITTER 16 // added to t_finer
-#define FAMILY 2   // levels between an emitter's patch and its family
 
 #include "common/leaves.glsl"
 #include "shooting/block.glsl"
+
+const int FAMILY = 1;  // levels between an emitter's patch and its family
 
 uniform sampler2D t_finer;  // 0, or 1 + how many levels the patches in each block are finer than FINEST
 

@@ -117,11 +117,15 @@ class ShotPasses:
     _emitted: F64  # RGB [W]
     _albedo: tuple[float, ...]  # mean, RGB
     _area: float  # of all texels, solver frame
-    _most_power: float  # beyond which it does not matter who shoots first, see rank.glsl [stored units · solver area]
 
     @property
     def _choice(self) -> ChoiceStages:
         """Among the patches that shoot now."""
+        raise NotImplementedError
+
+    @property
+    def _most_power(self) -> float:
+        """Beyond which it does not matter who shoots first, see rank.glsl [stored units · solver area]."""
         raise NotImplementedError
 
     def _finest_of(self, shot: Shot) -> tuple[int, int, int, int]:

@@ -187,7 +187,7 @@ class ChoiceStages:
         of_block["LEVELS"] = LEVELS
         of_tile = {"TILE_SQUARES": tile >> SQUARE_LEVEL}
         reads = lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE")
-        levels = {"LEVEL": level - root, "FINEST": finest - root}
+        levels = {"LEVEL": level - root, "FINEST": finest - root, "EMITTER": EMITTER}
         self.add_patches = Pass(gpu, "shooting/patches", defines=reads | of_block | levels | top)
         self.begin = Pass(gpu, "shooting/begin", defines=of_block | of_tile | top | {"SQUARE_LEVEL": SQUARE_LEVEL})
         self.add_runs = Pass(gpu, "shooting/runs", defines=of_tile)

@@ -13,6 +13,7 @@ Works badly where the middle of a patch sees something else than the rest of it 
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import replace
@@ -41,8 +42,8 @@ from app.solvers.shooting.stages import (
 # Large patches shoot first, and finer ones what those leave once so little of the emitted power is unshot. What is left then is
 # more here and less there: light that hardly leaves its corner. So they end once they hold so many times the residual asked for.
 COARSE_LEAVE, FINE_LEAVE = 5e-3, 10
-MOST = 0.02  # of the emitted power: emitters of more are divided, a lamp in 50 patches at least: shadows add up to soft ones
-ALIKE = 0.25  # of that: among patches that hold more, each has its turn, see rank.glsl
+MOST = 0.02  # of the emitted power: emitters of more are divided, one lamp into 50 patches at least: shadows add up to soft ones
+ALIKE = 1 / 16  # of that: among finest patches that hold more, each has its turn, see rank.glsl
 WHOLE = object()  # no part is left
 REPORT_LAG = 2  # read-backs in flight before the oldest is looked at
 
@@ -120,7 +121,7 @@ class UniformShooting(ShotPasses):
             self._scale_light(factor)
         before, self._phase, self._audits, self._even = self.lightmap.scene.materials, 0, True, False
         self.lightmap.edit_materials(materials, factor)
-        self._weigh_scene(at_least=self._most_power * float(factor.max()))
+        self._weigh_scene(at_least=self._alike * float(factor.max()))
         if not np.allclose([m.emission for m in materials], [m.emission * factor for m in before]):
             self._divide_emitters()
         self.report = replace(self.report, residual=self.unshot_share())
@@ -137,7 +138,7 @@ class UniformShooting(ShotPasses):
         sums, _, reflectance = self._tile_sums()
         self._area = float(sums[3]) / self._watt
         self._albedo = tuple((reflectance[:3] / max(sums[3], 1e-300)).tolist())
-        self._most_power = max(ALIKE * MOST * float(self._emitted.sum()) / self._watt, at_least)
+        self._alike = max(ALIKE * MOST * float(self._emitted.sum()) / self._watt, at_least)
 
     def _divide_emitters(self) -> None:
         """Let no patch hold much of the light. What was divided stays so: others may be owed light there."""
@@ -151,6 +152,10 @@ class UniformShooting(ShotPasses):
     def _choice(self) -> ChoiceStages:
         """Among the patches that shoot now."""
         return self.stages.choices[self._phase]
+
+    @property
+    def _most_power(self) -> float:
+        return self._alike if 0 < self._phase == len(self.stages.choices) - 1 else math.inf
 
     @property
     def grown(self) -> bool:
