@@ -79,6 +79,7 @@ class FakeSession:
             "charts": 18,
             "memory_mib": 7.3,
             "shots": 60,
+            "level": 2,
             "resolution": 256,
         }
         rates = {"residual": 0.0318, "seconds": 0.3, "shots_per_second": 212.0, "converged": False}

@@ -139,6 +139,7 @@ FACING = np.add(UNIT_SQUARE[::-1], [0.0, 0.0, 1.0])
 STANDING = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])  # on an edge, faces +x
 
 
+@pytest.mark.usefixtures("undivided")
 @pytest.mark.parametrize(("level", "density"), [(2, 32), (4, 16)], ids=["64 patches", "whole square"])
 @pytest.mark.parametrize(
     ("other", "expected"),
@@ -160,6 +161,7 @@ def test_unit_squares(gpu: Gpu, other: F64, expected: float, level: int, density
     solution.release()
 
 
+@pytest.mark.usefixtures("undivided")
 @pytest.mark.parametrize("discs", [1, 4])
 def test_unit_squares_by_discs(gpu: Gpu, discs: int) -> None:
     """The papers' discs reach the shot: one for a patch of a quarter of the square is already within 2 % at this distance

@@ -256,7 +256,7 @@ def leaves_of(solution: Solution) -> list[dict[Tile, bytes] | set[Tile]]:
 
 def test_a_solver_takes_along_what_it_knows_of_its_leaves(planted: Callable[..., Solution]) -> None:
     """Also those that are fresh, and the light of strong shots that is kept."""
-    box = planted(**(MANY | {"depth": 2}))
+    box = planted(**(MANY | {"depth": 2, "residual": 0.01}))
     box.settle()
     solver = tree_solver(box)
     assert solver._carried, "no strong light is kept"
@@ -292,7 +292,8 @@ def twin(gpu: Gpu, solution: Solution) -> Solution:
 @pytest.mark.long
 def test_further_shots_come_to_the_same_answer(gpu: Gpu, planted: Callable[..., Solution]) -> None:
     """As of a solver that kept its room: what either leaves unshot, at most 1 %, lies elsewhere, since the strongest patches are
-    found run by run of slots. As of one that had these leaves from the start: within 1 %, as whenever else a tree grows."""
+    found run by run of slots. As of one that had these leaves from the start: what patches of other leaves make of it is 1 %
+    (test_adaptive.py), besides that."""
     box, roomy = (planted(**(MANY | {"density": 4.0, "residual": 0.5})) for _ in range(2))
     tree_solver(roomy)._give_room_back = lambda: None  # type: ignore[method-assign]
     for one in (box, roomy):
@@ -306,7 +307,7 @@ def test_further_shots_come_to_the_same_answer(gpu: Gpu, planted: Callable[..., 
         one.solver.set_options(one.solver.options.replace(residual=0.01))
         one.settle()
     mine, here = collapse(box.lightmap.nodes, box.lightmap.irradiance())
-    for other, tolerance in zip(others, (0.005, 0.01), strict=True):
+    for other, tolerance in zip(others, (0.005, 0.015), strict=True):
         assert tree_solver(other).tree.slots.keys() == tree_solver(box).tree.slots.keys()
         light, there = collapse(other.lightmap.nodes, other.lightmap.irradiance())
         assert (here == there).all()

@@ -104,6 +104,7 @@ def test_the_light_does_not_depend_on_the_tile(gpu: Gpu, solver: str) -> None:
     np.testing.assert_allclose(*means, rtol=0.03)
 
 
+@pytest.mark.usefixtures("undivided")
 @pytest.mark.parametrize(("solver", "density"), [("shooting", 8.0), ("adaptive", 4.0)])
 def test_no_patch_is_larger_than_its_leaf(gpu: Gpu, solver: str, density: float) -> None:
     """On quadtrees, the lamp's leaves begin two levels below the roots: those of the others shoot from smaller patches."""

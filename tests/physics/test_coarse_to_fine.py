@@ -125,7 +125,11 @@ def test_a_patch_shoots_for_its_family_and_is_paid_back_evenly(gpu: Gpu, monkeyp
         box.solver.step(8)
         box.solver.poll(wait=True)
         received.append((box.solver._phase, np.average(box.H.mean(1), weights=box.area)))
-        if box.solver._phase == 0 and not owed and received[-1][1] > 0.5 * np.average(alone.H.mean(1), weights=alone.area):
+        if (
+            box.solver._phase == 0
+            and not owed
+            and received[-1][1] > 0.5 * np.average(alone.H.mean(1), weights=alone.area)
+        ):
             owed = -flux_of(box).min() / box.lightmap.emitted.sum()
             assert patches
     last = len(box.solver.stages.choices) - 1

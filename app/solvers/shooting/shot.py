@@ -169,12 +169,15 @@ class ShotPasses:
 
     def _fails(self, shots: int) -> Generator[None, None, bool]:
         """Whether a chosen shooter would make or lose light and can shoot from finer patches: it will. Only strong ones are worth
-        asking: after the first batch without any, none is. In parts; waits for the GPU."""
+        asking, each patch once: after the first batch without any, none is. In parts; waits for the GPU."""
         rows = self._shooter_rows(shots)
         power = powers_of(rows)
         strong = power * self._watt > AUDITED * self._emitted.sum()
         self._audits = bool(strong.any())
-        tried = np.flatnonzero(strong & (edges_of(rows) > SMALL)).tolist()
+        edge = edges_of(rows)
+        patches = [(int(x), int(y), int(size)) for x, y, size in zip(rows[:, 3, 3], rows[:, 4, 3], edge, strict=True)]
+        sound = self.buffers.sound
+        tried = [k for k in np.flatnonzero(strong & (edge > SMALL)).tolist() if patches[k] not in sound]
         if not tried:
             return False
         failed = []
@@ -182,6 +185,8 @@ class ShotPasses:
             for shot in tried:
                 if abs(sum(self._hand_out(targets, shot, power[shot])) - 1) > SOUND:
                     failed.append(shot)
+                else:
+                    sound.add(patches[shot])
                 yield
         if failed:
             self.buffers.shoot_finer(self._finest_of(self._shot_from_rows(row)) for row in rows[failed])

@@ -80,6 +80,7 @@ class ShotBuffers:
         self.ledger_target = gpu.target(self.ledger)
         self.ambient_target = gpu.target(self.ambient)
         self.report_target = gpu.target(self.report)
+        self.sound: set[tuple[int, int, int]] = set()  # patches whose shots were audited and pass: column, row, edge
         self._fit(lightmap)
         self.all_alike()
 
@@ -103,6 +104,7 @@ class ShotBuffers:
         place = np.divmod(np.arange(moves.slots), lightmap.columns)
         self._tiles[place] = held
         self.finer.write(self.finer_levels.tobytes())
+        self.sound.clear()
 
     def shoot_finer(self, patches: Iterable[tuple[int, int, int, int]]) -> None:
         """Let what is in these patches shoot from patches at least a level finer: column and row of the lower texel, edge, and
@@ -112,11 +114,8 @@ class ShotBuffers:
             _mark(self.finer_levels[rows, columns], max(finest + 2 - (edge.bit_length() - 1), 1))
         self.finer.write(self.finer_levels.tobytes())
 
-    def divide(
-        self, power: F64, most: float, largest: NDArray[np.int64], finest: NDArray[np.int64], *, families: bool
-    ) -> None:
-        """Let no patch hold more than so much power (slots, t, t) of texels; largest, finest (slots,): levels of patches;
-        families: whether one may shoot for several, and owe the others."""
+    def divide(self, power: F64, most: float, largest: NDArray[np.int64], finest: NDArray[np.int64]) -> None:
+        """Let no patch hold more than so much power (slots, t, t) of texels; largest, finest (slots,): levels of patches."""
         edge, highest = self._tile, highest_level(self._tile)
         level = np.full((len(power), edge, edge), highest)
         for one in range(highest, 0, -1):
@@ -129,11 +128,12 @@ class ShotBuffers:
         place = np.divmod(np.arange(len(power)), self._tiles.shape[1])
         tiles = self._tiles[place]
         _mark(tiles, finer)
-        self._tiles[place] = tiles % EMITTER + EMITTER * (families & (finer > 0))
+        self._tiles[place] = tiles % EMITTER + EMITTER * (finer > 0)
         self.finer.write(self.finer_levels.tobytes())
 
     def hand_down(self, change: Change) -> None:
         """Let leaves that came shoot as fine as what was in their place."""
+        self.sound.clear()
         if not self.finer_levels.any():
             return
         tiles, columns = self._tiles, self._tiles.shape[1]
@@ -167,6 +167,7 @@ class ShotBuffers:
 
     def all_alike(self) -> None:
         """Let nothing shoot from finer patches than other things."""
+        self.sound.clear()
         self.finer_levels[:] = 0
         self.finer.write(self.finer_levels.tobytes())
 

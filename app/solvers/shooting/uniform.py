@@ -141,12 +141,14 @@ class UniformShooting(ShotPasses):
         self._alike = max(ALIKE * MOST * float(self._emitted.sum()) / self._watt, at_least)
 
     def _divide_emitters(self) -> None:
-        """Let no patch hold much of the light. What was divided stays so: others may be owed light there."""
+        """Let no patch hold much of the light, but where 8 bits do not hold what a small one gives. What was divided stays so:
+        others may be owed light there."""
+        if self.lightmap.storage == "fixed8":
+            return
         power = self.lightmap.emission().sum(-1, dtype=np.float64) * self.lightmap.nodes.surfaces.area
         slots = np.arange(len(power))
         largest, finest = (self._levels_of(slots, choice) for choice in (self._choice, self.stages.choices[-1]))
-        most = MOST * self._emitted.sum()
-        self.buffers.divide(power, most, largest, finest, families=self.lightmap.storage != "fixed8")
+        self.buffers.divide(power, MOST * self._emitted.sum(), largest, finest)
 
     @property
     def _choice(self) -> ChoiceStages:
