@@ -12,6 +12,7 @@ from app.bench.curve import Stopwatch, errors
 from app.bench.methods import names_of
 from app.bench.report import Row
 from app.bench.truth import PATHS_SEED, Truth, no_tracer
+from app.bench.view import View
 from app.scene.model import Scene
 
 PEER_SEED = 7919 * PATHS_SEED  # no path of the reference again
@@ -22,11 +23,12 @@ class Peer:
     """missing: why it cannot run here, None if it can; curve: its samples within about so many seconds."""
 
     missing: Callable[[], str | None]
-    curve: Callable[[Scene, Truth, float], list[Row]]
+    curve: Callable[[Scene, Truth, View | None, float], list[Row]]
 
 
-def _mitsuba(scene: Scene, truth: Truth, limit: float) -> list[Row]:
-    """A path tracer with 1, 2, 4 … paths from each point, those before them included. Raises UserError."""
+def _mitsuba(scene: Scene, truth: Truth, view: View | None, limit: float) -> list[Row]:
+    """A path tracer with 1, 2, 4 … paths from each point, those before them included; its picture has as many paths altogether.
+    Raises UserError."""
     from app.bench import tracer
 
     traced = tracer.Tracer(scene)
@@ -43,6 +45,9 @@ def _mitsuba(scene: Scene, truth: Truth, limit: float) -> list[Row]:
             rows.append({"seconds": watch.seconds, "cpu_seconds": cpu.seconds, "paths": paths})
             rows[-1] |= errors(total / paths, truth)
         batch = paths
+    if view is not None:
+        each = max(round(paths * len(truth.points) / len(view.points)), 1)
+        rows[-1]["flip"] = view.flip(traced.irradiance(*view.points.positions_normals(scene), each, PEER_SEED))
     return rows
 
 
