@@ -22,7 +22,7 @@ from app.bench.curve import LEVELS, first_at, look_at, solve_curve
 from app.bench.machine import load, machine, processor
 from app.bench.measure import opened
 from app.bench.methods import METHODS
-from app.bench.peers import PEERS
+from app.bench.peers import PEERS, Task
 from app.bench.points import irradiance_of
 from app.bench.report import FLIP, Column, Row, csv_text, markdown_table, missing
 from app.bench.truth import Truth, choose, truth_of
@@ -200,7 +200,8 @@ def _measure(gpu: Gpu, one: SceneCurves, plan: Plan, console: Console, tell: Tel
 def _curve(gpu: Gpu, one: SceneCurves, truth: Truth, name: str, plan: Plan) -> list[Row]:
     """Of a method or a peer. Raises UserError."""
     if name in PEERS:
-        return PEERS[name].curve(one.scene, truth, one.view, plan.seconds)
+        atlas, _ = plan.options("uniform")
+        return PEERS[name].curve(Task(one.scene, truth, one.view, atlas, plan.seconds))
     with opened(gpu, one.scene, *plan.options(name)) as (lightmap, solver):
         rows = solve_curve(gpu, solver, plan.seconds, lambda: look_at(lightmap, solver, truth))
         if one.view is not None:
