@@ -19,24 +19,24 @@ CHOSEN = ("t_position_area", "t_residual")
 class Stream:
     """Reads and blends for the same texels and shots what the receiver pass of a solver does, and computes nothing."""
 
-    def __init__(self, gpu: Gpu, solver: UniformShooting) -> None:
-        self._gpu, self._solver = gpu, solver
-        self._passes = {key: self._pass(*key) for key in solver.stages.receive}
+    def __init__(self, gpu: Gpu, shooting: UniformShooting) -> None:
+        self._gpu, self._shooting = gpu, shooting
+        self._passes = {key: self._pass(*key) for key in shooting.stages.receive}
         self._moved: list[float] = []
 
     def _pass(self, flat: bool, near: bool) -> Pass:
         defines: dict[str, object] = {"FLAT": flat, "NEAR_FIELD": near}
-        defines |= {"VISIBILITY": VISIBILITIES.index(self._solver.options.visibility)}
-        defines |= self._solver.lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE")
+        defines |= {"VISIBILITY": VISIBILITIES.index(self._shooting.options.visibility)}
+        defines |= self._shooting.lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE")
         return Pass(self._gpu, "bench/stream", defines=defines, vertex="shooting/receive")
 
     def run(self) -> None:
         """For the batch that was chosen last. Waits for the GPU."""
-        self._moved.append(sum(self._draw(first, shots) for first, shots in self._solver.stages.groups(BATCH)))
+        self._moved.append(sum(self._draw(first, shots) for first, shots in self._shooting.stages.groups(BATCH)))
 
     def _draw(self, first: int, shots: int) -> float:
         """Bytes that the texels of these shots move."""
-        lightmap, moved = self._solver.lightmap, 0.0
+        lightmap, moved = self._shooting.lightmap, 0.0
         for (flat, _), stream in self._passes.items():
             if flat not in lightmap.receivers:
                 continue
@@ -45,9 +45,9 @@ class Stream:
                 stream.draw(
                     lightmap.light_target,
                     textures=lightmap.textures("t_materials", "t_albedo", *(() if flat else SHAPED))
-                    | self._solver.stages.sight_textures,
+                    | self._shooting.stages.sight_textures,
                     uniforms={"u_size": lightmap.size, "u_first": first, "u_shots": shots},
-                    blocks={"ShooterBlock": (self._solver.buffers.shooter_blocks, 0, BATCH * BLOCK_BYTES)},
+                    blocks={"ShooterBlock": (self._shooting.buffers.shooter_blocks, 0, BATCH * BLOCK_BYTES)},
                     mesh=lightmap.receivers[flat],
                     blend="add",
                 )
@@ -56,7 +56,7 @@ class Stream:
 
     def moved(self) -> dict[str, float]:
         """Bytes per shot of a batch that each pass must move, by its name: of the receiver pass in the mean of all runs."""
-        lightmap, stages = self._solver.lightmap, self._solver.stages
+        lightmap, stages = self._shooting.lightmap, self._shooting.stages
         item = 4 * stages.map_size[0] * stages.map_size[1]
         sight = item * len(stages.sight_textures)
         return {
