@@ -11,7 +11,7 @@ import time
 import bpy
 import numpy as np
 
-MARGIN = 4  # texels that are filled around each chart
+MARGIN = 16  # texels that are filled around each chart: as Blender has it, and the filter sees no black gaps
 BOUNCES = 1024  # as good as no limit: paths end by chance
 
 
