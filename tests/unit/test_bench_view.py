@@ -10,7 +10,7 @@ import pytest
 from app.atlas.node_set import Frame
 from app.bench import view
 from app.bench.report import FLIP, missing
-from app.bench.truth import Truth, truth_of
+from app.bench.truth import Truth, no_tracer, truth_of
 from app.gpu import Gpu
 from app.render.camera import CameraView
 from app.render.develop import encode_srgb
@@ -93,6 +93,25 @@ def test_the_back_of_one_side_is_black(gpu: Gpu) -> None:
     points.back[:] = True
     assert not view._colours(scene, points, "albedo").any() and not view._colours(scene, points, "emission").any()
     assert not view._reflecting(scene, points).any()
+
+
+@needs_flip
+def test_paths_make_the_view_once(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    if (reason := no_tracer()) is not None:
+        pytest.skip(reason)
+    from app.bench import tracer
+
+    scene = load_scene("furnace")
+    known = truth_of(scene, "closed-form", 1, silent)
+    traced = Truth("path-traced", known.points, known.E, None, "", 0.0)
+    first = view.view_of(gpu, scene, traced, 200, silent)
+    monkeypatch.setattr(tracer.Tracer, "irradiance", None)
+    again = view.view_of(gpu, scene, traced, 200, silent)
+    assert first is not None and again is not None and first.noise == again.noise
+    np.testing.assert_array_equal(first.E, again.E)
+    # 200 paths from 2000 points are 8 for a pixel, whose mean over 49,152 of them is within 1 %
+    assert first.E.mean() == pytest.approx(2.0, rel=0.01)
+    assert first.noise is not None and 0 < first.noise < 1
 
 
 def test_there_is_no_view_where_it_would_take_too_long(gpu: Gpu) -> None:
