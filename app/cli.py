@@ -213,7 +213,8 @@ def _error_flags(error: Parser) -> None:
         type=_peer_names,
         default=(),
         metavar="A,B",
-        help="other programs on the same plot: mitsuba (needs glowtree[peers])",
+        help="all, or some of other programs on the same plot: mitsuba, cycles, cycles-oidn (need glowtree[peers], or a Python "
+        "with bpy and pyoidn that GLOWTREE_BLENDER_PYTHON names)",
     )
     error.add_argument(
         "--seconds",

@@ -13,7 +13,7 @@ from app.atlas.charts import Charts
 from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents
 from app.scene.model import F32, F64, I32, Scene, Texture
 
-__all__ = ["faces_tangents", "texel_colours"]
+__all__ = ["faces_tangents", "look_up", "texel_colours"]
 
 SAMPLES = 2  # look-ups along each side of a texel
 BLOCK = 1 << 17  # texels in work at a time
@@ -91,11 +91,11 @@ def _average(texture: Texture, levels: list[F32], at: F64, du: F64, dv: F64) -> 
         mine = level == number
         for a in offsets:
             for b in offsets:
-                total[mine] += _look_up(texture, levels[number], at[mine] + a * du[mine] + b * dv[mine])
+                total[mine] += look_up(texture, levels[number], at[mine] + a * du[mine] + b * dv[mine])
     return (total / SAMPLES**2).astype(np.float32)
 
 
-def _look_up(texture: Texture, pixels: F32, at: F64) -> F32:
+def look_up(texture: Texture, pixels: F32, at: F64) -> F32:
     """One look-up per texture coordinate (n, 2) in one mip level, (n, 3)."""
     size = np.array([pixels.shape[1], pixels.shape[0]])
     place = at * size

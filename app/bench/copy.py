@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import statistics
-import time
-
 from app.gpu import Gpu
 
 
-def copy_bandwidth(gpu: Gpu, size: tuple[int, int], repeats: int = 15) -> float:
-    """Bytes per second, read and written, of copying an RGBA32F texture of ``size`` to another."""
-    source, sink = gpu.texture(size, 4, "f4"), gpu.texture(size, 4, "f4")
-    targets = gpu.target(source), gpu.target(sink)
-    targets[0].clear()
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        gpu.ctx.copy_framebuffer(targets[1], targets[0])
-        gpu.ctx.finish()
-        times.append(time.perf_counter() - start)
-    gpu.release_all(*targets, source, sink)
-    return 2 * 16 * size[0] * size[1] / statistics.median(times)
+class Copy:
+    """An RGBA32F texture of ``size`` copied to another. moved: bytes that a run reads and writes."""
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        self._gpu = gpu
+        self._textures = [gpu.texture(size, 4, "f4") for _ in range(2)]
+        self._source, self._sink = (gpu.target(texture) for texture in self._textures)
+        self._source.clear()
+        self.moved = 2 * 16 * size[0] * size[1]
+
+    def run(self) -> None:
+        self._gpu.ctx.copy_framebuffer(self._sink, self._source)
+
+    def release(self) -> None:
+        self._gpu.release_all(self._source, self._sink, *self._textures)

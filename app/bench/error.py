@@ -22,9 +22,11 @@ from app.bench.curve import LEVELS, first_at, look_at, solve_curve
 from app.bench.machine import load, machine, processor
 from app.bench.measure import opened
 from app.bench.methods import METHODS
-from app.bench.peers import PEERS
-from app.bench.report import Column, Row, csv_text, markdown_table
+from app.bench.peers import PEERS, Task
+from app.bench.points import irradiance_of
+from app.bench.report import FLIP, Column, Row, csv_text, markdown_table, missing
 from app.bench.truth import Truth, choose, truth_of
+from app.bench.view import SIZE, View, view_of
 from app.console import Console, Tell
 from app.errors import UserError
 from app.gpu import Gpu, gpu_context
@@ -39,7 +41,7 @@ SAMPLES = (
         Column(key, key)
         for key in ("scene", "method", "seconds", "cpu_seconds", "shots", "paths", "residual", "texels")
     ),
-    *(Column(key, key) for key in ("rms", "bias", "median", "q90", "leak", "imbalance")),
+    *(Column(key, key) for key in ("rms", "bias", "median", "q90", "leak", "imbalance", "flip")),
 )
 SUMMARY = (
     Column("method", "method"),
@@ -55,6 +57,7 @@ SUMMARY = (
     Column("q90", "90 %", ".2%"),
     Column("leak", "leak", ".3%"),
     Column("imbalance", "imbalance", "+.2%"),
+    Column("flip", "FLIP", ".4f", FLIP),
     *(Column(f"to_{level:g}", f"s to {level:.0%}", ".2f") for level in LEVELS),
 )
 NOTES = (
@@ -62,7 +65,8 @@ NOTES = (
     "mean. Bias: of the mean. Median, 90 %: quantiles of the error at each lit point, over the irradiance there. Leak: light at "
     "dark points, over the mean at lit ones. Imbalance: emitted light that is neither absorbed, nor unshot, nor gone. s to: "
     "seconds of solving until the RMS was that small, read between two looks; looking stops the clock, and loading is not timed. "
-    "CPU s: of all cores, which other programs on the machine do not change.",
+    "CPU s: of all cores, which other programs on the machine do not change. FLIP: how different what the first camera sees "
+    f"looks by this light and by the reference's, {SIZE[0]}×{SIZE[1]} pixels, 0 to 1; none where the reference has no picture.",
 )
 
 
@@ -75,6 +79,7 @@ class SceneCurves:
     scene: Scene
     reference: str
     truth: Truth | None = None
+    view: View | None = None
     curves: dict[str, list[Row]] = field(default_factory=dict)
 
     @property
@@ -118,6 +123,8 @@ def bench_error(flags: argparse.Namespace) -> int:
         plan.options(name)  # whose mistakes are told before anything is measured
     scenes = _scenes(flags.scenes, flags.reference)
     folder = prepare_directory(flags.output)
+    if reason := missing(FLIP):
+        console.warn(f"no FLIP: {reason}")
     plan = replace(plan, peers=tuple(name for name in plan.peers if _is_here(name, console)))
     with gpu_context() as gpu, console.progress("error") as tell:
         values: dict[str, Any] = {"glowtree": __version__, "renderer": gpu.limits.renderer, "machine": machine()}
@@ -170,27 +177,36 @@ def _measured(gpu: Gpu, scenes: list[SceneCurves], plan: Plan, console: Console,
 
 def _measure(gpu: Gpu, one: SceneCurves, plan: Plan, console: Console, tell: Tell) -> None:
     """Fill in the curves of a scene; what this machine cannot do is left out with a warning."""
+
+    def told(text: str, share: float) -> None:
+        tell(f"{one.name}, {text}", share)
+
     try:
-        truth = truth_of(one.scene, one.reference, plan.paths, lambda text, share: tell(f"{one.name}, {text}", share))
+        truth = truth_of(one.scene, one.reference, plan.paths, told)
+        view = view_of(gpu, one.scene, truth, plan.paths, told)
     except UserError as error:
         console.warn(f"{one.name}: left out: {error}")
         return
-    one.truth = truth
+    one.truth, one.view = truth, view
     names = (*plan.methods, *plan.peers)
     for i, name in enumerate(names):
         tell(f"{one.name}, {name}", i / len(names))
         try:
-            one.curves[name] = _curve(gpu, one.scene, truth, name, plan)
+            one.curves[name] = _curve(gpu, one, truth, name, plan)
         except (UserError, MemoryError) as error:
             console.warn(f"{one.name}, {name}: left out: {error or 'not enough memory'}")
 
 
-def _curve(gpu: Gpu, scene: Scene, truth: Truth, name: str, plan: Plan) -> list[Row]:
+def _curve(gpu: Gpu, one: SceneCurves, truth: Truth, name: str, plan: Plan) -> list[Row]:
     """Of a method or a peer. Raises UserError."""
     if name in PEERS:
-        return PEERS[name].curve(scene, truth, plan.seconds)
-    with opened(gpu, scene, *plan.options(name)) as (lightmap, solver):
-        return solve_curve(gpu, solver, plan.seconds, lambda: look_at(lightmap, solver, truth))
+        atlas, _ = plan.options("uniform")
+        return PEERS[name].curve(Task(one.scene, truth, one.view, atlas, plan.seconds))
+    with opened(gpu, one.scene, *plan.options(name)) as (lightmap, solver):
+        rows = solve_curve(gpu, solver, plan.seconds, lambda: look_at(lightmap, solver, truth))
+        if one.view is not None:
+            rows[-1]["flip"] = one.view.flip(irradiance_of(lightmap, one.view.points))
+    return rows
 
 
 def _values(one: SceneCurves, plan: Plan) -> dict[str, Any]:
@@ -207,6 +223,7 @@ def _values(one: SceneCurves, plan: Plan) -> dict[str, Any]:
         "source": str(one.scene.source),
         "triangles": len(one.scene.triangles),
         "truth": one.truth.as_dict(),
+        "view": None if one.view is None else one.view.as_dict(),
         "curves": curves,
         "summary": one.summary,
     }
@@ -223,6 +240,8 @@ def document(values: dict[str, Any], scenes: Iterable[SceneCurves]) -> str:
         noise = ""
         if truth.noise is not None:
             noise = f"; its own noise is {truth.noise:.2%} RMS, {truth.median_noise:.2%} in the median"
+        if one.view is not None and one.view.noise is not None:
+            noise += f"; pictures by two halves of its paths differ by a FLIP of {one.view.noise:.4f}"
         lit = int(truth.lit.sum())
         parts += [
             f"## {one.name}",

@@ -170,7 +170,7 @@ def scaling_row(gpu: Gpu, seconds: float, sweep: str, triangles: int, texels: in
         solver,
     ):
         light_up(lightmap)
-        passes, _ = passes_ms(gpu, solver, seconds)
+        passes = passes_ms(gpu, solver, seconds)
         row: Row = {"sweep": sweep, "triangles": len(lightmap.scene.triangles), "texels": lightmap.texel_count}
     return row | {"n": row[sweep], "shot_ms": sum(passes.values())} | {f"{name}_ms": passes[name] for name in PASSES}
 

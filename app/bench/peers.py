@@ -5,37 +5,56 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from app.atlas.options import AtlasOptions
+from app.bench.blender import bake, no_cycles
 from app.bench.curve import Stopwatch, errors
 from app.bench.methods import names_of
+from app.bench.points import light_at
 from app.bench.report import Row
 from app.bench.truth import PATHS_SEED, Truth, no_tracer
+from app.bench.view import View
+from app.loading import read_and_unfold
 from app.scene.model import Scene
 
 PEER_SEED = 7919 * PATHS_SEED  # no path of the reference again
 
 
 @dataclass(frozen=True)
+class Task:
+    """What a peer is to do, within about so many seconds. atlas: for one that bakes."""
+
+    scene: Scene
+    truth: Truth
+    view: View | None
+    atlas: AtlasOptions
+    seconds: float
+
+
+@dataclass(frozen=True)
 class Peer:
-    """missing: why it cannot run here, None if it can; curve: its samples within about so many seconds."""
+    """missing: why it cannot run here, None if it can; curve: its samples."""
 
     missing: Callable[[], str | None]
-    curve: Callable[[Scene, Truth, float], list[Row]]
+    curve: Callable[[Task], list[Row]]
 
 
-def _mitsuba(scene: Scene, truth: Truth, limit: float) -> list[Row]:
-    """A path tracer with 1, 2, 4 … paths from each point, those before them included. Raises UserError."""
+def _mitsuba(task: Task) -> list[Row]:
+    """A path tracer with 1, 2, 4 … paths from each point, those before them included; its picture has as many paths altogether.
+    Raises UserError."""
     from app.bench import tracer
 
+    scene, truth, view = task.scene, task.truth, task.view
     traced = tracer.Tracer(scene)
     place = truth.points.positions_normals(scene)
     rows: list[Row] = []
     total, paths, batch, nth = np.zeros_like(truth.E), 0, 1, 0
     traced.irradiance(*place, batch, PEER_SEED)  # kernels are compiled when they first run
     watch, cpu = Stopwatch(), Stopwatch(time.process_time)
-    while not rows or 2 * watch.seconds <= limit:
+    while not rows or 2 * watch.seconds <= task.seconds:
         nth += 1
         total += batch * traced.irradiance(*place, batch, PEER_SEED + nth)
         paths += batch
@@ -43,10 +62,34 @@ def _mitsuba(scene: Scene, truth: Truth, limit: float) -> list[Row]:
             rows.append({"seconds": watch.seconds, "cpu_seconds": cpu.seconds, "paths": paths})
             rows[-1] |= errors(total / paths, truth)
         batch = paths
+    if view is not None:
+        each = max(round(paths * len(truth.points) / len(view.points)), 1)
+        rows[-1]["flip"] = view.flip(traced.irradiance(*view.points.positions_normals(scene), each, PEER_SEED))
     return rows
 
 
-PEERS = {"mitsuba": Peer(no_tracer, _mitsuba)}
+def _cycles(task: Task, *, denoise: bool) -> list[Row]:
+    """Lightmaps with 1, 2, 4 … samples of each texel, each baked by itself; building the scene is not timed. Raises UserError."""
+    truth, view = task.truth, task.view
+    _, charts, _ = read_and_unfold(task.scene, task.atlas, False, lambda text, share: None)
+    sides = np.diff(charts.face_uv, axis=1)
+    texels = round(np.abs(np.linalg.det(sides)).sum() / 2)
+    rows: list[Row] = []
+    while not rows or 2 * rows[-1]["seconds"] <= task.seconds:
+        baked = bake(task.scene, charts, 1 << len(rows), denoise=denoise)
+        row: Row = {"seconds": baked.seconds, "cpu_seconds": baked.cpu_seconds, "paths": 1 << len(rows)}
+        row |= {"texels": texels, "made": baked.made}
+        rows.append(row | errors(light_at(baked.irradiance, charts, truth.points), truth))
+    if view is not None:
+        rows[-1]["flip"] = view.flip(light_at(baked.irradiance, charts, view.points))
+    return rows
+
+
+PEERS = {
+    "mitsuba": Peer(no_tracer, _mitsuba),
+    "cycles": Peer(no_cycles, partial(_cycles, denoise=False)),
+    "cycles-oidn": Peer(partial(no_cycles, "pyoidn"), partial(_cycles, denoise=True)),
+}
 
 
 def peer_names(text: str) -> tuple[str, ...]:

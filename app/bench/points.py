@@ -10,12 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.atlas.charts import Charts
 from app.atlas.collapse import collapse
 from app.atlas.lightmap import Lightmap
 from app.atlas.sides import lit_sides
 from app.bake.gutter import fill_gutter
 from app.reference.visibility import visible
-from app.scene.model import F64, Scene
+from app.scene.model import F32, F64, Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +65,13 @@ def open_above(scene: Scene, points: Points, reach: float) -> NDArray[np.bool_]:
 
 def irradiance_of(lightmap: Lightmap, points: Points) -> F64:
     """(n, 3) [W/m²], bilinear."""
-    nodes, charts = lightmap.nodes, lightmap.charts
-    image = fill_gutter(*collapse(nodes, lightmap.irradiance())).astype(np.float64)
+    image = fill_gutter(*collapse(lightmap.nodes, lightmap.irradiance()))
+    return light_at(image, lightmap.charts, points)
+
+
+def light_at(image: F32, charts: Charts, points: Points) -> F64:
+    """(n, 3), bilinear, of an image (h, w, 3) of the charts' atlas, row 0 at v = 0, with filled gutters."""
+    image = image.astype(np.float64)
     face = _faces(charts.face_triangle, charts.face_back, points)
     finer = image.shape[0] // charts.size[1]
     place = np.einsum("nk,nkc->nc", points.weights, charts.face_uv[face]) * finer - 0.5

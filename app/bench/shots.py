@@ -2,9 +2,8 @@
 
 The Cornell box is cut three times, then a museum and a grotto of the paper's sizes. A shot is timed alone, as the viewer shoots,
 and in batches, as the headless solver does (means over the shots made); the passes of a batch one by one, each to the end of its
-GPU work, for the shooters that the solve chooses (medians, divided by the shots of a batch). Bandwidth is what the receiver pass
-must move at least: H and r of each texel that gets light, read and written once in a batch, and of shaped tiles position, area,
-normal and ids; beside it a plain copy in the same run.
+GPU work, for the shooters that the solve chooses (medians, divided by the shots of a batch). What bounds them is measured beside
+them, in turns: the bytes that they must move (stream.py) against a plain copy, and the receiver pass without its arithmetic.
 """
 
 from __future__ import annotations
@@ -12,13 +11,14 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from app.atlas.lightmap import STORAGE, Lightmap
+from app.atlas.lightmap import Lightmap
 from app.atlas.options import AtlasOptions
-from app.bench.copy import copy_bandwidth
-from app.bench.report import markdown
+from app.bench.copy import Copy
+from app.bench.report import Column, Row, markdown, markdown_table
+from app.bench.stream import Stream
 from app.console import Console
 from app.gpu import Gpu, gpu_context
 from app.loading import load
@@ -35,8 +35,29 @@ SIZES = (
 )
 SECONDS = 3.0  # per figure and size
 WARM_UP = 1.0  # seconds of shots before: lamps first, and programs are compiled when they first draw
-BLENDED = 2 * 2 * 4  # numbers per texel: H and r, read and written, RGBA
-READ_BYTES = 16 + 8  # position, area; normal, ids
+HALF = 0.5  # of the time, or of a copy's bandwidth: from here on it is what bounds a pass
+BOUNDS = (
+    Column("scene", "scene"),
+    Column("texels", "texels", ","),
+    Column("shot_mb", "MB, shot", ".2f"),
+    Column("shot_gb_per_s", "GB/s", ".2f"),
+    Column("copy_gb_per_s", "copy GB/s", ".1f"),
+    Column("shot_share", "share", ".0%"),
+    Column("receive_mb", "MB, receive", ".2f"),
+    Column("receive_ms", "ms", ".2f"),
+    Column("receive_share", "share", ".0%"),
+    Column("copy_ms", "ms, copy", ".2f"),
+    Column("stream_ms", "ms, reads and blends", ".2f"),
+    Column("bound", "bound by"),
+)
+NOTE = f"Milliseconds per shot, and of each pass per shot of a batch of {BATCH}."
+BOUNDS_NOTE = (
+    "What bounds a shot of a batch: the megabytes that all its passes must move at least, at what rate they do, and its share of "
+    "a copy's in the same run. Then the receiver pass by itself; beside its time that of a copy of as many bytes, and of the "
+    "same texels drawn with the same reads and blends but nothing computed. It is bound by memory where it reaches half of the "
+    "copy's rate; by arithmetic where leaving it out saves half of the time or more; by fragments where reads and blends do not "
+    "reach half of the copy's rate by themselves, so that memory waits for the renderer; else by several of them."
+)
 
 
 def bench_shots(flags: argparse.Namespace) -> int:
@@ -61,20 +82,19 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions) -> dict
     single_ms = ms_per_shot(gpu, solver, 1, SECONDS)
     ms_per_shot(gpu, solver, BATCH, WARM_UP)
     shot_ms = ms_per_shot(gpu, solver, BATCH, SECONDS)
-    passes, received = passes_ms(gpu, solver, SECONDS)
-    shaped = len(nodes.shaped_tiles) / max(nodes.tiles, 1)
-    blend_bytes = BLENDED * int(STORAGE[options.storage][1:])
-    moved = received * (blend_bytes + shaped * READ_BYTES) / (passes["receive"] * 1e-3)
+    stream, copy = Stream(gpu, solver), Copy(gpu, lightmap.size)
+    times = passes_ms(gpu, solver, SECONDS, {"stream": stream.run, "copy": copy.run})
+    stream_ms, copy_ms = times.pop("stream"), times.pop("copy")
     row = {
         "scene": name,
         "triangles": len(nodes.scene.triangles),
         "texels": lightmap.texel_count,
         "shot_ms": shot_ms,
         "single_shot_ms": single_ms,
-        "pass_ms": passes,
-        "receive_gb_per_s": moved * 1e-9,
-        "copy_gb_per_s": copy_bandwidth(gpu, lightmap.size) * 1e-9,
+        "pass_ms": times,
     }
+    row |= bounds(times, stream.moved(), stream_ms, copy.moved / (BATCH * copy_ms * 1e-3))
+    copy.release()
     solver.release()
     lightmap.release()
     return row
@@ -100,33 +120,52 @@ def _ms(gpu: Gpu, run: Callable[[], object]) -> float:
     return (time.perf_counter() - start) * 1e3
 
 
-def passes_ms(gpu: Gpu, solver: Solver[ShootingOptions], seconds: float) -> tuple[dict[str, float], float]:
-    """Median milliseconds of each pass per shot of a batch, over the shooters of a solve, and how many texels are written.
-    Leaves the light wrong."""
-    times: dict[str, list[float]] = {label: [] for label in solver.passes(BATCH)}
-    samples: list[int] = []
-    end = time.perf_counter() + seconds
-    while time.perf_counter() < end or len(samples) < 5:
-        for label, run in solver.passes(BATCH).items():
-            query = gpu.ctx.query(samples=True)
-            with query:
-                times[label].append(_ms(gpu, run))
-            if label == "receive":
-                samples.append(query.samples)
-    return {label: statistics.median(values) / BATCH for label, values in times.items()}, statistics.mean(
-        samples
-    ) / BATCH
+def passes_ms(
+    gpu: Gpu, solver: Solver[ShootingOptions], seconds: float, beside: Mapping[str, Callable[[], None]] | None = None
+) -> dict[str, float]:
+    """Median milliseconds of each pass per shot of a batch, over the shooters of a solve; ``beside``: more to run and time after
+    each batch. Leaves the light wrong."""
+    times: dict[str, list[float]] = {label: [] for label in (*solver.passes(BATCH), *(beside or {}))}
+    end, batches = time.perf_counter() + seconds, 0
+    while time.perf_counter() < end or batches < 5:
+        for label, run in (solver.passes(BATCH) | dict(beside or {})).items():
+            times[label].append(_ms(gpu, run))
+        batches += 1
+    return {label: statistics.median(values) / BATCH for label, values in times.items()}
+
+
+def bounds(pass_ms: Mapping[str, float], moved: Mapping[str, float], stream_ms: float, copy_rate: float) -> Row:
+    """What bounds a shot and its receiver pass: bytes that each pass must move, and a copy's bytes per second."""
+    shot_bytes, shot_ms = sum(moved.values()), sum(pass_ms.values())
+    receive_ms, copy_ms = pass_ms["receive"], moved["receive"] / copy_rate * 1e3
+    if copy_ms >= HALF * receive_ms:
+        bound = "memory"
+    elif stream_ms <= HALF * receive_ms:
+        bound = "arithmetic"
+    else:
+        bound = "fragments" if copy_ms <= HALF * stream_ms else "several"
+    return {
+        "shot_mb": shot_bytes * 1e-6,
+        "shot_gb_per_s": shot_bytes / shot_ms * 1e-6,
+        "copy_gb_per_s": copy_rate * 1e-9,
+        "shot_share": shot_bytes / shot_ms * 1e3 / copy_rate,
+        "moved_mb": {label: value * 1e-6 for label, value in moved.items()},
+        "receive_mb": moved["receive"] * 1e-6,
+        "receive_ms": receive_ms,
+        "receive_share": copy_ms / receive_ms,
+        "copy_ms": copy_ms,
+        "stream_ms": stream_ms,
+        "bound": bound,
+    }
 
 
 def _table(values: dict[str, Any]) -> str:
     """Markdown."""
     labels = list(values["sizes"][0]["pass_ms"])
-    head = ["scene", "triangles", "texels", f"shot, of {BATCH}", "shot, alone", *labels, "GB/s", "copy GB/s", "share"]
+    head = ["scene", "triangles", "texels", f"shot, of {BATCH}", "shot, alone", *labels]
     lines = []
     for row in values["sizes"]:
         numbers = [row["shot_ms"], row["single_shot_ms"], *(row["pass_ms"][label] for label in labels)]
-        rates = row["receive_gb_per_s"], row["copy_gb_per_s"]
-        cells = [row["scene"], f"{row['triangles']:,}", f"{row['texels']:,}", *(f"{n:.2f}" for n in numbers)]
-        lines.append([*cells, *(f"{rate:.1f}" for rate in rates), f"{rates[0] / rates[1]:.0%}"])
-    note = f"ms per shot, and of each pass per shot of a batch of {BATCH}; GB/s: of the receiver pass"
-    return f"{values['renderer']}\n{note}\n\n{markdown(head, lines)}"
+        lines.append([row["scene"], f"{row['triangles']:,}", f"{row['texels']:,}", *(f"{n:.2f}" for n in numbers)])
+    parts = [values["renderer"], NOTE, markdown(head, lines), BOUNDS_NOTE, markdown_table(BOUNDS, values["sizes"])]
+    return "\n\n".join(parts)

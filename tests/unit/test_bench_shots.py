@@ -1,0 +1,84 @@
+"""What bounds a shot: bytes that must move, and the receiver pass without its arithmetic."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.atlas.options import AtlasOptions
+from app.bench.copy import Copy
+from app.bench.measure import opened
+from app.bench.shots import bounds, passes_ms
+from app.bench.stream import Stream, texel_bytes
+from app.gpu import Gpu
+from app.solvers import ShootingOptions, UniformShooting
+from app.solvers.shooting.stages import BATCH
+
+GB = 1e9
+
+
+@pytest.mark.parametrize(
+    ("receive_ms", "stream_ms", "copy_ms", "bound"),
+    [
+        (10.0, 10.0, 5.0, "memory"),
+        (10.0, 5.0, 4.9, "arithmetic"),
+        (10.0, 9.0, 1.0, "fragments"),
+        (10.0, 9.0, 4.9, "several"),
+    ],
+)
+def test_what_bounds_the_receiver_pass(receive_ms: float, stream_ms: float, copy_ms: float, bound: str) -> None:
+    moved = {"choose": 3e6, "receive": copy_ms * 1e-3 * GB}  # a copy of a GB each second
+    row = bounds({"choose": 5.0, "receive": receive_ms}, moved, stream_ms, GB)
+    assert row["bound"] == bound and row["copy_ms"] == pytest.approx(copy_ms)
+    assert row["receive_share"] == pytest.approx(copy_ms / receive_ms)
+    assert row["shot_mb"] == pytest.approx(3 + copy_ms)
+    assert row["shot_share"] == pytest.approx((3 + copy_ms) / (5.0 + receive_ms)), "of a second at a GB each"
+
+
+@pytest.mark.parametrize(("storage", "light"), [("rgba32f", 2 * 2 * 16), ("rgba16f", 2 * 2 * 8), ("fixed8", 2 * 2 * 4)])
+def test_bytes_of_a_texel_follow_from_its_formats(gpu: Gpu, storage: str, light: int) -> None:
+    with opened(gpu, "textured-room", AtlasOptions(texels=600), ShootingOptions(storage=storage)) as (lightmap, _):
+        albedo = 4 * np.dtype(lightmap.nodes.arrays["t_albedo"].dtype).itemsize
+        assert texel_bytes(lightmap, flat=True) == light + albedo
+        assert texel_bytes(lightmap, flat=False) == light + albedo + 16 + 8
+
+
+@pytest.mark.parametrize("visibility", ["item-id", "combined"])
+def test_the_stream_draws_the_texels_of_the_receiver_pass_and_changes_no_light(gpu: Gpu, visibility: str) -> None:
+    options = ShootingOptions(visibility=visibility)
+    with opened(gpu, "museum", AtlasOptions(texels=8_000), options) as (lightmap, solver):
+        assert isinstance(solver, UniformShooting) and set(lightmap.receivers) == {True, False}
+        solver.reset()
+        solver.step(BATCH)
+        stream, steps = Stream(gpu, solver), solver.passes(BATCH)
+        steps["choose"]()
+        before = lightmap.irradiance(), lightmap.residual()
+        stream.run()
+        for was, now in zip(before, (lightmap.irradiance(), lightmap.residual()), strict=True):
+            # what is read is below 2^32, and 1e-30 of it is added
+            np.testing.assert_allclose(was, now, rtol=0, atol=1e-20 * lightmap.unit * BATCH)
+        query = gpu.ctx.query(samples=True)
+        with query:
+            steps["receive"]()
+        moved = stream.moved()
+        maps = moved["see"] / 2 * (1 if visibility == "item-id" else 2)
+        received = (moved["receive"] - maps) * BATCH
+        least, most = (query.samples * texel_bytes(lightmap, flat=flat) for flat in (True, False))
+        assert 0 < least < received < most
+
+
+def test_all_of_it_is_timed_in_turns(gpu: Gpu) -> None:
+    with opened(gpu, "furnace", AtlasOptions(texels=600), ShootingOptions()) as (lightmap, solver):
+        copy, runs = Copy(gpu, lightmap.size), list[Any]()
+
+        def run() -> None:
+            runs.append(None)
+            copy.run()
+
+        times = passes_ms(gpu, solver, 0.0, {"copy": run})
+        assert copy.moved == 2 * 16 * lightmap.size[0] * lightmap.size[1]
+        copy.release()
+    assert list(times) == [*solver.passes(BATCH), "copy"] and len(runs) == 5
+    assert all(ms > 0 for ms in times.values())
