@@ -72,7 +72,7 @@ def bake(flags: argparse.Namespace) -> int:
         finite = np.asarray(np.isfinite(irradiance).all(-1))
         lost = int((covered & ~finite).sum())
         result = report(session) | {"texels_not_finite": lost}
-        irradiance = np.where(finite[..., None], irradiance, np.float32(0))
+        irradiance = np.where(finite[..., None], np.maximum(irradiance, 0), np.float32(0))  # no light is still owed
         files = write_bake(flags.output, session.scene, session.charts, irradiance, covered & finite, result)
         session.release()
     if failure is not None:

