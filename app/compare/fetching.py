@@ -1,0 +1,78 @@
+"""A reference on its way, in a thread of its own: the window never waits for it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from app.atlas.points import Points, random_points
+from app.bake.read import read_bake
+from app.compare.comparison import POINTS, POINTS_SEED
+from app.compare.light import ReferenceLight, light_of_bake
+from app.errors import UserError
+from app.loading import CancelledError, Progress
+from app.scene.model import Scene
+
+Work = Callable[[Progress], ReferenceLight]
+
+
+def bake_light(path: Path, scene: Scene, tell: Progress) -> ReferenceLight:
+    """Raises UserError where there is no bake, or one of another scene."""
+    tell("reading", 0.0)
+    bake = read_bake(path)
+    tell("looking for its surfaces", 0.5)
+    return light_of_bake(bake, scene)
+
+
+def with_points(light: ReferenceLight, scene: Scene) -> tuple[ReferenceLight, Points]:
+    """And the points that are measured. Raises UserError for a reference without light."""
+    points = random_points(scene, POINTS, POINTS_SEED)
+    if not light.at(points).max() > 0:
+        raise UserError(f"{light.name}: holds no light")
+    return light, points
+
+
+class Fetching:
+    """``ended`` says whether it is over; ``result`` gives light and points or raises what went wrong.
+
+    stage, fraction: how far it is. cancelled: by the user; the thread ends soon.
+    """
+
+    def __init__(self, scene: Scene, work: Work) -> None:
+        self.scene = scene
+        self.stage, self.fraction = "starting", 0.0
+        self.cancelled = False
+        self._found: tuple[ReferenceLight, Points] | None = None
+        self._error: BaseException | None = None
+        self._thread = threading.Thread(target=self._run, args=(work,), daemon=True)
+        self._thread.start()
+
+    @property
+    def ended(self) -> bool:
+        return not self._thread.is_alive()
+
+    @property
+    def result(self) -> tuple[ReferenceLight, Points]:
+        """Raises UserError, or CancelledError."""
+        self._thread.join()
+        if self._error is not None:
+            raise self._error
+        assert self._found is not None
+        return self._found
+
+    def cancel(self) -> None:
+        self.cancelled = True
+
+    def _run(self, work: Work) -> None:
+        try:
+            self._found = with_points(work(self._progress), self.scene)
+        except MemoryError:
+            self._error = UserError("not enough memory for this reference")
+        except Exception as error:  # raised again by the main thread, with its traceback
+            self._error = error
+
+    def _progress(self, stage: str, share: float) -> None:
+        if self.cancelled:
+            raise CancelledError
+        self.stage, self.fraction = stage, share
