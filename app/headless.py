@@ -161,8 +161,8 @@ def check_reference(flags: argparse.Namespace) -> None:
 def picture(session: Session, size: tuple[int, int]) -> np.ndarray:
     """(height, width, 3) u8 sRGB of the session as it is, top row first. Raises UserError for sizes beyond the GPU's."""
     check_size(session.gpu, size)
-    if measured(session.shown) != "off":
-        return ui_image(session.gpu, session, size, panels=False)  # with the legend
+    if measured(session.shown) != "off" or session.shown.show == "split":
+        return ui_image(session.gpu, session, size, panels=False)  # with the legend, or the line between both
     texture = session.gpu.texture(size, 4, "f1")
     target = session.gpu.target(texture)
     try:

@@ -23,7 +23,7 @@ from app.gpu import gpu_context
 from app.session import Session, Stats, Stop
 from app.solving import share_done
 
-NICENESS = 10  # the window goes first
+NICENESS = 5  # the window goes first
 
 
 def solve(source: Path, target: Path) -> None:
@@ -59,7 +59,8 @@ def say(stage: str, share: float) -> None:
 
 def end_with_parent() -> None:
     """Wait until whoever started this is gone, or has closed its end."""
-    sys.stdin.buffer.read()
+    while os.read(sys.stdin.fileno(), 1):  # not through a buffer: its lock would be held when this process ends
+        pass
     os._exit(1)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 
 from app.ui import theme, widgets
-from app.ui.panels import convergence, display, inspect, scene, solver
+from app.ui.panels import compare, convergence, display, inspect, scene, solver
 from app.ui.state import State
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ PANELS = (
     Panel("Solver", "left", solver.draw),
     Panel("Display", "right top", display.draw),
     Panel("Inspect", "right", inspect.draw),
+    Panel("Compare", "right", compare.draw),
     Panel("Convergence", "bottom", convergence.draw),
 )
 
