@@ -204,19 +204,19 @@ def report(session: Session) -> dict[str, Any]:
             for name in ("emitted", "absorbed", "escaped", "unshot", "imbalance")
         },
         "imbalance": stats.imbalance,
-        "error": _error(session),
+        **_error(session),
         "warnings": [*session.scene.warnings, *session.charts.warnings, *_notes(session)],
     }
 
 
-def _error(session: Session) -> dict[str, Any] | None:
-    """Against the reference, at random points; None without one."""
+def _error(session: Session) -> dict[str, Any]:
+    """Against the reference, at random points; nothing without one."""
     comparison = session.comparison
     if comparison is None or comparison.error is None:
-        return None
+        return {}
     light = comparison.light
     known = {"reference": light.name, "reference_texels": light.texels, "reference_residual": light.unshot}
-    return known | {"points": comparison.lit} | comparison.error._asdict()
+    return {"error": known | {"points": comparison.lit} | comparison.error._asdict()}
 
 
 def _open_reference(session: Session, path: Path, console: Console) -> None:
@@ -309,7 +309,7 @@ def _folder(path: Path) -> Iterator[None]:
 
 
 def _summary(result: dict[str, Any]) -> str:
-    error = result["error"]
+    error = result.get("error")
     compared = "" if error is None else f", off by {error['rms']:.2%} RMS and {error['median']:.2%} in the median"
     state = "stopped early" if result["interrupted"] else "converged" if result["converged"] else "stopped as asked"
     return (

@@ -23,6 +23,7 @@ from app.gpu import gpu_context
 from app.session import Session, Stats, Stop
 from app.solving import share_done
 
+LOADING = 0.1  # of the bar, which is then for shooting
 NICENESS = 5  # the window goes first
 
 
@@ -31,11 +32,14 @@ def solve(source: Path, target: Path) -> None:
     given = pickle.loads(source.read_bytes())
     with gpu_context() as gpu:
         session = Session(gpu, shooting=given["shooting"], atlas=given["atlas"])
-        session.open_now(given["scene"], say)
+        session.open_now(given["scene"], lambda stage, share: say(stage, LOADING * share))
         stop = Stop()
 
         def tell(stats: Stats) -> None:
-            say(f"{stats.shots:,} shots, {stats.residual:.3%} unshot", share_done(session, stop))
+            say(
+                f"{stats.shots:,} shots, {stats.residual:.3%} unshot",
+                LOADING + (1 - LOADING) * share_done(session, stop),
+            )
 
         session.solve(stop, tell)
         lightmap, charts = session.lightmap, session.charts

@@ -80,7 +80,7 @@ def light_of_bake(bake: Bake, scene: Scene) -> ReferenceLight:
         materials[mine] = bake.scene.materials[their]
     texels, unshot = bake.report.get("texels"), bake.report.get("residual")
     return ReferenceLight(
-        name=f"bake {bake.folder.name}",
+        name=f"bake {bake.folder.resolve().name}",
         image=bake.irradiance,
         triangle=triangle,
         back=back,
@@ -119,12 +119,13 @@ def _partners(bake: Bake, scene: Scene) -> tuple[I32, NDArray[np.bool_], _Partne
             same = np.abs(corners - mine[left]).max(axis=(1, 2)) <= slack
             found[left[same]], turn[left[same]] = near[left[same], k], turns
     nearby = found < 0
-    area = scene.normals_areas[1][triangle]
-    if area[nearby].sum() > LOST_AREA * area.sum():
-        share = area[nearby].sum() / area.sum()
-        raise UserError(
-            f"{bake.folder}: is of another scene: {share:.1%} of the surfaces of {scene.name} are not in it"
-        )
+    area, their_area = (x.normals_areas[1][lit_sides(x).triangle] for x in (scene, bake.scene))
+    lost, total = area[nearby].sum(), area.sum()
+    other = f"{bake.folder}: is of another scene"
+    if lost > LOST_AREA * total:
+        raise UserError(f"{other}: {lost / total:.1%} of the surfaces of {scene.name} are not in it")
+    if their_area.sum() - total > LOST_AREA * total:
+        raise UserError(f"{other}: it has surfaces that {scene.name} has not")
     return triangle, back, _Partners(np.where(nearby, near[:, 0], found), turn, nearby)
 
 

@@ -51,7 +51,7 @@ def solved_light(scene: Scene, atlas: AtlasOptions, shooting: Options, tell: Pro
 
 def _light(found: dict[str, Any], scene: Scene) -> ReferenceLight:
     return ReferenceLight(
-        name="solved here",
+        name="a finer solve",
         image=found["image"],
         triangle=found["triangle"],
         back=found["back"],

@@ -92,6 +92,13 @@ BAD = [
     (SHOT + "--exposure nan", "nan: must be -24 to 24"),
     (SHOT + "--exposure 25", "25: must be -24 to 24"),
     (SHOT + "--false-colour-max -1", "must be 0 to"),
+    # references
+    (SHOT + "--layer error", "--layer error: needs a --reference"),
+    (SHOT + "--show split", "--show split: needs a --reference"),
+    (SHOT + "--show bogus", "bogus: must be one of solution"),
+    (SHOT + "--split 2", "2: must be 0 to 1"),
+    (SHOT + "--reference nowhere", "nowhere: is no bake, irradiance.exr and scene.glb missing"),
+    (SHOT + "--reference dark.obj", "is no bake"),
     # the solver
     (SHOT + "--shots 0", "0: must be a whole number above 0"),
     (SHOT + "--shots -1", "-1: must be a whole number above 0"),

@@ -106,7 +106,7 @@ def _reference(session: Session, state: State) -> None:
         light = comparison.light
         texels = "unknown" if light.texels is None else f"{light.texels:,}"
         rest = "unknown" if light.unshot is None else widgets.percent(light.unshot)
-        widgets.facts("reference", [("Is a", light.name), ("Texels", texels), ("Unshot", rest)])
+        widgets.facts("reference", [("From", light.name), ("Texels", texels), ("Unshot", rest)])
     width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
     if imgui.button(f"{ICONS.ICON_FA_FOLDER_OPEN} Open a bake ...", imgui.ImVec2(width, 0)):
         state.ask_for_reference = True
