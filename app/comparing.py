@@ -91,7 +91,11 @@ class Comparing(Viewing):
     def _compare_with(self, light: ReferenceLight, points: Points) -> None:
         self._release_comparison()
         self._found, self._found_for = (light, points), self.unedited
-        self.comparison = Comparison(self.gpu, self.lightmap, light, points)
+        self._begin_comparison()
+
+    def _begin_comparison(self) -> None:
+        assert self._found is not None
+        self.comparison, self._measured = Comparison(self.gpu, self.lightmap, *self._found), False
 
     def _release_comparison(self) -> None:
         if self.comparison is not None:
@@ -119,7 +123,7 @@ class Comparing(Viewing):
         if self.fetching is not None and self.fetching.scene is not self.unedited:
             self.stop_fetching()
         if self._found is not None and self._found_for is self.unedited:
-            self.comparison = Comparison(self.gpu, self.lightmap, *self._found)
+            self._begin_comparison()
         elif self._found is not None:
             self.drop_reference()
 
@@ -142,9 +146,10 @@ class Comparing(Viewing):
 
     def _reference(self, *, whole: bool) -> Reference | None:
         display, comparison = self.display, self.comparison
-        if comparison is None or (display.show == "solution" and not LAYER_SHADERS[display.layer].compares):
+        if comparison is None:
             return None
-        comparison.texels.follow(whole=whole)
+        if display.show != "solution" or LAYER_SHADERS[display.layer].compares:
+            comparison.texels.follow(whole=whole)
         return Reference(comparison.texels.texture, float(np.sqrt(3.0)) * comparison.dark)
 
     def release(self) -> None:

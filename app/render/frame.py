@@ -62,7 +62,7 @@ class FrameRenderer:
     ) -> None:
         """Draw into the lower left ``size`` (width, height) [px] of ``target``.
 
-        reference: for ``display.show`` and for layers that compare; None where they need none.
+        reference: for ``display.show`` and for layers that compare; None where there is none.
         ambient: A [W/m²] for ``display.ambient``. shooter: the patch to mark for ``display.last_shooter``: (u, v, u, v) in
         atlas texels. scale: of the false colour; left out, it is found from the light, which waits for the GPU.
         samples: per pixel along each axis. whole: show all light as it is now; False bounds the work of a frame, a large

@@ -63,6 +63,9 @@ class Surfaces:
             self._others, fresh = self._fitting(self._others, display)
             now = whole or fresh or not self._sides[1]
             shown.append((self._others.resolve(layer_name, display, whole=now, instead=True, **wanted), right))
+        elif reference is None and self._others is not None:
+            self._others.release()
+            self._others = None
         if left is not None:
             self._texels, fresh = self._fitting(self._texels, display)
             now = whole or fresh or not self._sides[0]
