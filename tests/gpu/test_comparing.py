@@ -187,6 +187,15 @@ def test_the_error_has_the_colour_of_its_value(gpu: Gpu, box: Lightmap, share: f
     texels.release()
 
 
+def test_where_the_reference_is_dark_errors_are_over_what_counts_as_dark(gpu: Gpu, box: Lightmap) -> None:
+    texels, reference = reference_of(gpu, box, even(box, (0.0, 0.0, 0.0)))
+    put(box, "t_irradiance", even(box, (0.2, 0.0, 0.0)))
+    shown = picture(gpu, box, PLAIN.replace(layer="error"), reference=reference._replace(dark=2.0))  # 10 %
+    expected = colour_map(1001)[round(1000 * np.log(10.0 / ERRORS.low) / np.log(ERRORS.high / ERRORS.low))]
+    assert shown[SIZE[1] // 3, SIZE[0] // 2] / 255 == pytest.approx(expected, abs=STEP + 0.5 / 255)
+    texels.release()
+
+
 def test_a_split_picture_is_half_of_each(gpu: Gpu, box: Lightmap) -> None:
     texels, reference = reference_of(gpu, box, even(box, (0.5, 1.0, 2.0)))
     put(box, "t_irradiance", smooth(box))
