@@ -60,20 +60,18 @@ def smooth(lightmap: Lightmap) -> F64:
 
 @pytest.mark.parametrize("storage", ["rgba32f", "rgba16f", "fixed8"])
 def test_the_probe_reads_what_is_drawn(gpu: Gpu, box: Lightmap, storage: str) -> None:
-    """Bilinear as in a bake; where that reads gutters, its nearest texel instead of the mean of those that are there."""
+    """Bilinear as in a bake, but that gutters are left out: for more than half of the points there are none."""
     box.set_storage(storage)
     box.clear()
-    tiles = smooth(box)
     if storage == "rgba32f":
-        put(box, "t_irradiance", tiles)
+        put(box, "t_irradiance", even(box, (1, 1, 1)) * np.random.default_rng(3).uniform(1, 2, (box.tiles, 16, 16, 1)))
     else:
         box.light_target.clear(*[2.0 / box.unit] * 3, 0.0)
     points = random_points(box.scene, 500, 1)
     probe = Probe(gpu, box, points)
     found, expected = probe.irradiance(probe.look()), irradiance_of(box, points)
-    texel = np.abs(np.diff(tiles, axis=1)[tiles[:, 1:].min(-1) * tiles[:, :-1].min(-1) > 0]).max()
-    assert np.abs(found - expected).max() <= (texel if storage == "rgba32f" else 1e-4 * expected.max())
     assert np.median(np.abs(found - expected)) < 1e-5
+    assert np.abs(found - expected).max() < (1.0 if storage == "rgba32f" else 1e-5)  # all of the noise; none
     probe.release()
 
 
