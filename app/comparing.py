@@ -21,7 +21,7 @@ from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
 from app.render.resolve import Reference
 from app.scene.load import NO_LIGHT
-from app.scene.model import Scene
+from app.scene.model import RGB, Scene
 from app.solvers import ShootingOptions
 from app.viewing import Viewing
 
@@ -126,6 +126,16 @@ class Comparing(Viewing):
             self._begin_comparison()
         elif self._found is not None:
             self.drop_reference()
+
+    def reference_at(self, texel: tuple[int, int]) -> RGB | None:
+        """Irradiance [W/m²] of the reference on a texel (column, row) of the node set; None without a reference."""
+        if self.comparison is None:
+            return None
+        nodes = self.lightmap.nodes
+        (x, column), (y, row) = (divmod(at, nodes.tile) for at in texel)
+        tiles = self.comparison.light.on_tiles(nodes, np.array([y * nodes.columns + x]))
+        red, green, blue = tiles[0, row, column].tolist()
+        return red, green, blue
 
     @property
     def comparing(self) -> bool:

@@ -31,13 +31,21 @@ class Points:
         normal = scene.normals_areas[0][self.triangle] * np.where(self.back, -1.0, 1.0)[:, None]
         return np.einsum("nk,nkc->nc", self.weights, scene.corners[self.triangle]), normal
 
-    def among(self, triangle: NDArray[np.int32], back: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """(n,) which of these sides each point lies on."""
-        keys, wanted = 2 * triangle.astype(np.int64) + back, 2 * self.triangle.astype(np.int64) + self.back
-        order = np.argsort(keys)
-        side = order[np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)]
-        assert (keys[side] == wanted).all(), "a point on a side without texels"
-        return np.asarray(side)
+
+class SideIndex:
+    """Finds points among sides: triangle (f,) and whether its back."""
+
+    def __init__(self, triangle: NDArray[np.int32], back: NDArray[np.bool_]) -> None:
+        keys = 2 * triangle.astype(np.int64) + back
+        self._order = np.argsort(keys)
+        self._keys = keys[self._order]
+
+    def of(self, points: Points) -> NDArray[np.int64]:
+        """(n,) which of the sides each point lies on."""
+        wanted = 2 * points.triangle.astype(np.int64) + points.back
+        place = np.minimum(np.searchsorted(self._keys, wanted), len(self._keys) - 1)
+        assert (self._keys[place] == wanted).all(), "a point on a side without texels"
+        return np.asarray(self._order[place])
 
 
 def random_points(scene: Scene, count: int, seed: int) -> Points:

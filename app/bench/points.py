@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from app.atlas.collapse import collapse
 from app.atlas.lightmap import Lightmap
-from app.atlas.points import Points, bilinear
+from app.atlas.points import Points, SideIndex, bilinear
 from app.bake.gutter import fill_gutter
 from app.reference.visibility import visible
 from app.scene.model import F64, Scene
@@ -34,7 +34,7 @@ def irradiance_of(lightmap: Lightmap, points: Points) -> F64:
     """(n, 3) [W/m²], bilinear."""
     nodes, charts = lightmap.nodes, lightmap.charts
     image = fill_gutter(*collapse(nodes, lightmap.irradiance())).astype(np.float64)
-    face = points.among(charts.face_triangle, charts.face_back)
+    face = SideIndex(charts.face_triangle, charts.face_back).of(points)
     finer = image.shape[0] // charts.size[1]
     place = np.einsum("nk,nkc->nc", points.weights, charts.face_uv[face]) * finer
     return bilinear(image, place)

@@ -5,6 +5,7 @@ A bake belongs to a scene if its triangles are those of the scene; how both are 
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from app.atlas.node_set import NodeSet
-from app.atlas.points import Points, bilinear
+from app.atlas.points import Points, SideIndex, bilinear
 from app.atlas.sides import lit_sides, scene_size
 from app.bake.read import Bake
 from app.errors import UserError
@@ -44,9 +45,13 @@ class ReferenceLight:
     texels: int | None = None
     unshot: float | None = None
 
+    @functools.cached_property
+    def _sides(self) -> SideIndex:
+        return SideIndex(self.triangle, self.back)
+
     def at(self, points: Points) -> F64:
         """(n, 3) [W/m²], bilinear."""
-        side = points.among(self.triangle, self.back)
+        side = self._sides.of(points)
         return bilinear(self.image, np.einsum("nk,nkc->nc", points.weights, self.uv[side]))
 
     def on_tiles(self, nodes: NodeSet, slots: Ints) -> F32:

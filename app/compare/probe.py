@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
-from app.atlas.points import Points
+from app.atlas.points import Points, SideIndex
 from app.gpu import Gpu, Pass, ReadBack
 from app.scene.model import F64
 
@@ -16,7 +16,7 @@ class Probe:
     def __init__(self, gpu: Gpu, lightmap: Lightmap, points: Points) -> None:
         self._gpu, self._lightmap, self._count = gpu, lightmap, len(points)
         charts = lightmap.charts
-        face = points.among(charts.face_triangle, charts.face_back)
+        face = SideIndex(charts.face_triangle, charts.face_back).of(points)
         edge = int(np.ceil(np.sqrt(len(points))))
         table = np.zeros((edge * edge, 4), np.float32)
         table[: len(points), :2] = np.einsum("nk,nkc->nc", points.weights, charts.face_uv[face])

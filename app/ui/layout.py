@@ -55,7 +55,11 @@ def docks(state: State) -> None:
 
 
 def panels(session: Session, state: State) -> None:
-    """Every panel that is not hidden."""
+    """Every panel that is not hidden. A reference that has come brings its panel to the front."""
+    compared = session.opened and session.comparison is not None
+    if compared and not state.compared:
+        imgui.set_window_focus("Compare")
+    state.compared = compared
     for panel in PANELS:
         if panel.title in state.hidden_panels:
             continue

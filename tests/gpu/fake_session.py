@@ -92,6 +92,9 @@ class FakeSession:
             light=light, error=error, lit=4001, errors=FakeErrors(), notes=lambda lightmap: ["a note"]
         )
 
+    def reference_at(self, texel: tuple[int, int]) -> tuple[float, float, float] | None:
+        return None if self.comparison is None else (16.125, 11.0, 3.0)
+
     def open_reference(self, path: Path) -> None:
         self.calls.append(("open_reference", str(path)))
 

@@ -149,6 +149,17 @@ def test_the_error_falls_while_light_is_shot(session: Session, tmp_path: Path, m
     assert len(comparison.errors.column("rms")) == 0
 
 
+def test_a_texel_has_its_reference(session: Session, tmp_path: Path) -> None:
+    session.solve(Stop(shots=20))
+    assert session.reference_at((0, 0)) is None
+    session.open_reference_now(baked(session, tmp_path, 3.0))
+    lightmap = session.lightmap
+    tile, row, column = (int(n[7]) for n in np.nonzero(lightmap.nodes.surfaces.area > 0))
+    corner = lightmap.nodes.corner(tile)
+    texel = corner[0] + column, corner[1] + row
+    assert session.reference_at(texel) == pytest.approx(3 * lightmap.light_at(texel)[0], rel=1e-5)
+
+
 def test_an_edit_is_measured_and_said(session: Session, tmp_path: Path) -> None:
     session.solve(Stop())
     session.open_reference_now(baked(session, tmp_path))

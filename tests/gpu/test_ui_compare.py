@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from desks import VIEW, Desk, desk, session, where
+from desks import PICKED, VIEW, Desk, desk, session, where
 from imgui_bundle import imgui
 
 from app.compare.options import ReferenceOptions
@@ -49,6 +49,31 @@ def test_the_error_is_shown_as_it_was_measured(compared: Desk, monkeypatch: pyte
     compared.frames()
     assert {("RMS", "4.12 %"), ("Median", "0.93 %"), ("90 % below", "7.14 %"), ("Bias", "-0.31 %")} <= set(told)
     assert {("From", "bake reference"), ("Texels", "124,816"), ("Unshot", "0.010 %")} <= set(told)
+
+
+def test_a_reference_brings_its_panel_to_the_front(desk: Desk) -> None:
+    window = imgui.internal.find_window_by_name("Compare")
+    assert window.hidden
+    desk.session.compare()
+    desk.frames(3)
+    assert not window.hidden
+    imgui.set_window_focus("Inspect")
+    desk.frames(3)
+    assert window.hidden, "only when it comes"
+
+
+def test_a_picked_texel_has_its_reference(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    desk.ui.state.picked = PICKED  # type: ignore[assignment]
+    told: list[float] = []
+    real = widgets.number
+    monkeypatch.setattr(widgets, "number", lambda value, *more: told.append(value) or real(value, *more))
+    desk.frames()
+    assert 16.125 not in told
+    desk.session.compare()
+    desk.frames(3)
+    imgui.set_window_focus("Inspect")
+    desk.frames(3)
+    assert 16.125 in told
 
 
 def test_references_are_asked_for(panel: Desk, where: dict[str, tuple[float, float]]) -> None:

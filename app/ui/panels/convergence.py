@@ -106,7 +106,8 @@ def _shares(
     implot.setup_axis_limits(implot.ImAxis_.y1, decade, highest, implot.Cond_.always)
     for name, (over, values, colour) in curves.items():
         if len(over):
-            line = implot.Spec(line_color=imgui.ImVec4(*colour), line_weight=2.0)
+            alone = implot.Marker_.circle if len(over) == 1 else implot.Marker_.none
+            line = implot.Spec(line_color=imgui.ImVec4(*colour), line_weight=2.0, marker=alone)
             implot.plot_line(name, over, np.maximum(values, SMALLEST), line)
     implot.end_plot()
 
