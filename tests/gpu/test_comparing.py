@@ -60,7 +60,7 @@ def smooth(lightmap: Lightmap) -> F64:
 
 @pytest.mark.parametrize("storage", ["rgba32f", "rgba16f", "fixed8"])
 def test_the_probe_reads_what_is_drawn(gpu: Gpu, box: Lightmap, storage: str) -> None:
-    """Bilinear as in a bake, but that gutters are left out: for more than half of the points there are none."""
+    """Bilinear as in a bake, gutters included: noise shows any other texel."""
     box.set_storage(storage)
     box.clear()
     if storage == "rgba32f":
@@ -70,8 +70,8 @@ def test_the_probe_reads_what_is_drawn(gpu: Gpu, box: Lightmap, storage: str) ->
     points = random_points(box.scene, 500, 1)
     probe = Probe(gpu, box, points)
     found, expected = probe.irradiance(probe.look()), irradiance_of(box, points)
-    assert np.median(np.abs(found - expected)) < 1e-5
-    assert np.abs(found - expected).max() < (1.0 if storage == "rgba32f" else 1e-5)  # all of the noise; none
+    # a place in the atlas is a 32-bit float there: 1e-5 of a texel, of which the noise is 1 at most
+    np.testing.assert_allclose(found, expected, atol=5e-5)
     probe.release()
 
 
