@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from app.atlas.options import MAX_TEXELS, AtlasOptions
-from app.atlas.points import Points
-from app.compare.comparison import Comparison
-from app.compare.fetching import Fetching, bake_light, with_points
-from app.compare.light import ReferenceLight
+from app.compare.comparison import Comparison, Found
+from app.compare.fetching import Fetching, bake_light, looked_up
 from app.compare.options import ReferenceOptions
 from app.compare.solving import solved_light
 from app.errors import UserError
@@ -42,20 +41,19 @@ class Comparing(Viewing):
         super().__init__(gpu, display)
         self.comparison: Comparison | None = None
         self.fetching: Fetching | None = None
-        self._found: tuple[ReferenceLight, Points] | None = None
-        self._found_for: Scene | None = None
+        self._found: Found | None = None
         self._measured = True
 
     # -- references come and go ----------------------------------------------------------------------------------------
 
     def open_reference(self, path: Path) -> None:
         """Read a bake in the background."""
-        self._fetch(Fetching(self.unedited, partial(bake_light, path, self.unedited)))
+        self._fetch(Fetching(self.lightmap.nodes, partial(bake_light, path, self.unedited)))
 
     def open_reference_now(self, path: Path) -> None:
         """Read a bake and wait. Raises UserError."""
         light = bake_light(path, self.unedited, lambda stage, share: None)
-        self._compare_with(*with_points(light, self.unedited))
+        self._compare_with(looked_up(light, self.lightmap.nodes))
 
     def solve_reference(self, options: ReferenceOptions) -> None:
         """Solve the scene as it is now in the background, with closed forms and full storage. Raises UserError."""
@@ -64,7 +62,7 @@ class Comparing(Viewing):
             raise UserError(f"{scene.name}: {NO_LIGHT}")
         texels = options.texels or self.reference_texels
         atlas, shooting = AtlasOptions(texels=texels), ShootingOptions(residual=options.residual)
-        self._fetch(Fetching(self.unedited, lambda tell: solved_light(scene, atlas, shooting, tell)))
+        self._fetch(Fetching(self.lightmap.nodes, lambda tell: solved_light(scene, atlas, shooting, tell)))
 
     @property
     def reference_texels(self) -> int:
@@ -88,14 +86,15 @@ class Comparing(Viewing):
         self.stop_fetching()
         self.fetching = fetching
 
-    def _compare_with(self, light: ReferenceLight, points: Points) -> None:
+    def _compare_with(self, found: Found) -> None:
         self._release_comparison()
-        self._found, self._found_for = (light, points), self.unedited
+        self._found = found
         self._begin_comparison()
 
     def _begin_comparison(self) -> None:
         assert self._found is not None
-        self.comparison, self._measured = Comparison(self.gpu, self.lightmap, *self._found), False
+        self.comparison, self._measured = Comparison(self.gpu, self.lightmap, self._found), False
+        self._found = replace(self._found, nodes=self.lightmap.nodes, tiles=None)  # they are on the GPU now
 
     def _release_comparison(self) -> None:
         if self.comparison is not None:
@@ -109,8 +108,8 @@ class Comparing(Viewing):
         if self.fetching is not None and self.fetching.ended:
             fetching, self.fetching = self.fetching, None
             try:
-                if fetching.scene is self.unedited:
-                    self._compare_with(*fetching.result)
+                if fetching.nodes.scene is self.unedited:
+                    self._compare_with(fetching.result)
             except (UserError, CancelledError) as error:
                 self.message = str(error)
         if self.comparison is not None:
@@ -120,9 +119,9 @@ class Comparing(Viewing):
     def _compare_anew(self) -> None:
         """Another lightmap: the reference stays while the scene is the same one, cut anew."""
         self._release_comparison()
-        if self.fetching is not None and self.fetching.scene is not self.unedited:
+        if self.fetching is not None and self.fetching.nodes.scene is not self.unedited:
             self.stop_fetching()
-        if self._found is not None and self._found_for is self.unedited:
+        if self._found is not None and self._found.nodes.scene is self.unedited:
             self._begin_comparison()
         elif self._found is not None:
             self.drop_reference()

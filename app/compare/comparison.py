@@ -9,11 +9,13 @@ and read some frames later.
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
+from app.atlas.node_set import NodeSet
 from app.atlas.points import Points
 from app.compare.light import ReferenceLight
 from app.compare.probe import Probe
@@ -21,7 +23,7 @@ from app.compare.texels import ReferenceTexels
 from app.gpu import Gpu, ReadBack
 from app.history import ERRORS, Rows
 from app.metrics import DARK, bias, lit_points, median_local, quantile_local, relative_rms
-from app.scene.model import F64
+from app.scene.model import F32, F64
 
 POINTS = 4096
 POINTS_SEED = 3
@@ -38,21 +40,32 @@ class ErrorNow(NamedTuple):
     q90: float
 
 
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A reference, random points to measure at, and what the texels of a node set, none of a quadtree, have of it."""
+
+    light: ReferenceLight
+    points: Points
+    nodes: NodeSet
+    tiles: F32 | None
+
+
 class Comparison:
     """Of one lightmap with a reference. Whoever makes it releases it.
 
     light: the reference; error: the last one measured; errors: rows of it over shots and seconds; lit: points that are measured.
     """
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, light: ReferenceLight, points: Points) -> None:
-        """points: random ones; those that are dark in the reference are left out."""
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, found: Found) -> None:
+        """Of the points found, those that are dark in the reference are left out."""
+        light, points = found.light, found.points
         values = light.at(points)
         lit = lit_points(values)
         self.light, self.lit = light, int(lit.sum())
         self.dark = DARK * float(values.mean())
         self._reference = values[lit]
         self._probe = Probe(gpu, lightmap, points.only(lit))
-        self.texels = ReferenceTexels(gpu, lightmap, light)
+        self.texels = ReferenceTexels(gpu, lightmap, light, found.tiles if found.nodes is lightmap.nodes else None)
         self.error: ErrorNow | None = None
         self._asked: tuple[ReadBack, int, float, object] | None = None
         self._frames, self._due = 0, 0.0

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from app.atlas.lightmap import Lightmap
 from app.compare.light import ReferenceLight
 from app.gpu import Gpu, Texture
+from app.scene.model import F32
 
-TEXELS_PER_FRAME = 1 << 16  # that are looked up in one frame, where not all must be
+TEXELS_PER_FRAME = 1 << 14  # that are looked up in one frame, where not all must be
 
 
 class ReferenceTexels:
@@ -18,9 +19,13 @@ class ReferenceTexels:
     texture: RGBA32F, H of the reference [W/m²]; 0 where it has not been looked up yet.
     """
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, light: ReferenceLight) -> None:
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, light: ReferenceLight, tiles: F32 | None = None) -> None:
+        """tiles: of all slots, where they have been looked up before, see ``ReferenceLight.on_tiles``."""
         self._gpu, self._lightmap, self._light = gpu, lightmap, light
         self._begin()
+        if tiles is not None:
+            self._write(np.arange(len(tiles)), tiles)
+            self._version = lightmap.version
 
     def _begin(self) -> None:
         nodes = self._lightmap.nodes
@@ -39,14 +44,13 @@ class ReferenceTexels:
         keys = np.where(nodes.used, nodes.leaves.keys, -1)
         stale = np.flatnonzero(nodes.used & (keys != self._known))
         now = stale if whole else stale[: TEXELS_PER_FRAME // nodes.tile**2]
-        self._write(now)
+        self._write(now, self._light.on_tiles(nodes, now))
         self._known[now] = keys[now]
         if len(now) == len(stale):
             self._version = self._lightmap.version
 
-    def _write(self, slots: NDArray[np.int64]) -> None:
+    def _write(self, slots: NDArray[np.int64], tiles: F32) -> None:
         nodes = self._lightmap.nodes
-        tiles = self._light.on_tiles(nodes, slots)
         tiles = np.concatenate([tiles, np.ones((*tiles.shape[:-1], 1), np.float32)], axis=-1)
         if len(slots) == nodes.tiles:
             self.texture.write(nodes.image_from_tiles(tiles).tobytes())

@@ -158,6 +158,11 @@ def test_a_texel_has_its_reference(session: Session, tmp_path: Path) -> None:
     corner = lightmap.nodes.corner(tile)
     texel = corner[0] + column, corner[1] + row
     assert session.reference_at(texel) == pytest.approx(3 * lightmap.light_at(texel)[0], rel=1e-5)
+    comparison, nodes = session.comparison, lightmap.nodes
+    assert comparison is not None
+    image = np.frombuffer(comparison.texels.texture.read(), np.float32).reshape(*nodes.size[::-1], 4)
+    all_of_them = comparison.light.on_tiles(nodes, np.arange(nodes.tiles))
+    np.testing.assert_array_equal(nodes.tiles_from_image(image)[..., :3], all_of_them, err_msg="before any frame asks")
 
 
 def test_an_edit_is_measured_and_said(session: Session, tmp_path: Path) -> None:
