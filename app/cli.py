@@ -122,6 +122,7 @@ def _view_flags(view: Parser) -> None:
     _scene_flags(view, optional=True)
     add_flags(view, ShootingOptions)
     _size_flag(view, "window")
+    _reference_flag(view)
     view.add_argument("--frames", type=_positive(int), metavar="N", help="close after N frames (for tests)")
     add_flags(view, DisplayOptions)
 
@@ -131,6 +132,7 @@ def _shot_flags(shot: Parser) -> None:
     _output_flag(shot, "PNG", "the picture to write")
     _size_flag(shot, "picture")
     shot.add_argument("--camera", metavar="NAME", help="a camera of the scene (default: its first)")
+    _reference_flag(shot)
     shot.add_argument("--ui", action="store_true", help="draw the viewer's panels too")
     _json_flag(shot)
     add_flags(shot, ShootingOptions)
@@ -257,6 +259,11 @@ def _scene_flags(parser: Parser, *, optional: bool = False) -> None:
 
 def _output_flag(parser: Parser, what: str, help: str) -> None:
     parser.add_argument("-o", "--output", type=Path, required=True, metavar=what, help=help)
+
+
+def _reference_flag(parser: Parser) -> None:
+    help = "a bake of the same scene, to compare with: the error, and --layer error and --show"
+    parser.add_argument("--reference", type=Path, metavar="DIR", help=help)
 
 
 def _size_flag(parser: Parser, what: str) -> None:

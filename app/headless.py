@@ -24,6 +24,7 @@ from app.errors import UserError
 from app.gpu import Gpu, gpu_context
 from app.headless_ui import SAMPLES, pixels, ui_image
 from app.options import from_flags
+from app.render.false_colour import measured
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
 from app.scene.load import NO_LIGHT
@@ -35,6 +36,7 @@ from app.solving import NotFiniteError, share_done
 def shot(flags: argparse.Namespace, note: str | None = None) -> int:
     """Solve and save a picture. note: what else the user should know. Raises UserError."""
     _check_file(flags.output)
+    check_reference(flags)
     console = Console(quiet=flags.json)
     with gpu_context() as gpu:
         session = Session(gpu, **session_options(flags))
@@ -42,7 +44,10 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
         shows_light = flags.ui or LAYER_SHADERS[session.display.layer].light is not None
         _open(session, flags.scene, console, note, needs_light=shows_light)
         _choose_camera(session, flags.camera)
+        if flags.reference is not None:
+            _open_reference(session, flags.reference, console)
         failure = _solve(session, flags, console)
+        session.measure()
         if flags.exposure is None:
             session.expose()
         if flags.ui:
@@ -101,13 +106,14 @@ def view_or_shot(flags: argparse.Namespace) -> int:
 
 def view(flags: argparse.Namespace) -> int:
     """Open the window on a scene. Raises UserError."""
+    check_reference(flags)
     from app.scene.library import scene_names
     from app.scene.load import LOADERS
     from app.window import run_window
 
     def make_session(gpu: Any) -> Session:
         session = Session(gpu, **session_options(flags), expose_on_open=flags.exposure is None)
-        session.open(flags.scene)
+        session.open(flags.scene, reference=flags.reference)
         return session
 
     run_window(
@@ -144,11 +150,19 @@ def session_options(flags: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+def check_reference(flags: argparse.Namespace) -> None:
+    """Raise UserError for what cannot be shown without a reference."""
+    display = from_flags(DisplayOptions, flags)
+    for name, asks in (("layer", LAYER_SHADERS[display.layer].compares), ("show", display.show != "solution")):
+        if asks and flags.reference is None:
+            raise UserError(f"--{name} {getattr(display, name)}: needs a --reference")
+
+
 def picture(session: Session, size: tuple[int, int]) -> np.ndarray:
     """(height, width, 3) u8 sRGB of the session as it is, top row first. Raises UserError for sizes beyond the GPU's."""
     check_size(session.gpu, size)
-    if session.display.false_colour != "off":
-        return ui_image(session.gpu, session, size, panels=False)  # with the legend
+    if measured(session.shown) != "off" or session.shown.show == "split":
+        return ui_image(session.gpu, session, size, panels=False)  # with the legend, or the line between both
     texture = session.gpu.texture(size, 4, "f1")
     target = session.gpu.target(texture)
     try:
@@ -190,8 +204,27 @@ def report(session: Session) -> dict[str, Any]:
             for name in ("emitted", "absorbed", "escaped", "unshot", "imbalance")
         },
         "imbalance": stats.imbalance,
+        **_error(session),
         "warnings": [*session.scene.warnings, *session.charts.warnings, *_notes(session)],
     }
+
+
+def _error(session: Session) -> dict[str, Any]:
+    """Against the reference, at random points; nothing without one."""
+    comparison = session.comparison
+    if comparison is None or comparison.error is None:
+        return {}
+    light = comparison.light
+    known = {"reference": light.name, "reference_texels": light.texels, "reference_residual": light.unshot}
+    return {"error": known | {"points": comparison.lit} | comparison.error._asdict()}
+
+
+def _open_reference(session: Session, path: Path, console: Console) -> None:
+    """Read it, and say what there is to say. Raises UserError."""
+    session.open_reference_now(path)
+    assert session.comparison is not None
+    for note in session.comparison.notes(session.lightmap):
+        console.warn(note)
 
 
 def _notes(session: Session) -> list[str]:
@@ -276,10 +309,12 @@ def _folder(path: Path) -> Iterator[None]:
 
 
 def _summary(result: dict[str, Any]) -> str:
+    error = result.get("error")
+    compared = "" if error is None else f", off by {error['rms']:.2%} RMS and {error['median']:.2%} in the median"
     state = "stopped early" if result["interrupted"] else "converged" if result["converged"] else "stopped as asked"
     return (
         f"{result['shots']} shots in {result['seconds']['shoot']:.1f} s, {result['residual']:.2%} unshot ({state}), "
-        f"{result['texels']} texels, energy imbalance {result['imbalance']:+.2%}, {result['renderer']}"
+        f"{result['texels']} texels, energy imbalance {result['imbalance']:+.2%}{compared}, {result['renderer']}"
     )
 
 

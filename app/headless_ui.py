@@ -17,7 +17,7 @@ from PIL import Image
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, ShaderError, Texture
 from app.gpu.imgui import ImguiRenderer
-from app.render.false_colour import Scale, colour_map, false_colour_scale
+from app.render.false_colour import Scale, colour_map, false_colour_scale, measured
 from app.render.resolve import BORDER, TEXELS_PER_FRAME, display_size
 from app.ui import theme
 from app.ui.app import Ui
@@ -69,7 +69,7 @@ class UiFrame:
         seconds: since the last frame. look: draw the view anew, or show it as it was drawn last. Reloads shaders itself.
         """
         scale = self._false_colour(session)
-        legend = None if scale is None else _legend(session.display.false_colour, scale)
+        legend = None if scale is None else _legend(measured(session.shown), scale)
         data = self._ui.frame(
             session, size=size, ratio=ratio, seconds=seconds, texture_id=self._renderer.texture_id, legend=legend
         )
@@ -121,10 +121,13 @@ class UiFrame:
 
     def _false_colour(self, session: Session) -> Scale | None:
         """The scale of what is shown. Finding its top reads all light back, so that is done only now and then."""
-        display = session.display
-        if not session.opened or display.false_colour == "off":
+        if not session.opened:
             return None
-        asked = (session.lightmap, display.false_colour, display.false_colour_log, display.false_colour_max)
+        display = session.shown
+        kind = measured(display)
+        if kind == "off":
+            return None
+        asked = (session.lightmap, kind, display.false_colour_log, display.false_colour_max)
         now = time.perf_counter()
         if self._scale is None or asked != self._scale_of or (now >= self._scale_due and not display.false_colour_max):
             self._scale = false_colour_scale(display, session.lightmap)

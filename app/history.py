@@ -8,26 +8,39 @@ from app.scene.model import F64
 
 CAPACITY = 4096  # rows kept: more than a plot has pixels
 COLUMNS = ("shots", "seconds", "residual", "absorbed", "escaped")
+ERRORS = ("shots", "seconds", "rms", "median")
 
 
-class History:
-    """Columns of equal length: shots, seconds, residual [-], absorbed and escaped (shares of the emitted power)."""
+class Rows:
+    """Columns of equal length, by name. When full, every second row goes."""
 
-    def __init__(self) -> None:
-        self._rows = np.zeros((CAPACITY, len(COLUMNS)))
+    def __init__(self, columns: tuple[str, ...]) -> None:
+        self._columns = columns
+        self._rows = np.zeros((CAPACITY, len(columns)))
         self._count = 0
 
-    def add(self, shots: int, seconds: float, residual: float, escaped: float) -> None:
-        """Append a row; what is neither unshot nor escaped was absorbed. When full, every second row goes."""
+    def append(self, *row: float) -> None:
+        """One number for each column."""
         if self._count == CAPACITY:
             self._rows[: CAPACITY // 2] = self._rows[::2]
             self._count = CAPACITY // 2
-        self._rows[self._count] = shots, seconds, residual, 1.0 - residual - escaped, escaped
+        self._rows[self._count] = row
         self._count += 1
 
     def column(self, name: str) -> F64:
-        """One of COLUMNS, contiguous (n,) f64."""
-        return np.ascontiguousarray(self._rows[: self._count, COLUMNS.index(name)])
+        """Contiguous (n,) f64."""
+        return np.ascontiguousarray(self._rows[: self._count, self._columns.index(name)])
+
+
+class History(Rows):
+    """Shots, seconds, residual [-], absorbed and escaped (shares of the emitted power)."""
+
+    def __init__(self) -> None:
+        super().__init__(COLUMNS)
+
+    def add(self, shots: int, seconds: float, residual: float, escaped: float) -> None:
+        """Append a row; what is neither unshot nor escaped was absorbed."""
+        self.append(shots, seconds, residual, 1.0 - residual - escaped, escaped)
 
     @property
     def shots_per_second(self) -> float:

@@ -11,6 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+DARK = 1e-3  # share of the mean below which a point counts as dark
+
+
+def lit_points(reference: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) where colours (n, 3) are not dark."""
+    mean = reference.mean(axis=1)
+    return np.asarray(mean > DARK * mean.mean())
+
 
 def relative_rms(value: ArrayLike, reference: ArrayLike) -> float:
     """√(mean (v - r)²) / mean r. NaN where the reference is black."""

@@ -16,6 +16,7 @@ import numpy as np
 from app.atlas.charts import Charts
 from app.atlas.options import AtlasOptions
 from app.bookkeeping import Books, Effort
+from app.comparing import Comparing
 from app.errors import UserError
 from app.gpu import Gpu
 from app.history import History
@@ -27,10 +28,9 @@ from app.scene.model import Material, Scene
 from app.solvers import EnergyBook, ShootingOptions
 from app.solving import not_finite, solve
 from app.stats import Stats, Stop, stats_of
-from app.viewing import Viewing
 
 
-class Session(Viewing):
+class Session(Comparing):
     """Raises UserError (SceneError, GpuError) from ``open_now``; ``open`` reports through ``message`` instead.
 
     expose_on_open: whether a scene that opens sets the exposure.
@@ -60,16 +60,18 @@ class Session(Viewing):
         self._books = Books()
         self._settled, self._busy, self._opened = True, False, False
         self._opening = Opening(gpu, self.renderer)
+        self._then_reference: Path | None = None
         self.unedited: Scene  # the open one as it was read: the same through edits, and however it is cut
 
     # -- opening -------------------------------------------------------------------------------------------------------
 
-    def open(self, source: str | Path) -> None:
-        """Start to load in the background; ``poll`` swaps the scene when it is there."""
+    def open(self, source: str | Path, *, reference: Path | None = None) -> None:
+        """Start to load in the background; ``poll`` swaps the scene when it is there. reference: a bake to open then."""
+        self._then_reference = reference
         light, expose = self.default_light, self.expose_on_open
         self._opening.begin(Loading(source, self.atlas, default_light=light, expose=expose))
 
-    def open_now(self, source: str | Path, progress: Callable[[str, float], None] | None = None) -> None:
+    def open_now(self, source: str | Path | Scene, progress: Callable[[str, float], None] | None = None) -> None:
         """Load and wait."""
         light, expose = self.default_light, self.expose_on_open
         loaded = load(source, self.atlas, default_light=light, expose=expose, progress=progress)
@@ -90,6 +92,8 @@ class Session(Viewing):
             self._open_part(self.loading)
         elif self._opened:
             self.hear()
+        if self._opened:
+            self._compare()
 
     def _open_part(self, loading: Loading) -> None:
         """The next part of opening what was loaded; the scene that is open stays until the last."""
@@ -125,6 +129,10 @@ class Session(Viewing):
         self.message = None if self.scene.emits else f"{self.scene.name} has no light: try --light for a ceiling light"
         self._opened = True
         self._books.begin(self.solver.books())
+        self._compare_anew()
+        if self._then_reference is not None:
+            self.open_reference(self._then_reference)
+            self._then_reference = None
         self._begin()
 
     def close(self) -> None:
@@ -176,7 +184,7 @@ class Session(Viewing):
     @property
     def at_rest(self) -> bool:
         """Whether nothing changes by itself: neither light nor numbers, and no scene is on its way."""
-        return self.loading is None and not self.shooting_goes_on and self._settled
+        return self.loading is None and not self.shooting_goes_on and self._settled and not self.comparing
 
     def advance(self, *, budget_ms: float, shots: int = 1, brisk: bool = False) -> int:
         """Make up to ``shots`` shots within ``budget_ms``; returns how many. None when paused or converged, nor in a frame that
@@ -240,6 +248,10 @@ class Session(Viewing):
         self._books.edited()
         self._settled = False
 
+    def measure(self) -> None:
+        """Wait for the GPU and bring ``comparison`` up to the last shot."""
+        self._compare(wait=True)
+
     def _begin_again(self) -> None:
         self._books.begin_again()
         self._begin()
@@ -250,6 +262,8 @@ class Session(Viewing):
         self._pace.begin()
         self.gpu.timers.reset()
         self.history = History()
+        if self.comparison is not None:
+            self.comparison.begin()
         self.history.add(0, 0.0, self.solver.report.residual, 0.0)
 
     def hear(self, *, books: bool = True, wait: bool = False) -> None:

@@ -16,6 +16,7 @@ from app.render.false_colour import Scale
 from app.render.frame import FrameRenderer
 from app.render.items import ItemImage
 from app.render.options import DisplayOptions
+from app.render.resolve import Reference
 from app.render.surfaces import Rect
 from app.scene.model import RGB, Camera
 from app.solvers import EnergyBook, ShootingOptions, Solver
@@ -38,6 +39,15 @@ class Viewing(ABC):
     @abstractmethod
     def books(self) -> EnergyBook:
         """The last energy book that was made."""
+
+    @property
+    def shown(self) -> DisplayOptions:
+        """The display knobs, as far as there is what they ask for."""
+        return self.display
+
+    def _reference(self, *, whole: bool) -> Reference | None:
+        """The light that is shown beside or instead of the solution's, and errors are of."""
+        return None
 
     def pick(self, x_px: int, y_px: int) -> Picked | None:
         """What surface is at that pixel of the last frame, and the light on it."""
@@ -64,7 +74,8 @@ class Viewing(ABC):
             size,
             self.lightmap,
             self.view,
-            self.display,
+            self.shown,
+            reference=self._reference(whole=whole),
             ambient=self._ambient,
             shooter=self._shooter_rect,
             scale=scale,

@@ -202,7 +202,8 @@ class ViewerWindow(WindowConfig):
             self.wnd.render(now, min(elapsed, REST_SECONDS))
             if not self.wnd.is_closing:
                 self.wnd.swap_buffers()
-            if self._session.loading is not None and not self._session.shooting_goes_on:
+            waiting = self._session.loading is not None or self._session.fetching is not None
+            if waiting and not self._session.shooting_goes_on:
                 time.sleep(LOADING_PAUSE)
 
     def _wake(self, *_: object) -> None:
@@ -306,7 +307,7 @@ class ViewerWindow(WindowConfig):
     def on_files_dropped_event(self, x: int, y: int, paths: list[str]) -> None:
         """Files were dropped: the first one is opened."""
         if paths:
-            self._ui.state.act(lambda: self._session.open(Path(paths[0])))
+            self._ui.drop(self._session, Path(paths[0]))
 
     def _button(self, x: int, y: int, button: int, down: bool) -> None:
         self._ui.io.add_mouse_pos_event(x, y)

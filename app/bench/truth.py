@@ -20,12 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app import cache
+from app.atlas.points import Points, random_points
 from app.atlas.sides import scene_size, weld
-from app.bench.points import Points, open_above, random_points
+from app.bench.points import open_above
 from app.console import Tell
 from app.errors import UserError
-from app.metrics import median_local
+from app.metrics import lit_points, median_local
 from app.reference.dense import irradiance_at, solve_dense
+from app.scene.arrays import arrays_of
 from app.scene.model import F64, Scene
 
 POINTS = 2000
@@ -36,7 +38,6 @@ PATCHES = (
     6000  # of the dense matrix: in a Cornell box 0.8 % RMS from a path tracer's with 0.5 % of noise; of 3000 2.9 %
 )
 DENSE_TRIANGLES = 60  # most for which it takes minutes
-DARK = 1e-3  # share of the mean below which a point counts as dark
 FORMAT = b"glowtree truth 1"  # changes when a reference or its file does
 CACHE_FILES = 64  # kept, newest first
 
@@ -58,8 +59,7 @@ class Truth:
     @property
     def lit(self) -> NDArray[np.bool_]:
         """(n,) points that are not dark."""
-        mean = self.E.mean(axis=1)
-        return np.asarray(mean > DARK * mean.mean())
+        return lit_points(self.E)
 
     @property
     def noise(self) -> float | None:
@@ -246,21 +246,6 @@ def _cached(
         cache.store(cache.content(found), path, CACHE_FILES)
     kept = points.only(found["kept"])
     return Truth(reference, kept, found["E"], found.get("deviation"), made, float(found["seconds"]))
-
-
-def arrays_of(scene: Scene) -> dict[str, NDArray[Any]]:
-    """All of a scene that light depends on, by name; cameras, names and order of its objects are not."""
-    arrays: dict[str, NDArray[Any]] = {"corners": scene.corners, "material_ids": scene.material_ids}
-    for name, uv in (("uv0", scene.uv0), ("uv1", scene.uv1)):
-        if uv is not None:
-            arrays[name] = uv
-    for k, material in enumerate(scene.materials):
-        arrays[f"material {k}"] = np.array([*material.albedo, *material.emission, material.double_sided])
-        for kind, texture in (("albedo", material.albedo_texture), ("emission", material.emission_texture)):
-            if texture is not None:
-                arrays[f"{kind} {k} {texture.wrap} {texture.bilinear} {texture.texcoord}"] = texture.pixels
-                arrays[f"{kind} {k} transform"] = texture.uv_transform
-    return arrays
 
 
 REFERENCES = {

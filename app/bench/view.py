@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from app import cache
 from app.atlas.materials import look_up
 from app.atlas.node_set import Frame
+from app.atlas.points import Points
 from app.atlas.sides import lit_sides
-from app.bench.points import Points
 from app.bench.report import FLIP, missing
-from app.bench.truth import CACHE_FILES, Truth, arrays_of
+from app.bench.truth import CACHE_FILES, Truth
 from app.console import Tell
 from app.gpu import Gpu, Mesh, Pass
 from app.render.camera import CameraView
@@ -27,6 +27,7 @@ from app.render.develop import encode_srgb
 from app.render.exposure import KEY
 from app.render.false_colour import LUMINANCE
 from app.render.surfaces import uniform_matrix
+from app.scene.arrays import arrays_of
 from app.scene.model import F64, Scene, Texture
 
 SIZE = (256, 192)  # pixels

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from app.render.false_colour import Scale, value_per_radiance
+from app.render.false_colour import Scale, measured, value_per_radiance
 from app.render.options import DisplayOptions
 from app.scene.model import F64
 
@@ -20,7 +20,7 @@ def curve(display: DisplayOptions, scale: Scale | None, *, exposed: bool) -> tup
         uniforms = {
             "u_range": (scale.low, scale.high),
             "u_logarithmic": float(scale.low > 0),
-            "u_per_radiance": value_per_radiance(display.false_colour),
+            "u_per_radiance": value_per_radiance(measured(display)),
         }
         return "false_colour", uniforms | {"u_gain": 1.0}
     return "tone_maps/" + (display.tone_map if exposed else "clamp"), {

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.atlas.lightmap import Lightmap
+from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
 from app.render.sample import sampled_colours, sampled_irradiance, sampled_tiles
 from app.scene.model import F32, F64
@@ -22,7 +23,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec.709 [IEC 61966-2-1]
 SHARES = (1.0, 99.0)
 DECADES = (0.5, 3.0)  # of a logarithmic scale: fewer would be noise, more cannot be told apart
 NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # ends of a scale, times a power of ten
-UNITS = {"illuminance": "lx", "luminance": "cd/m²"}
+UNITS = {"illuminance": "lx", "luminance": "cd/m²", "error": "%"}
 LAYER = {"illuminance": "irradiance", "luminance": "combined"}  # the layer whose radiance is measured
 VIRIDIS = np.array(
     [
@@ -45,15 +46,28 @@ class Scale(NamedTuple):
     unit: str
 
 
+ERRORS = Scale(0.1, 100.0, UNITS["error"])  # the same in every picture, so that they can be compared
+
+
+def measured(display: DisplayOptions) -> str:
+    """What is shown in false colour: ``illuminance``, ``luminance``, ``error``, or ``off`` for nothing. Errors go first."""
+    return "error" if LAYER_SHADERS[display.layer].compares else display.false_colour
+
+
 def value_per_radiance(kind: str) -> float:
-    """What a layer's radiance of 1 W/(sr m²) measures: lx for irradiance (shown as H/π), cd/m² for radiance B/π."""
+    """What a layer's radiance of 1 W/(sr m²) measures: lx for irradiance (shown as H/π), cd/m² for radiance B/π; of an error,
+    which is no radiance, %."""
+    if kind == "error":
+        return 100.0
     return WHITE_EFFICACY * np.pi if kind == "illuminance" else WHITE_EFFICACY
 
 
 def false_colour_scale(display: DisplayOptions, lightmap: Lightmap) -> Scale:
     """The scale of the display's false colour, found from the light on what does not emit and rounded to short numbers; only its
-    lower end where ``false_colour_max`` gives the upper one. Waits for the GPU."""
-    kind, high, low = display.false_colour, display.false_colour_max, 0.0
+    lower end where ``false_colour_max`` gives the upper one. Waits for the GPU. Of errors it is always the same."""
+    kind, high, low = measured(display), display.false_colour_max, 0.0
+    if kind == "error":
+        return ERRORS
     if not high or display.false_colour_log:
         darkest, brightest = _ends(kind, lightmap)
         high = high or _nice_above(brightest)

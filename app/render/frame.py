@@ -8,9 +8,10 @@ from app.atlas.lightmap import Lightmap
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.render.atlas_image import AtlasImage
 from app.render.camera import CameraView
-from app.render.false_colour import LAYER, Scale, false_colour_scale
+from app.render.false_colour import LAYER, Scale, false_colour_scale, measured
 from app.render.options import DisplayOptions
 from app.render.pick import Picker, PickHit
+from app.render.resolve import Reference
 from app.render.surfaces import Rect, Surfaces
 from app.scene.model import RGB
 
@@ -52,6 +53,7 @@ class FrameRenderer:
         view: CameraView,
         display: DisplayOptions,
         *,
+        reference: Reference | None = None,
         ambient: RGB | None = None,
         shooter: Rect | None = None,
         scale: Scale | None = None,
@@ -60,16 +62,15 @@ class FrameRenderer:
     ) -> None:
         """Draw into the lower left ``size`` (width, height) [px] of ``target``.
 
+        reference: for ``display.show`` and for layers that compare; None where there is none.
         ambient: A [W/m²] for ``display.ambient``. shooter: the patch to mark for ``display.last_shooter``: (u, v, u, v) in
         atlas texels. scale: of the false colour; left out, it is found from the light, which waits for the GPU.
         samples: per pixel along each axis. whole: show all light as it is now; False bounds the work of a frame, a large
         lightmap is then brought up to date over several. Raises GpuError for a picture larger than a texture can be.
         """
-        layer = display.layer
-        if display.false_colour == "off":
-            scale = None
-        else:
-            layer, scale = LAYER[display.false_colour], scale or false_colour_scale(display, lightmap)
+        kind = measured(display)
+        layer = LAYER.get(kind, display.layer)
+        scale = None if kind == "off" else scale or false_colour_scale(display, lightmap)
         clip_from_local = view.clip_from_local(size[0] / size[1], lightmap.frame)
         surfaces = self._surfaces_of(lightmap, display.interpolation)
         picture = self._picture_for(target, size, samples)
@@ -82,6 +83,7 @@ class FrameRenderer:
             layer,
             display,
             scale=scale,
+            reference=reference,
             ambient=ambient,
             shooter=shooter,
             whole=whole,

@@ -10,14 +10,20 @@ from app.render.options import LAYERS
 @dataclass(frozen=True)
 class Layer:
     """shader: its file. light: the lightmap's texture that it shows as radiance, exposed; None for what is no light and
-    is shown as it is. smooth: whether its texels may be interpolated. checker: depth of the texel checker. defines:
-    those of the lightmap's that the shader declares."""
+    is shown as it is. smooth: whether its texels may be interpolated. checker: depth of the texel checker. compares: whether it
+    is of a reference, too. defines: those of the lightmap's that the shader declares."""
 
     shader: str
     light: str | None = None
     smooth: bool = True
     checker: float = 0.0
+    compares: bool = False
     defines: tuple[str, ...] = ()
+
+    @property
+    def received(self) -> bool:
+        """Whether it shows light received, which a reference has too."""
+        return self.light == "t_irradiance" and not self.compares
 
 
 LAYER_SHADERS = {
@@ -28,5 +34,6 @@ LAYER_SHADERS = {
     "charts": Layer("charts", smooth=False, checker=0.12, defines=("MATERIAL_BITS",)),
     "leaves": Layer("leaves", smooth=False, checker=0.12, defines=("TILE",)),
     "texels": Layer("texels", smooth=False, checker=0.25, defines=("MATERIAL_BITS",)),
+    "error": Layer("error", "t_irradiance", compares=True),
 }
 assert tuple(LAYER_SHADERS) == LAYERS

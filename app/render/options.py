@@ -6,16 +6,23 @@ from dataclasses import dataclass
 
 from app.options import Options, option
 
-LAYERS = ("combined", "irradiance", "residual", "albedo", "charts", "leaves", "texels")
+LAYERS = ("combined", "irradiance", "residual", "albedo", "charts", "leaves", "texels", "error")
 TONE_MAPS = ("clamp", "reinhard", "aces", "agx", "neutral")
 INTERPOLATIONS = ("nearest", "bilinear", "bicubic")
+SHOWN = ("solution", "reference", "split")
 FALSE_COLOURS = ("off", "illuminance", "luminance")  # lux, cd/m²
 
 
 @dataclass(frozen=True)
 class DisplayOptions(Options):
     layer: str = option(
-        "combined", "what is shown: B, H, r, albedo, charts, quadtree levels or texel density", choices=LAYERS
+        "combined",
+        "what is shown: B, H, r, albedo, charts, quadtree levels, texel density or error",
+        choices=LAYERS,
+    )
+    show: str = option("solution", "whose light: the solution's, a reference's, or both side by side", choices=SHOWN)
+    split: float = option(
+        0.5, "share of the picture that is the solution's, where both are shown", minimum=0, maximum=1
     )
     exposure: float = option(0.0, "exposure; where not given, found from the light", unit="EV", minimum=-24, maximum=24)
     tone_map: str = option("agx", "tone curve", choices=TONE_MAPS)

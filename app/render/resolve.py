@@ -7,7 +7,7 @@ rasteriser. A texel that covers nothing copies a neighbour, so that no gutter or
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,13 @@ TEXELS_PER_FRAME = 1 << 16  # that are brought up to date in one frame, where no
 LAYER_TABLES = ("t_normal_ids", "t_materials", "t_albedo", "t_emission", "t_facets", "t_leaves")
 PLACES_WIDTH = 256  # of the table of places; pixels divide by it: a constant, a power of two
 T = TypeVar("T")
+
+
+class Reference(NamedTuple):
+    """The light of a reference on every texel of a lightmap, RGBA32F [W/m²], and the length of a colour that counts as dark."""
+
+    texture: Texture
+    dark: float
 
 
 class DisplayTexels:
@@ -69,11 +76,20 @@ class DisplayTexels:
         return self.size == display_size(self._lightmap, border) and self._border == border
 
     def resolve(
-        self, layer_name: str, display: DisplayOptions, *, scale: Scale | None, ambient: RGB, whole: bool
+        self,
+        layer_name: str,
+        display: DisplayOptions,
+        *,
+        scale: Scale | None,
+        ambient: RGB,
+        whole: bool,
+        reference: Reference | None = None,
+        instead: bool = False,
     ) -> dict[str, Texture]:
         """Bring the display texels up to date; the textures that surfaces bind.
 
-        If not ``whole``, those of leaves that have changed, and TEXELS_PER_FRAME others, in turn.
+        If not ``whole``, those of leaves that have changed, and TEXELS_PER_FRAME others, in turn. reference: for layers that
+        compare, or, ``instead``, to be shown in place of the lightmap's irradiance.
         """
         layer, lightmap = LAYER_SHADERS[layer_name], self._lightmap
         if self._version != lightmap.version:
@@ -87,6 +103,10 @@ class DisplayTexels:
         }
         textures = self._tables | lightmap.textures(*LAYER_TABLES)
         textures |= {"t_light": lightmap.texture(layer.light)} if layer.light else {}
+        if reference is not None:
+            textures["t_reference"], uniforms["u_dark"] = reference
+        if reference is not None and instead:
+            textures["t_light"], uniforms["u_unit"] = reference.texture, 1.0
         uniforms |= {"u_size": self.size, "u_pages": self._pages}
         textures |= lightmap.textures("t_pages", "t_position_area")
 

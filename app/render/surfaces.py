@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from app.atlas.lightmap import Lightmap
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.render.ages import LATER, LeafAges
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
-from app.render.resolve import BORDER, PLACES_WIDTH, DisplayTexels
+from app.render.resolve import BORDER, PLACES_WIDTH, DisplayTexels, Reference
 from app.render.surface_mesh import SurfaceMesh
 from app.scene.model import F64, RGB
 
 Rect = tuple[float, float, float, float]
+Part = tuple[int, int, int, int] | None
 NOWHERE: Rect = (-1e6, -1e6, -1e6, -1e6)
 DARK: RGB = (0.0, 0.0, 0.0)
 
@@ -25,6 +28,8 @@ class Surfaces:
         self._ages = LeafAges(lightmap.nodes)
         self.mesh = SurfaceMesh(gpu, lightmap.nodes)
         self._texels = DisplayTexels(gpu, lightmap, self._ages, BORDER[interpolation])
+        self._others: DisplayTexels | None = None  # of a reference's light
+        self._sides = True, False  # whether the solution and the reference were shown last
         self._passes = {(overlay, False): self._pass(overlay, bicubic=False) for overlay in (False, True)}
         self._shown: dict[str, Texture] = {}
         self._live = False
@@ -37,23 +42,35 @@ class Surfaces:
         display: DisplayOptions,
         *,
         scale: Scale | None = None,
+        reference: Reference | None = None,
         ambient: RGB | None = None,
         shooter: Rect | None = None,
         whole: bool = True,
     ) -> None:
         """Draw the layer into ``target``, which has depth, over what is there.
 
-        scale: of the false colour, where one is on. ambient: A [W/m²], light that every surface is taken to receive
+        scale: of the false colour, where one is on. reference: for layers that compare, and to be shown as ``display.show`` asks,
+        where the layer is of received light. ambient: A [W/m²], light that every surface is taken to receive
         besides. shooter: the patch to mark: lower and upper corner (u, v, u, v) in atlas texels. whole: see
         ``DisplayTexels.resolve``; else one of many, in which new leaves shine.
         """
         lit_by = ambient if ambient and display.ambient else DARK
-        border, self._live = BORDER[display.interpolation], not whole
-        if not self._texels.fits(border):
-            self._texels.release()
-            self._texels = DisplayTexels(self._gpu, self.lightmap, self._ages, border)
-            whole = True  # a part of new ones would be black
-        self._shown = self._texels.resolve(layer_name, display, scale=scale, ambient=lit_by, whole=whole)
+        self._live = not whole
+        wanted: dict[str, Any] = {"scale": scale, "ambient": lit_by, "reference": reference}
+        shown: list[tuple[dict[str, Texture], Part]] = []
+        left, right = _parts(layer_name, display, reference, target.size)
+        if right is not None and reference is not None:
+            self._others, fresh = self._fitting(self._others, display)
+            now = whole or fresh or not self._sides[1]
+            shown.append((self._others.resolve(layer_name, display, whole=now, instead=True, **wanted), right))
+        elif reference is None and self._others is not None:
+            self._others.release()
+            self._others = None
+        if left is not None:
+            self._texels, fresh = self._fitting(self._texels, display)
+            now = whole or fresh or not self._sides[0]
+            shown.append((self._texels.resolve(layer_name, display, whole=now, **wanted), left))
+        self._shown, self._sides = shown[-1][0], (left is not None, right is not None)
 
         uniforms: dict[str, object] = {"u_clip_from_local": uniform_matrix(clip_from_local), "u_texel": self._texel}
         marked = shooter if shooter and display.last_shooter else None
@@ -66,7 +83,17 @@ class Surfaces:
         if kind not in self._passes:
             self._passes[kind] = self._pass(*kind)
         mesh = self.mesh.seen(clip_from_local)
-        self._passes[kind].draw(target, textures=self._shown, uniforms=uniforms, mesh=mesh, depth=True)
+        for textures, part in shown:
+            self._passes[kind].draw(target, textures=textures, uniforms=uniforms, mesh=mesh, depth=True, scissor=part)
+
+    def _fitting(self, texels: DisplayTexels | None, display: DisplayOptions) -> tuple[DisplayTexels, bool]:
+        """These, or others of the size that is wanted; and whether they are new: a part of them would be black."""
+        border = BORDER[display.interpolation]
+        if texels is not None and texels.fits(border):
+            return texels, False
+        if texels is not None:
+            texels.release()
+        return DisplayTexels(self._gpu, self.lightmap, self._ages, border), True
 
     def draw_atlas(self, program: Pass, target: Framebuffer, *, turned: bool) -> None:
         """The virtual atlas with what was drawn last, all over ``target``; ``program`` is render/atlas. turned: u for v."""
@@ -105,7 +132,23 @@ class Surfaces:
 
     def release(self) -> None:
         self._texels.release()
+        if self._others is not None:
+            self._others.release()
         self.mesh.release()
+
+
+def _parts(
+    layer_name: str, display: DisplayOptions, reference: Reference | None, size: tuple[int, int]
+) -> tuple[Part, Part]:
+    """The part of the picture (x, y, width, height) [px] that shows the solution, and the one that shows the reference; None for
+    one that is not shown."""
+    width, height = size
+    share = 1.0
+    if reference is not None and LAYER_SHADERS[layer_name].received:
+        share = {"solution": 1.0, "reference": 0.0, "split": display.split}[display.show]
+    middle = round(share * width)
+    left, right = (0, 0, middle, height), (middle, 0, width - middle, height)
+    return left if middle > 0 else None, right if middle < width else None
 
 
 def uniform_matrix(matrix: F64) -> tuple[float, ...]:

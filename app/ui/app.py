@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from app.session import Session
 
 SMALLEST_STEP = 1e-4  # s: Dear ImGui wants time to pass between frames
+IRRADIANCE = ".exr"
+AUTHORED = "The scenes that come along are under File > Scenes."
+BAKES = "'glowtree bake' writes an irradiance.exr."
 FPS_MEMORY = 0.9  # share of the last value in the running mean
 
 
@@ -47,7 +50,8 @@ class Ui:
         io.set_ini_filename(str(layout_file) if layout_file else None)
         theme.apply(scale)
         self.state = State(measured=measured, live=live, scenes=tuple(scenes))
-        self._dialog = FileDialog(suffixes, native=native_dialog)
+        self._dialog = FileDialog("Open a scene", "Scenes", suffixes, AUTHORED, native=native_dialog)
+        self._bakes = FileDialog("Open a bake", "Irradiance", (IRRADIANCE,), BAKES, native=native_dialog)
 
     def use(self) -> None:
         """Make this interface's contexts the current ones."""
@@ -105,13 +109,19 @@ class Ui:
     def moving(self) -> bool:
         """Whether something of the interface changes by itself: a notice, a flight of the eye, a file dialog."""
         state = self.state
-        return bool(state.toasts) or state.flight is not None or state.drag_button >= 0 or self._dialog.waiting
+        return (
+            bool(state.toasts)
+            or state.flight is not None
+            or state.drag_button >= 0
+            or self._dialog.waiting
+            or self._bakes.waiting
+        )
 
     @property
     def held(self) -> bool:
         """Whether a hand is at a control or moves the view."""
         self.use()
-        return bool(imgui.is_any_item_active()) or self.state.drag_button >= 0
+        return bool(imgui.is_any_item_active()) or self.state.drag_button >= 0 or self.state.split_held
 
     def take_requests(self) -> list[Request]:
         """What the host has to do, once."""
@@ -151,3 +161,16 @@ class Ui:
         chosen = self._dialog.poll()
         if chosen is not None:
             self.state.act(lambda: session.open(chosen))
+        if self.state.ask_for_reference:
+            self.state.ask_for_reference = False
+            self._bakes.open()
+        bake = self._bakes.poll()
+        if bake is not None:
+            self.state.act(lambda: session.open_reference(bake))
+
+    def drop(self, session: Session, file: Path) -> None:
+        """A file was dropped on the window: a scene, or the light of a bake of the one that is open."""
+        if file.suffix.lower() == IRRADIANCE and session.opened:
+            self.state.act(lambda: session.open_reference(file))
+        else:
+            self.state.act(lambda: session.open(file))

@@ -12,16 +12,18 @@ from imgui_bundle import imgui, portable_file_dialogs
 
 from app.ui import theme, widgets
 
-TITLE = "Open a scene"
 HELPERS = ("zenity", "kdialog", "matedialog", "qarma")  # what the system's dialog needs on Linux
-AUTHORED = "The scenes that come along are under File > Scenes."
 SIZE_EM = (36.0, 26.0)
 
 
 class FileDialog:
     """Closed, or waiting for an answer. ``poll`` never blocks."""
 
-    def __init__(self, suffixes: Sequence[str], *, native: bool | None = None) -> None:
+    def __init__(
+        self, title: str, kind: str, suffixes: Sequence[str], hint: str, *, native: bool | None = None
+    ) -> None:
+        """kind: of the files, as a plural; hint: what is said in a folder without any."""
+        self._title, self._kind, self._hint = title, kind, hint
         self._suffixes = tuple(suffixes)
         on_linux = sys.platform not in ("win32", "darwin")
         self._native = any(map(shutil.which, HELPERS)) if native is None and on_linux else native is not False
@@ -35,7 +37,7 @@ class FileDialog:
             self._opening = True
         elif self._pending is None:
             patterns = " ".join(f"*{s}" for s in self._suffixes) or "*"
-            self._pending = portable_file_dialogs.open_file(TITLE, str(self._folder), ["Scenes", patterns])
+            self._pending = portable_file_dialogs.open_file(self._title, str(self._folder), [self._kind, patterns])
 
     @property
     def waiting(self) -> bool:
@@ -58,12 +60,12 @@ class FileDialog:
 
     def _listed(self) -> Path | None:
         if self._opening:
-            imgui.open_popup(TITLE)
+            imgui.open_popup(self._title)
             self._opening = False
         em = imgui.get_font_size()
         imgui.set_next_window_size(imgui.ImVec2(SIZE_EM[0] * em, SIZE_EM[1] * em), imgui.Cond_.appearing)
         imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.appearing, imgui.ImVec2(0.5, 0.5))
-        if not imgui.begin_popup_modal(TITLE, None, imgui.WindowFlags_.no_saved_settings)[0]:
+        if not imgui.begin_popup_modal(self._title, None, imgui.WindowFlags_.no_saved_settings)[0]:
             return None
         imgui.text_unformatted(str(self._folder))
         imgui.begin_child("files", imgui.ImVec2(0, -imgui.get_frame_height_with_spacing()), imgui.ChildFlags_.borders)
@@ -83,7 +85,7 @@ class FileDialog:
         entries = readable(self._folder, self._suffixes)
         if not any(entry.is_file() for entry in entries):
             wanted = f" ({' '.join(self._suffixes)})" if self._suffixes else ""
-            widgets.wrapped(f"No scene files{wanted} here. {AUTHORED}", theme.DIM)
+            widgets.wrapped(f"No files{wanted} here. {self._hint}", theme.DIM)
         for entry in entries:
             folder = entry.is_dir()
             icon = theme.ICONS.ICON_FA_FOLDER if folder else theme.ICONS.ICON_FA_CUBE

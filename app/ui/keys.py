@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 
 from app.ui.navigation import focus
+from app.ui.panels.compare import show, shown
 from app.ui.panels.solver import toggle
 from app.ui.state import Request, State
 
@@ -61,6 +62,18 @@ def _restart(session: Session, state: State) -> None:
     state.act(session.restart)
 
 
+def _flip(session: Session, state: State) -> None:
+    show(session, state, "solution" if shown(session) == "reference" else "reference")
+
+
+def _split(session: Session, state: State) -> None:
+    show(session, state, "solution" if shown(session) == "split" else "split")
+
+
+def _error(session: Session, state: State) -> None:
+    show(session, state, session.display.show if shown(session) == "error" else "error")
+
+
 def _open(session: Session, state: State) -> None:
     state.ask_for_file = True
 
@@ -86,6 +99,9 @@ SHORTCUTS = (
     Shortcut(".", "one shot", Key.period, _one_shot, needs_scene=True),
     Shortcut("R", "restart", Key.r, _restart, needs_scene=True),
     Shortcut("F", "look at the picked point, or at the whole scene", Key.f, focus, needs_scene=True),
+    Shortcut("C", "flip between solution and reference", Key.c, _flip, needs_scene=True),
+    Shortcut("V", "split view: solution and reference", Key.v, _split, needs_scene=True),
+    Shortcut("X", "error heat map on and off", Key.x, _error, needs_scene=True),
     Shortcut("Ctrl+O", "open a scene", Key.o, _open, control=True),
     Shortcut("Esc", "close what is open, stop loading, else quit", Key.escape, _escape),
 )
@@ -96,7 +112,7 @@ POINTER = (
     ("Right or middle drag", "pan"),
     ("Wheel", "nearer and farther"),
     ("W A S D Q E", "fly; Shift is faster, Ctrl slower"),
-    ("Drop a file", "open it"),
+    ("Drop a file", "open it; an .exr as a reference"),
 )
 
 

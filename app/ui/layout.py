@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 
 from app.ui import theme, widgets
-from app.ui.panels import convergence, display, inspect, scene, solver
+from app.ui.panels import compare, convergence, display, inspect, scene, solver
 from app.ui.state import State
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ PANELS = (
     Panel("Solver", "left", solver.draw),
     Panel("Display", "right top", display.draw),
     Panel("Inspect", "right", inspect.draw),
+    Panel("Compare", "right", compare.draw),
     Panel("Convergence", "bottom", convergence.draw),
 )
 
@@ -54,7 +55,11 @@ def docks(state: State) -> None:
 
 
 def panels(session: Session, state: State) -> None:
-    """Every panel that is not hidden."""
+    """Every panel that is not hidden. A reference that has come brings its panel to the front."""
+    compared = session.opened and session.comparison is not None
+    if compared and not state.compared:
+        imgui.set_window_focus("Compare")
+    state.compared = compared
     for panel in PANELS:
         if panel.title in state.hidden_panels:
             continue

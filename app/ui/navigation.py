@@ -11,6 +11,7 @@ from imgui_bundle import imgui
 
 from app.picking import read_again
 from app.ui import theme
+from app.ui.divider import divider
 from app.ui.state import State
 
 if TYPE_CHECKING:
@@ -47,8 +48,9 @@ def navigate(session: Session, state: State, seconds: float) -> None:
     left, top, width, height = state.view_px
     x, y = io.mouse_pos.x - left, io.mouse_pos.y - top
     inside = 0 <= x < width and 0 <= y < height and not io.want_capture_mouse
+    taken = divider(session, state)
     for button in range(3):
-        if inside and imgui.is_mouse_clicked(button) and state.drag_button < 0:
+        if inside and not (taken and button == 0) and imgui.is_mouse_clicked(button) and state.drag_button < 0:
             state.drag_button, state.flight = button, None
     if state.drag_button >= 0:
         _drag(session, state, x, y, height)

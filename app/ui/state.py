@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import TYPE_CHECKING, Any
 
+from app.compare.options import ReferenceOptions
 from app.errors import UserError
 from app.options import Options, option
 
@@ -67,7 +68,7 @@ class State:
     live: whether frames follow each other, so that there is a rate of them.
     texture_id: makes a texture of the host drawable; legend: the scale of what is shown now; stats: of the session,
     asked once per frame (None without a scene). atlas: edited, not yet applied. view_px: the 3-D view (left, top,
-    width, height) [display units].
+    width, height) [display units]. reference: of a solve in the background; layer: to go back to from the error.
     """
 
     measured: bool = True
@@ -80,6 +81,7 @@ class State:
     show_ui: bool = True
     show_help: bool = False
     ask_for_file: bool = False
+    ask_for_reference: bool = False
     hidden_panels: set[str] = field(default_factory=set)
     docked: set[str] = field(default_factory=set)
     rebuild_layout: bool = False
@@ -93,11 +95,15 @@ class State:
     inset: tuple[object, Any] | None = None
     inset_age: float = 0.0
     drag_button: int = -1
+    split_held: bool = False
+    compared: bool = False
     flight: Flight | None = None
     material: int = 0
     atlas: AtlasOptions | None = None
     emission_colours: dict[int, RGB] = field(default_factory=dict)
     plot: str = "shots"
+    reference: ReferenceOptions = field(default_factory=ReferenceOptions)
+    layer: str = "combined"
     toasts: list[Toast] = field(default_factory=list)
     last_message: str | None = None
     requests: list[Request] = field(default_factory=list)

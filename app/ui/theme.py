@@ -33,6 +33,7 @@ BAD = _rgba(0xE5705F)
 
 # What the energy went into, the same in every plot, bar and table
 ABSORBED, ESCAPED, UNSHOT = AMBER, BLUE, _rgba(0x8E8C85)
+RMS, MEDIAN = BAD, BLUE
 
 _C = imgui.Col_
 _COLOURS: dict[imgui.Col_, RGBA] = {

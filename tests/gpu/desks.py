@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,18 @@ from app.ui.state import Request
 
 SIZE = (1280, 720)
 VIEW = (640, 260)  # in the middle of the 3-D view
+PICKED = SimpleNamespace(
+    **{"triangle": 12, "object": "box", "material": 0, "back": False, "chart": 3, "facet": 4, "texel": (112, 93)},
+    **{
+        "position": (0.0, 0.0, -2.0),
+        "normal": (0.0, 1.0, 0.0),
+        "area": 6e-4,
+        "patch": (28, 23),
+        "patch_edge": 4,
+        "B": (12.0, 8.0, 2.0),
+    },
+    **{"E": (0.0, 0.0, 0.0), "H": (16.0, 11.0, 3.0), "r": (0.02, 0.01, 0.004), "albedo": (0.7, 0.7, 0.7)},
+)
 
 
 class Desk:

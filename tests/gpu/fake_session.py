@@ -49,12 +49,23 @@ class FakeHistory:
         }[name]
 
 
+class FakeErrors:
+    """Thirty looks, of which each finds 90 % of the error."""
+
+    def column(self, name: str) -> np.ndarray:
+        shots = 2 * np.arange(30.0)
+        return {"shots": shots, "seconds": shots / 200, "rms": 0.9**shots, "median": 0.5 * 0.9**shots}[name]
+
+
 class FakeSession:
     """What the interface uses of a session. ``calls`` lists what it was asked to do, ``insets`` the pictures of the atlas."""
 
     def __init__(self, *, opened: bool = True) -> None:
         self.opened, self.running, self.name, self.message = opened, True, "fake box", None
         self.loading: SimpleNamespace | None = None
+        self.fetching: SimpleNamespace | None = None
+        self.comparison: SimpleNamespace | None = None
+        self.reference_texels = 124816
         cameras = (SimpleNamespace(name="front", world_from_camera=np.eye(4), yfov=0.7),)
         self.scene = SimpleNamespace(materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras)
         self.unedited = self.scene
@@ -68,6 +79,33 @@ class FakeSession:
         self.picked = None
         self.calls: list[tuple[object, ...]] = []
         self.insets: list[tuple[tuple[int, int], bool]] = []
+
+    @property
+    def shown(self) -> DisplayOptions:
+        return self.display
+
+    def compare(self) -> None:
+        """There is a reference."""
+        light = SimpleNamespace(name="bake reference", texels=124816, unshot=1e-4)
+        error = SimpleNamespace(rms=0.0412, median=0.0093, q90=0.0714, bias=-0.0031)
+        self.comparison = SimpleNamespace(
+            light=light, error=error, lit=4001, errors=FakeErrors(), notes=lambda lightmap: ["a note"]
+        )
+
+    def reference_at(self, texel: tuple[int, int]) -> tuple[float, float, float] | None:
+        return None if self.comparison is None else (16.125, 11.0, 3.0)
+
+    def open_reference(self, path: Path) -> None:
+        self.calls.append(("open_reference", str(path)))
+
+    def solve_reference(self, options: object) -> None:
+        self.calls.append(("solve_reference", options))
+
+    def stop_fetching(self) -> None:
+        self.calls.append(("stop_fetching",))
+
+    def drop_reference(self) -> None:
+        self.calls.append(("drop_reference",))
 
     @property
     def stats(self) -> SimpleNamespace:

@@ -40,6 +40,9 @@ EFFECTS: dict[str, Callable[[Desk], bool]] = {
     ".": lambda d: ("shoot",) in d.session.calls and not d.session.running,
     "R": lambda d: ("restart",) in d.session.calls,
     "F": lambda d: d.ui.state.flight is not None,
+    "C": lambda d: d.session.display.show == "reference",
+    "V": lambda d: d.session.display.show == "split",
+    "X": lambda d: d.session.display.layer == "error",
     "Ctrl+O": lambda d: imgui.is_popup_open("", imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level),
     "Esc": lambda d: Request.QUIT in d.requests,
 }
@@ -47,6 +50,7 @@ EFFECTS: dict[str, Callable[[Desk], bool]] = {
 
 @pytest.mark.parametrize("shortcut", SHORTCUTS, ids=lambda s: s.label)
 def test_every_key_does_what_the_help_says(desk: Desk, shortcut: Any) -> None:
+    desk.session.compare()
     assert not EFFECTS[shortcut.label](desk)
     desk.key(shortcut.key, control=shortcut.control)
     assert EFFECTS[shortcut.label](desk)

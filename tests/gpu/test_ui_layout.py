@@ -23,9 +23,11 @@ __all__ = ["desk", "session"]
 def test_panels_stand_side_by_side(gpu: Gpu, size: tuple[int, int]) -> None:
     desk = Desk(gpu, FakeSession(), size)
     taken = np.zeros((size[1], size[0]), int)
-    for panel in layout.PANELS:
-        window = imgui.internal.find_window_by_name(panel.title)
-        assert window.dock_id and window.size.x >= 280 and window.size.y >= 150, panel.title
+    windows = {panel.title: imgui.internal.find_window_by_name(panel.title) for panel in layout.PANELS}
+    docks = {window.dock_id: window for title, window in windows.items() if title != "Compare"}
+    assert windows["Compare"].dock_id == windows["Inspect"].dock_id, "a tab behind the other"
+    for window in docks.values():
+        assert window.dock_id and window.size.x >= 280 and window.size.y >= 150, window.name
         left, top = int(window.pos.x), int(window.pos.y)
         taken[top : top + int(window.size.y), left : left + int(window.size.x)] += 1
     left, top, width, height = (int(v) for v in desk.ui.state.view_px)

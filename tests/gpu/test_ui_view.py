@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from desks import VIEW, Desk, desk, session, where
+from desks import PICKED, VIEW, Desk, desk, session, where
 from fake_session import FakeSession
 from imgui_bundle import imgui
 
@@ -17,19 +17,6 @@ from app.ui import navigation
 from app.ui.panels import atlas
 
 __all__ = ["desk", "session", "where"]
-
-PICKED = SimpleNamespace(
-    **{"triangle": 12, "object": "box", "material": 0, "back": False, "chart": 3, "facet": 4, "texel": (112, 93)},
-    **{
-        "position": (0.0, 0.0, -2.0),
-        "normal": (0.0, 1.0, 0.0),
-        "area": 6e-4,
-        "patch": (28, 23),
-        "patch_edge": 4,
-        "B": (12.0, 8.0, 2.0),
-    },
-    **{"E": (0.0, 0.0, 0.0), "H": (16.0, 11.0, 3.0), "r": (0.02, 0.01, 0.004), "albedo": (0.7, 0.7, 0.7)},
-)
 
 
 def test_another_scene_of_the_same_name_is_another_scene(desk: Desk) -> None:

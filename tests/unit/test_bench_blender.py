@@ -14,9 +14,10 @@ from solver_scenes import grey, quads_scene, room
 from app.atlas.node_set import NodeSet
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
+from app.atlas.points import random_points
 from app.bench import blender, peers
 from app.bench.blender import Baked
-from app.bench.points import light_at, random_points
+from app.bench.points import light_at
 from app.bench.truth import truth_of
 from app.errors import UserError
 from app.loading import read_and_unfold

@@ -18,12 +18,12 @@ import pytest
 from solver_scenes import grey, quads_scene, room
 
 from app.atlas.options import AtlasOptions
+from app.atlas.points import random_points
 from app.bench import curve, truth
 from app.bench.error import TITLE
 from app.bench.measure import opened, warm_up
 from app.bench.methods import DEFAULT_METHODS, METHODS, method_names
 from app.bench.peers import PEERS
-from app.bench.points import random_points
 from app.bench.report import FLIP, missing
 from app.bench.truth import Truth
 from app.cli import ERROR_SCENES, build_parser, run

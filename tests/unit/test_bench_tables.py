@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from app.atlas.options import AtlasOptions
+from app.atlas.points import random_points
 from app.bench import equal, measure, published, tables
-from app.bench.points import irradiance_of, random_points
+from app.bench.points import irradiance_of
 from app.bench.report import Column, csv_text, markdown_table
 from app.bench.rooms import FEWEST, room_of
 from app.cli import run

@@ -11,11 +11,13 @@ import pytest
 from solver_scenes import grey, quads_scene, room
 
 from app import cache
+from app.atlas.points import random_points
 from app.bench import truth
-from app.bench.points import open_above, random_points
+from app.bench.points import open_above
 from app.bench.truth import Truth
 from app.metrics import relative_rms
 from app.reference.patches import texture_at
+from app.scene.arrays import arrays_of
 from app.scene.load import load_scene
 from app.scene.model import Material, Scene, Texture
 
@@ -100,7 +102,7 @@ def test_the_cache_is_hit_and_its_key_changes(own_cache: Path, monkeypatch: pyte
 
 def test_textures_and_sides_are_part_of_the_key() -> None:
     scene = load_scene("textured-room")
-    whole = cache.digest(b"", truth.arrays_of(scene))
+    whole = cache.digest(b"", arrays_of(scene))
     textured = next(k for k, m in enumerate(scene.materials) if m.albedo_texture is not None)
     for change in (
         {"double_sided": not scene.materials[textured].double_sided},
@@ -110,7 +112,7 @@ def test_textures_and_sides_are_part_of_the_key() -> None:
     ):
         materials = list(scene.materials)
         materials[textured] = replace(materials[textured], **change)
-        other = cache.digest(b"", truth.arrays_of(scene.with_materials(tuple(materials))))
+        other = cache.digest(b"", arrays_of(scene.with_materials(tuple(materials))))
         assert (other == whole) == ("name" in change), change
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -92,6 +93,13 @@ BAD = [
     (SHOT + "--exposure nan", "nan: must be -24 to 24"),
     (SHOT + "--exposure 25", "25: must be -24 to 24"),
     (SHOT + "--false-colour-max -1", "must be 0 to"),
+    # references
+    (SHOT + "--layer error", "--layer error: needs a --reference"),
+    (SHOT + "--show split", "--show split: needs a --reference"),
+    (SHOT + "--show bogus", "bogus: must be one of solution"),
+    (SHOT + "--split 2", "2: must be 0 to 1"),
+    (SHOT + "--reference nowhere", "nowhere: is no bake, irradiance.exr and scene.glb missing"),
+    (SHOT + "--reference dark.obj", "is no bake"),
     # the solver
     (SHOT + "--shots 0", "0: must be a whole number above 0"),
     (SHOT + "--shots -1", "-1: must be a whole number above 0"),
@@ -192,6 +200,23 @@ def test_warnings_are_told_on_stderr(folder: Path, capfd: pytest.CaptureFixture[
 def test_layers_that_show_no_light_need_none(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["shot", "dark.obj", "-o", "a.png", "--size", "64x48", "--layer", "charts", *FEW]) == 0
     assert (folder / "a.png").is_file()
+
+
+def test_a_shot_says_how_far_it_is_from_its_reference(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["bake", "cornell-box", "-o", "right", "--texels", "2000", "--residual", "0.2"]) == 0
+    (folder / "right" / "report.json").unlink()  # as another program leaves it
+    capfd.readouterr()
+    line = ["shot", "cornell-box", "-o", "a.png", "--size", "64x48", "--reference", "right"]
+    errors = []
+    for residual in ("0.5", "0.2"):
+        assert run([*line, "--layer", "error", "--texels", "2000", "--residual", residual, "--json"]) == 0
+        out, err = capfd.readouterr()
+        errors.append(json.loads(out)["error"])
+        assert err == "" and errors[-1]["reference"] == "bake right" and errors[-1]["reference_texels"] is None
+    assert errors[0]["rms"] > 2 * errors[1]["rms"] and errors[0]["bias"] < errors[1]["bias"] < 0.01
+    assert run([*line, "--show", "split", *FEW]) == 0
+    out = capfd.readouterr().out
+    assert re.search(r", off by \d+\.\d\d% RMS and \d+\.\d\d% in the median, ", out) and out.count("\n") == 1
 
 
 def test_view_without_a_screen_draws_headless_and_says_where(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""Convergence: residual and energy over shots or seconds, and the time of each pass."""
+"""Convergence: residual, error and energy over shots or seconds, and the time of each pass."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ MOST_POINTS = 400  # per curve: more cannot be told apart in a panel
 SMALLEST = 1e-6  # of the power emitted, for the logarithmic axis
 PLOT_EM = 20.0  # width of a plot with its legend
 TIMINGS_EM = 19.0  # width of the table of passes: the longest name and its bar
+Curve = tuple[np.ndarray, np.ndarray, theme.RGBA]  # x, y, colour
 AXES = ("shots", "seconds")
 AXIS = int(implot.AxisFlags_.auto_fit | implot.AxisFlags_.no_highlight)
 LEGEND = int(implot.LegendFlags_.no_menus | implot.LegendFlags_.outside | implot.LegendFlags_.horizontal)
@@ -62,12 +63,17 @@ def _plots(session: Session, size: imgui.ImVec2, label: str, *, named: bool) -> 
     """Over a column of the history; ``named`` writes which below."""
     history = session.history
     rows = np.flatnonzero(np.isfinite(history.column("residual")) & np.isfinite(history.column("absorbed")))
-    chosen = rows[np.unique(np.linspace(0, max(len(rows) - 1, 0), min(len(rows), MOST_POINTS)).astype(int))]
+    chosen = _thinned(rows)
     x = history.column(label)[chosen]
     curves = {n: history.column(n)[chosen] for n in ("residual", "absorbed", "escaped")}
-    _residual(size, x, curves["residual"], label if named else None)
+    _shares(size, session, label, x, curves["residual"], named=named)
     imgui.same_line()
     _energy(size, x, curves, label if named else None)
+
+
+def _thinned(rows: np.ndarray) -> np.ndarray:
+    """MOST_POINTS of these at most, evenly, with the first and the last."""
+    return np.asarray(rows[np.unique(np.linspace(0, max(len(rows) - 1, 0), min(len(rows), MOST_POINTS)).astype(int))])
 
 
 def _begin(name: str, size: imgui.ImVec2, label: str | None) -> bool:
@@ -79,17 +85,31 @@ def _begin(name: str, size: imgui.ImVec2, label: str | None) -> bool:
     return True
 
 
-def _residual(size: imgui.ImVec2, x: np.ndarray, residual: np.ndarray, label: str | None) -> None:
-    if _begin("residual", size, label):
-        lowest = max(float(residual.min(initial=1.0)), SMALLEST)
-        decade = 10.0 ** min(np.floor(np.log10(lowest)), -1.0)  # whole decades, at least one
-        implot.setup_axis(implot.ImAxis_.y1, None, int(implot.AxisFlags_.no_highlight))
-        implot.setup_axis_scale(implot.ImAxis_.y1, implot.Scale_.log10)
-        implot.setup_axis_limits(implot.ImAxis_.y1, decade, 1.0, implot.Cond_.always)
-        if len(x):
-            line = implot.Spec(line_color=imgui.ImVec4(*theme.AMBER), line_weight=2.0)
-            implot.plot_line("residual / emitted", x, np.maximum(residual, SMALLEST), line)
-        implot.end_plot()
+def _shares(
+    size: imgui.ImVec2, session: Session, label: str, x: np.ndarray, residual: np.ndarray, *, named: bool
+) -> None:
+    """The residual, and beside it the error where there is a reference, in logarithms [fraction]."""
+    if not _begin("residual", size, label if named else None):
+        return
+    curves: dict[str, Curve] = {"residual / emitted": (x, residual, theme.AMBER)}
+    if session.comparison is not None:
+        curves = {"residual": (x, residual, theme.AMBER)}  # all three names fit above the plot
+        rows = session.comparison.errors
+        chosen = _thinned(np.flatnonzero(np.isfinite(rows.column("rms"))))
+        for name, column, colour in (("RMS error", "rms", theme.RMS), ("median error", "median", theme.MEDIAN)):
+            curves[name] = rows.column(label)[chosen], rows.column(column)[chosen], colour
+    lowest = min(float(values.min(initial=1.0)) for _, values, _ in curves.values())
+    highest = max(float(values.max(initial=1.0)) for _, values, _ in curves.values())
+    decade = 10.0 ** min(np.floor(np.log10(max(lowest, SMALLEST))), -1.0)  # whole decades, at least one
+    implot.setup_axis(implot.ImAxis_.y1, None, int(implot.AxisFlags_.no_highlight))
+    implot.setup_axis_scale(implot.ImAxis_.y1, implot.Scale_.log10)
+    implot.setup_axis_limits(implot.ImAxis_.y1, decade, highest, implot.Cond_.always)
+    for name, (over, values, colour) in curves.items():
+        if len(over):
+            alone = implot.Marker_.circle if len(over) == 1 else implot.Marker_.none
+            line = implot.Spec(line_color=imgui.ImVec4(*colour), line_weight=2.0, marker=alone)
+            implot.plot_line(name, over, np.maximum(values, SMALLEST), line)
+    implot.end_plot()
 
 
 def _energy(size: imgui.ImVec2, x: np.ndarray, curves: dict[str, np.ndarray], label: str | None) -> None:

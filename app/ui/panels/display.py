@@ -6,21 +6,29 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.render.false_colour import UNITS
+from app.render.false_colour import UNITS, measured
 from app.ui import widgets
+from app.ui.panels import compare
 from app.ui.state import State
 
 if TYPE_CHECKING:
     from app.session import Session
 
+SCALED, DEVELOPED = ("false_colour_log", "false_colour_max"), ("tone_map", "exposure")
+COMPARED = ("show", "split")  # the Compare panel has them
+
 
 def draw(session: Session, state: State) -> None:
     """The whole panel: DisplayOptions, one widget each; the false-colour scale only while it is used."""
-    plain = session.display.false_colour == "off"
-    skip = ("false_colour_log", "false_colour_max") if plain else ("tone_map", "exposure")
-    unit = {} if plain else {"false_colour_max": UNITS[session.display.false_colour]}
-    session.display = widgets.edit_options(session.display, skip=skip, units=unit)
-    if plain:
+    kind = measured(session.shown)
+    skip = {"off": SCALED, "error": (*SCALED, *DEVELOPED)}.get(kind, DEVELOPED)
+    unit = {"false_colour_max": UNITS[kind]} if kind in UNITS else {}
+    edited = widgets.edit_options(session.display, skip=(*skip, *COMPARED), units=unit)
+    if edited.layer == "error" and session.display.layer != "error":
+        state.act(lambda: compare.show(session, state, "error"))  # which says so where there is no reference
+    else:
+        session.display = edited
+    if kind == "off":
         widgets.labelled("Set exposure")
         if imgui.button("Auto", imgui.ImVec2(-1, 0)):
             state.act(session.expose)

@@ -26,7 +26,7 @@ def draw(session: Session, state: State) -> None:
         if widgets.fold("Surface"):
             _surface(session, state.picked)
         if widgets.fold("Light [W/m²]"):
-            _light(state.picked)
+            _light(session, state.picked)
     if widgets.fold("What the last shooter saw"):
         _shooter(session, state)
     if widgets.fold("Atlas"):
@@ -80,11 +80,13 @@ def _surface(session: Session, picked: Picked) -> None:
     )
 
 
-def _light(picked: Picked) -> None:
+def _light(session: Session, picked: Picked) -> None:
+    right = session.reference_at(picked.texel) if picked.area > 0 else None
     rows = (
         ("B", picked.B, "radiosity: all light that leaves"),
         ("E", picked.E, "exitance of its own"),
         ("H", picked.H, "irradiance: light received"),
+        *([] if right is None else [("R", right, "irradiance of the reference")]),
         ("r", picked.r, "residual: not yet shot"),
         ("ρ", picked.albedo, "albedo"),
     )

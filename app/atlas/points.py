@@ -1,0 +1,67 @@
+"""Random points on the surfaces of a scene: where irradiance is compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.sides import lit_sides
+from app.scene.model import F64, Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """On surfaces: triangle (n,) and whether its back; weights (n, 3) of its corners."""
+
+    triangle: NDArray[np.int32]
+    back: NDArray[np.bool_]
+    weights: F64
+
+    def __len__(self) -> int:
+        return len(self.triangle)
+
+    def only(self, which: NDArray[np.bool_]) -> Points:
+        return Points(self.triangle[which], self.back[which], self.weights[which])
+
+    def positions_normals(self, scene: Scene) -> tuple[F64, F64]:
+        """(n, 3) [m] and (n, 3)."""
+        normal = scene.normals_areas[0][self.triangle] * np.where(self.back, -1.0, 1.0)[:, None]
+        return np.einsum("nk,nkc->nc", self.weights, scene.corners[self.triangle]), normal
+
+
+class SideIndex:
+    """Finds points among sides: triangle (f,) and whether its back."""
+
+    def __init__(self, triangle: NDArray[np.int32], back: NDArray[np.bool_]) -> None:
+        keys = 2 * triangle.astype(np.int64) + back
+        self._order = np.argsort(keys)
+        self._keys = keys[self._order]
+
+    def of(self, points: Points) -> NDArray[np.int64]:
+        """(n,) which of the sides each point lies on."""
+        wanted = 2 * points.triangle.astype(np.int64) + points.back
+        place = np.minimum(np.searchsorted(self._keys, wanted), len(self._keys) - 1)
+        assert (self._keys[place] == wanted).all(), "a point on a side without texels"
+        return np.asarray(self._order[place])
+
+
+def random_points(scene: Scene, count: int, seed: int) -> Points:
+    """Even in area on all sides that light can reach."""
+    random = np.random.default_rng(seed)
+    sides = lit_sides(scene)
+    area = scene.normals_areas[1][sides.triangle]
+    order = np.lexsort((sides.back, sides.triangle))
+    side = random.choice(order, count, p=area[order] / area.sum())
+    return Points(sides.triangle[side], sides.back[side], random.dirichlet((1, 1, 1), count))
+
+
+def bilinear(image: NDArray[Any], place: F64) -> F64:
+    """An image (h, w, c) at places (n, 2) [its texels], whose middles lie at halves: (n, c), its edge texels beyond its edges."""
+    low = np.floor(place - 0.5).astype(np.int64)
+    (x, y), (s, t) = low.T, (place - 0.5 - low).T[..., None]
+    columns, rows = (np.clip([i, i + 1], 0, size - 1) for i, size in ((x, image.shape[1]), (y, image.shape[0])))
+    below, above = ((1 - s) * image[row, columns[0]] + s * image[row, columns[1]] for row in rows)
+    return np.asarray((1 - t) * below + t * above)

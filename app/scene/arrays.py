@@ -1,0 +1,25 @@
+"""A scene as named arrays: what a digest of it is made from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.scene.model import Scene
+
+
+def arrays_of(scene: Scene) -> dict[str, NDArray[Any]]:
+    """All of a scene that light depends on, by name; cameras, names and order of its objects are not."""
+    arrays: dict[str, NDArray[Any]] = {"corners": scene.corners, "material_ids": scene.material_ids}
+    for name, uv in (("uv0", scene.uv0), ("uv1", scene.uv1)):
+        if uv is not None:
+            arrays[name] = uv
+    for k, material in enumerate(scene.materials):
+        arrays[f"material {k}"] = np.array([*material.albedo, *material.emission, material.double_sided])
+        for kind, texture in (("albedo", material.albedo_texture), ("emission", material.emission_texture)):
+            if texture is not None:
+                arrays[f"{kind} {k} {texture.wrap} {texture.bilinear} {texture.texcoord}"] = texture.pixels
+                arrays[f"{kind} {k} transform"] = texture.uv_transform
+    return arrays

@@ -1,0 +1,133 @@
+"""Compare: a reference, how far the solution is from it, and how both are shown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+
+from app.ui import theme, widgets
+from app.ui.state import State
+
+if TYPE_CHECKING:
+    from app.compare.comparison import Comparison
+    from app.session import Session
+
+ICONS = theme.ICONS
+VIEWS = ("solution", "reference", "split", "error")
+MEANINGS = {
+    "solution": "The light that is being solved: C shows the one or the other",
+    "reference": "The light of the reference: C shows the one or the other",
+    "split": "The solution left of the line, the reference right of it; drag the line: V",
+    "error": "How far the irradiance of each texel is from the reference, over the reference: X",
+}
+FINER = (
+    "The scene as it is now is solved once more, with more texels and further, in a process of its own. That shows what texels, "
+    "patches and unshot light cost; an error of the method itself is in both."
+)
+
+
+def draw(session: Session, state: State) -> None:
+    """The whole panel."""
+    comparison = session.comparison
+    if comparison is None:
+        widgets.wrapped("A reference is a bake of this scene, or a finer solve of it.", theme.DIM)
+    else:
+        _views(session, state)
+        if widgets.fold("Error"):
+            _error(session, comparison)
+    if widgets.fold("Reference"):
+        _reference(session, state)
+    if widgets.fold("Solve one"):
+        _solve(session, state)
+
+
+def shown(session: Session) -> str:
+    """Which of VIEWS it is."""
+    display = session.shown
+    return "error" if display.layer == "error" else display.show
+
+
+def show(session: Session, state: State, view: str) -> None:
+    """One of VIEWS; without a reference a line that says so."""
+    if session.comparison is None:
+        state.notify("no reference yet: the Compare panel opens or solves one", error=True)
+        return
+    display = session.display
+    if view == "error":
+        state.layer = display.layer
+        session.display = display.replace(layer="error")
+    else:
+        layer = state.layer if display.layer == "error" else display.layer
+        session.display = display.replace(layer=layer, show=view)
+
+
+def _views(session: Session, state: State) -> None:
+    """One button for each, side by side."""
+    now, gap = shown(session), imgui.get_style().item_spacing.x
+    texts = [imgui.calc_text_size(view.capitalize()).x for view in VIEWS]
+    rest = (imgui.get_content_region_avail().x - (len(VIEWS) - 1) * gap - sum(texts)) / len(VIEWS)
+    for view, text in zip(VIEWS, texts, strict=True):
+        if view != VIEWS[0]:
+            imgui.same_line()
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*(theme.AMBER if view == now else theme.TEXT)))
+        if imgui.button(view.capitalize(), imgui.ImVec2(text + rest, 0)):
+            show(session, state, view)
+        imgui.pop_style_color()
+        widgets.tooltip(MEANINGS[view])
+
+
+def _error(session: Session, comparison: Comparison) -> None:
+    error = comparison.error
+    if error is None:
+        widgets.dim("measuring")
+        return
+    widgets.facts(
+        "error",
+        [
+            ("RMS", widgets.percent(error.rms)),
+            ("Median", widgets.percent(error.median)),
+            ("90 % below", widgets.percent(error.q90)),
+            ("Bias", f"{'+' if error.bias > 0 else ''}{widgets.percent(error.bias)}"),
+        ],
+    )
+    widgets.tooltip(
+        f"Of irradiance, at {comparison.lit:,} random points that are lit in the reference. RMS over the mean; median and 90 % "
+        "of the errors over the reference at each point; bias of the mean"
+    )
+    for note in comparison.notes(session.lightmap):
+        widgets.wrapped(note, theme.AMBER)
+
+
+def _reference(session: Session, state: State) -> None:
+    """What it is, where there is one, and where it comes from."""
+    comparison = session.comparison
+    if comparison is not None:
+        light = comparison.light
+        texels = "unknown" if light.texels is None else f"{light.texels:,}"
+        rest = "unknown" if light.unshot is None else widgets.percent(light.unshot)
+        widgets.facts("reference", [("From", light.name), ("Texels", texels), ("Unshot", rest)])
+    width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
+    if imgui.button(f"{ICONS.ICON_FA_FOLDER_OPEN} Open a bake ...", imgui.ImVec2(width, 0)):
+        state.ask_for_reference = True
+    widgets.tooltip("What 'glowtree bake' wrote of this scene; the irradiance.exr can be dropped on the window, too")
+    imgui.same_line()
+    imgui.begin_disabled(comparison is None)
+    if imgui.button("Forget", imgui.ImVec2(width, 0)):
+        state.act(session.drop_reference)
+    imgui.end_disabled()
+
+
+def _solve(session: Session, state: State) -> None:
+    """The knobs of a solve in the background, or how far it is."""
+    fetching = session.fetching
+    if fetching is None:
+        state.reference = widgets.edit_options(state.reference, starts={"texels": session.reference_texels})
+        if imgui.button("Solve in the background", imgui.ImVec2(-1, 0)):
+            state.act(lambda: session.solve_reference(state.reference))
+        widgets.tooltip(FINER)
+        return
+    imgui.progress_bar(fetching.fraction, imgui.ImVec2(-1, 0), "")
+    widgets.wrapped(fetching.stage, theme.DIM)
+    if imgui.button("Stop", imgui.ImVec2(-1, 0)):
+        state.act(session.stop_fetching)

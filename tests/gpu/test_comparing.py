@@ -1,0 +1,363 @@
+"""A solution beside a reference: numbers at random points, pictures of both, and references that come and go."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+from boxes import PLAIN, SIZE, STEP, box, cornell, even, picture, put
+from gl_objects import forgotten, held
+
+from app.atlas.collapse import collapse
+from app.atlas.lightmap import Lightmap
+from app.atlas.options import AtlasOptions
+from app.atlas.points import random_points
+from app.bake import write_bake
+from app.bake.gutter import fill_gutter
+from app.bench.points import irradiance_of
+from app.compare.comparison import POINTS, POINTS_SEED, error_of
+from app.compare.light import ReferenceLight
+from app.compare.options import ReferenceOptions
+from app.compare.probe import Probe
+from app.compare.texels import ReferenceTexels
+from app.errors import UserError
+from app.gpu import Gpu
+from app.headless import picture as shot
+from app.metrics import lit_points
+from app.render.false_colour import ERRORS, colour_map
+from app.render.resolve import Reference
+from app.scene.model import F32, F64
+from app.session import Session, Stop
+from app.solvers import ShootingOptions
+
+__all__ = ["box", "cornell", "forgotten"]
+
+SHOOTING = ShootingOptions(resolution=64, residual=0.05)
+
+
+def light_of(lightmap: Lightmap, tiles: F32) -> ReferenceLight:
+    """Irradiance (tiles, t, t, 3) of a uniform lightmap as a reference."""
+    charts = lightmap.charts
+    image = fill_gutter(*collapse(lightmap.nodes, tiles))
+    uv = charts.face_uv * (image.shape[0] // charts.size[1])
+    return ReferenceLight("made", image, charts.face_triangle, charts.face_back, uv, lightmap.scene.materials)
+
+
+def smooth(lightmap: Lightmap) -> F64:
+    """Light that is linear in space [W/m²], on every texel that covers a surface."""
+    surfaces = lightmap.nodes.surfaces
+    local = lightmap.frame.local_from_world(surfaces.position)
+    return (surfaces.area > 0)[..., None] * (2.0 + local @ np.array([[0.5, 0, 0.2], [0.1, 0.4, 0], [0, 0.2, 0.3]]))
+
+
+# -- numbers -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("storage", ["rgba32f", "rgba16f", "fixed8"])
+def test_the_probe_reads_what_is_drawn(gpu: Gpu, box: Lightmap, storage: str) -> None:
+    """Bilinear as in a bake, gutters included: noise shows any other texel."""
+    box.set_storage(storage)
+    box.clear()
+    if storage == "rgba32f":
+        put(box, "t_irradiance", even(box, (1, 1, 1)) * np.random.default_rng(3).uniform(1, 2, (box.tiles, 16, 16, 1)))
+    else:
+        box.light_target.clear(*[2.0 / box.unit] * 3, 0.0)
+    points = random_points(box.scene, 500, 1)
+    probe = Probe(gpu, box, points)
+    found, expected = probe.irradiance(probe.look()), irradiance_of(box, points)
+    # a place in the atlas is a 32-bit float there: 1e-5 of a texel, of which the noise is 1 at most
+    np.testing.assert_allclose(found, expected, atol=5e-5)
+    probe.release()
+
+
+def test_the_probe_reads_quadtrees(gpu: Gpu) -> None:
+    """Light of leaves of several levels is what their texels hold, within what it changes by over the largest."""
+    session = Session(gpu, shooting=SHOOTING, atlas=AtlasOptions(adaptive=True, texels=900))
+    session.open_now("cornell-box")
+    session.solve(Stop(shots=60))
+    lightmap = session.lightmap
+    assert np.ptp(lightmap.nodes.leaves.level[lightmap.nodes.used]) > 0
+    tiles = smooth(lightmap)
+    put(lightmap, "t_irradiance", tiles)
+    points = random_points(session.scene, 500, 2)
+    probe = Probe(gpu, lightmap, points)
+    local = lightmap.frame.local_from_world(points.positions_normals(session.scene)[0])
+    expected = 2.0 + local @ np.array([[0.5, 0, 0.2], [0.1, 0.4, 0], [0, 0.2, 0.3]])
+    size = 1.0 / (lightmap.charts.density * lightmap.frame.scale)  # of a texel of level 0, solver frame
+    # half a texel's diagonal where only one is near; light changes by 0.6 at most per unit in any channel
+    assert np.abs(probe.irradiance(probe.look()) - expected).max() <= 0.6 * size
+    probe.release()
+    session.release()
+
+
+@pytest.fixture
+def session(gpu: Gpu) -> Iterator[Session]:
+    session = Session(gpu, shooting=SHOOTING, atlas=AtlasOptions(texels=900))
+    session.open_now("furnace")
+    yield session
+    session.release()
+
+
+def baked(session: Session, folder: Path, factor: float = 1.0) -> Path:
+    """The light of a session, times a factor."""
+    irradiance, covered = collapse(session.lightmap.nodes, session.lightmap.irradiance())
+    report = {"texels": session.lightmap.texel_count, "residual": session.stats.residual}
+    write_bake(folder, session.scene, session.charts, np.float32(factor) * irradiance, covered, report)
+    return folder
+
+
+def frames(session: Session, until: Callable[[], bool]) -> None:
+    """Go on until then, as the window does."""
+    end = time.monotonic() + 60
+    while not until():
+        assert time.monotonic() < end
+        session.poll()
+        session.advance(budget_ms=20, shots=4)
+
+
+def test_the_error_against_a_bake_is_that_of_its_light(session: Session, tmp_path: Path) -> None:
+    session.solve(Stop())
+    session.open_reference_now(baked(session, tmp_path, 2.0))
+    session.measure()
+    assert session.comparison is not None and session.comparison.error is not None
+    # in a furnace light is all but even: interpolated at gutters or not, it differs by less than 1 % of itself
+    assert session.comparison.error == pytest.approx((0.5, -0.5, 0.5, 0.5), abs=0.01)
+    points = random_points(session.scene, POINTS, POINTS_SEED)
+    reference = session.comparison.light.at(points)
+    lit = lit_points(reference)
+    expected = error_of(irradiance_of(session.lightmap, points)[lit], reference[lit])
+    assert session.comparison.error == pytest.approx(expected, abs=1e-3)
+
+
+def test_the_error_falls_while_light_is_shot(session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.compare.comparison.SECONDS", 0.0)
+    session.solve(Stop())
+    session.open_reference_now(baked(session, tmp_path))
+    session.restart()
+    comparison = session.comparison
+    assert comparison is not None and not session.at_rest
+    frames(session, lambda: session.at_rest)
+    rms, shots = (comparison.errors.column(name) for name in ("rms", "shots"))
+    assert len(rms) > 3 and (np.diff(shots) > 0).all() and shots[-1] == session.solver.shots
+    assert rms[0] > 0.5 and rms[-1] < 0.02 and (np.diff(rms) < 1e-3).all()
+    session.restart()
+    assert len(comparison.errors.column("rms")) == 0
+
+
+def test_a_texel_has_its_reference(session: Session, tmp_path: Path) -> None:
+    session.solve(Stop(shots=20))
+    assert session.reference_at((0, 0)) is None
+    session.open_reference_now(baked(session, tmp_path, 3.0))
+    lightmap = session.lightmap
+    tile, row, column = (int(n[7]) for n in np.nonzero(lightmap.nodes.surfaces.area > 0))
+    corner = lightmap.nodes.corner(tile)
+    texel = corner[0] + column, corner[1] + row
+    assert session.reference_at(texel) == pytest.approx(3 * lightmap.light_at(texel)[0], rel=1e-5)
+    comparison, nodes = session.comparison, lightmap.nodes
+    assert comparison is not None
+    image = np.frombuffer(comparison.texels.texture.read(), np.float32).reshape(*nodes.size[::-1], 4)
+    all_of_them = comparison.light.on_tiles(nodes, np.arange(nodes.tiles))
+    np.testing.assert_array_equal(nodes.tiles_from_image(image)[..., :3], all_of_them, err_msg="before any frame asks")
+
+
+def test_an_edit_is_measured_and_said(session: Session, tmp_path: Path) -> None:
+    session.solve(Stop())
+    session.open_reference_now(baked(session, tmp_path))
+    frames(session, lambda: session.at_rest)
+    comparison, material = session.comparison, session.scene.materials[0]
+    assert comparison is not None and comparison.error is not None and comparison.error.rms < 0.01
+    assert comparison.notes(session.lightmap) == []
+    session.set_material(0, dataclasses.replace(material, emission=(2 * material.emission[0],) * 3))
+    assert not session.at_rest
+    frames(session, lambda: session.at_rest)
+    assert comparison.error.rms == pytest.approx(1.0, abs=0.1)  # twice the light
+    assert comparison.notes(session.lightmap) == [f"the reference was solved with other materials: {material.name}"]
+
+
+# -- pictures ----------------------------------------------------------------------------------------------------------
+
+
+def reference_of(gpu: Gpu, box: Lightmap, tiles: F64) -> tuple[ReferenceTexels, Reference]:
+    texels = ReferenceTexels(gpu, box, light_of(box, tiles.astype(np.float32)))
+    texels.follow(whole=True)
+    return texels, Reference(texels.texture, 1e-3)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.03, 0.5, 3.0])
+def test_the_error_has_the_colour_of_its_value(gpu: Gpu, box: Lightmap, share: float) -> None:
+    H = np.array([2.0, 1.0, 0.5])
+    texels, reference = reference_of(gpu, box, even(box, tuple(H)))
+    put(box, "t_irradiance", even(box, tuple(H * (1 + share))))
+    shown = picture(gpu, box, PLAIN.replace(layer="error", exposure=7, false_colour="luminance"), reference=reference)
+    place = np.log(np.clip(100 * share, ERRORS.low, ERRORS.high) / ERRORS.low) / np.log(ERRORS.high / ERRORS.low)
+    # the legend is sampled in steps of 1/1000 here, less than half a step of 8 bits
+    expected = colour_map(1001)[round(place * 1000)]
+    assert shown[SIZE[1] // 3, SIZE[0] // 2] / 255 == pytest.approx(expected, abs=STEP + 0.5 / 255)
+    texels.release()
+
+
+def test_where_the_reference_is_dark_errors_are_over_what_counts_as_dark(gpu: Gpu, box: Lightmap) -> None:
+    texels, reference = reference_of(gpu, box, even(box, (0.0, 0.0, 0.0)))
+    put(box, "t_irradiance", even(box, (0.2, 0.0, 0.0)))
+    shown = picture(gpu, box, PLAIN.replace(layer="error"), reference=reference._replace(dark=2.0))  # 10 %
+    expected = colour_map(1001)[round(1000 * np.log(10.0 / ERRORS.low) / np.log(ERRORS.high / ERRORS.low))]
+    assert shown[SIZE[1] // 3, SIZE[0] // 2] / 255 == pytest.approx(expected, abs=STEP + 0.5 / 255)
+    texels.release()
+
+
+def test_a_split_picture_is_half_of_each(gpu: Gpu, box: Lightmap) -> None:
+    texels, reference = reference_of(gpu, box, even(box, (0.5, 1.0, 2.0)))
+    put(box, "t_irradiance", smooth(box))
+    alone = picture(gpu, box)
+    solution, other, split = (
+        picture(gpu, box, PLAIN.replace(show=show, split=0.25), reference=reference)
+        for show in ("solution", "reference", "split")
+    )
+    middle = SIZE[0] // 4
+    assert (solution == alone).all() and (other != alone).any()
+    assert (split[:, :middle] == alone[:, :middle]).all()
+    assert (split[:, middle:] == other[:, middle:]).all()
+    put(box, "t_irradiance", even(box, (0.5, 1.0, 2.0)))
+    assert np.abs(picture(gpu, box).astype(int) - other).max() <= 1  # the reference looks as its light does
+    texels.release()
+
+
+def test_layers_without_received_light_have_no_other_side(gpu: Gpu, box: Lightmap) -> None:
+    texels, reference = reference_of(gpu, box, even(box, (1.0, 1.0, 1.0)))
+    for layer in ("albedo", "residual", "charts"):
+        display = PLAIN.replace(layer=layer)
+        assert (
+            picture(gpu, box, display.replace(show="reference"), reference=reference) == picture(gpu, box, display)
+        ).all()
+    texels.release()
+
+
+def test_the_reference_follows_the_leaves(gpu: Gpu, tmp_path: Path) -> None:
+    session = Session(gpu, shooting=SHOOTING, atlas=AtlasOptions(adaptive=True, texels=900))
+    session.open_now("cornell-box")
+    session.solve(Stop(shots=20))
+    lightmap = session.lightmap
+    light = light_of(lightmap, lightmap.irradiance())
+    texels = ReferenceTexels(gpu, lightmap, light)
+    for shots in (20, 60, 120):
+        session.solve(Stop(shots=shots))
+        version = lightmap.version
+        texels.follow(whole=shots != 60)
+        nodes = lightmap.nodes
+        image = np.frombuffer(texels.texture.read(), np.float32).reshape(*nodes.size[::-1], 4)
+        held_ = nodes.tiles_from_image(image)[nodes.used][..., :3]
+        np.testing.assert_array_equal(held_, light.on_tiles(nodes, np.flatnonzero(nodes.used)), err_msg=str(shots))
+    assert version > 0
+    texels.release()
+    session.release()
+
+
+def test_without_a_reference_the_solution_is_shown(session: Session) -> None:
+    session.solve(Stop(shots=8))
+    plain = shot(session, (64, 48))
+    for change in ({"layer": "error"}, {"show": "reference"}, {"show": "split"}):
+        session.display = PLAIN.replace(**change)
+        session.display = session.display.replace(tone_map="agx")
+        assert (shot(session, (64, 48)) == plain).all()
+
+
+# -- references come and go --------------------------------------------------------------------------------------------
+
+
+def test_a_reference_stays_with_its_scene(session: Session, tmp_path: Path) -> None:
+    session.solve(Stop())
+    session.open_reference(baked(session, tmp_path))
+    frames(session, lambda: session.fetching is None)
+    first = session.comparison
+    assert first is not None and session.message is None
+    session.set_atlas(AtlasOptions(texels=2000))
+    frames(session, lambda: session.loading is None)
+    assert session.comparison is not None and session.comparison is not first
+    frames(session, lambda: session.at_rest)
+    error = session.comparison.error
+    assert error is not None and error.rms < 0.03  # a furnace, to a residual of 0.05 of both
+    session.display = session.display.replace(layer="error", show="split")
+    session.open_now("cornell-box")
+    assert session.comparison is None
+    assert (session.display.layer, session.display.show) == ("combined", "solution")
+
+
+def test_a_reference_of_another_scene_is_said(session: Session, tmp_path: Path) -> None:
+    session.solve(Stop(shots=4))
+    folder = baked(session, tmp_path)
+    session.open_now("cornell-box")
+    session.open_reference(folder)
+    frames(session, lambda: session.fetching is None)
+    assert session.comparison is None and "is of another scene" in str(session.message)
+    with pytest.raises(UserError, match="is of another scene"):
+        session.open_reference_now(folder)
+
+
+def test_a_black_reference_is_none(session: Session, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="holds no light"):
+        session.open_reference_now(baked(session, tmp_path))
+
+
+def test_releasing_leaves_nothing_behind(
+    gpu: Gpu, session: Session, tmp_path: Path, forgotten: Callable[[], list[object]]
+) -> None:
+    session.solve(Stop(shots=20))
+    folder = baked(session, tmp_path)
+    counts = []
+    for _ in range(2):  # programs that were compiled once stay
+        session.open_reference_now(folder)
+        session.display = session.display.replace(show="split")
+        shot(session, (64, 48))
+        session.poll()  # a measurement stays on its way
+        session.drop_reference()
+        shot(session, (64, 48))
+        counts.append(held(gpu))
+    assert counts[0] == counts[1] and not forgotten()
+
+
+# -- solved in the background ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(tmp_path / "cache"))
+    return tmp_path / "cache" / "reference"
+
+
+def workers() -> list[psutil.Process]:
+    return [p for p in psutil.Process().children() if "app.reference_worker" in p.cmdline()]
+
+
+def test_a_finer_solve_is_a_reference(session: Session, own_cache: Path) -> None:
+    """A furnace: its answer is known. What the worker wrote is there at once the next time."""
+    session.running = False
+    options = ReferenceOptions(texels=1500, residual=1e-2)
+    session.solve_reference(options)
+    assert session.fetching is not None and not session.at_rest
+    frames(session, lambda: session.fetching is None)
+    assert session.message is None and not workers()
+    comparison = session.comparison
+    assert comparison is not None and comparison.light.texels is not None and comparison.light.unshot is not None
+    assert comparison.light.texels > session.lightmap.texel_count and comparison.light.unshot <= 1e-2
+    material = session.scene.materials[0]
+    H = np.pi * material.emission[0] / (1 - material.albedo[0])
+    # what is unshot, and 2 % for form factors and visibility of coarse texels
+    assert comparison.light.at(random_points(session.scene, 100, 1)) == pytest.approx(H, rel=1e-2 + 0.02)
+    (kept,) = own_cache.glob("*.npz")
+    written = kept.stat().st_mtime_ns
+    session.solve_reference(options)
+    frames(session, lambda: session.fetching is None)
+    assert session.comparison is not comparison and kept.stat().st_mtime_ns == written
+    session.solve_reference(options.replace(residual=1e-9))
+    frames(session, lambda: bool(workers()))
+    session.stop_fetching()
+    gone = time.monotonic() + 10
+    while workers():
+        assert time.monotonic() < gone, "still there"
+        time.sleep(0.05)
+    assert session.comparison is not None and session.fetching is None
