@@ -341,7 +341,8 @@ class UniformShooting(ShotPasses):
         residual = report[0, 0] * self._watt / emitted if emitted > 0 else 0.0
         if choice is self._choice and residual <= max(COARSE_LEAVE, self.options.residual):
             finest = choice is self.stages.choices[-1]
-            self._even = finest and report[0, 2] * self._watt <= FINE_LEAVE * self.options.residual * emitted
+            left = float(report[0, 2]) * self._watt
+            self._even = finest and left <= FINE_LEAVE * self.options.residual * float(emitted)
             if not finest:
                 self._next_phase()
         self.report = StepReport(int(report[1, 3]), float(residual), report[1, :3] * self._watt)
