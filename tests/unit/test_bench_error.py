@@ -265,8 +265,8 @@ def test_a_furnace_from_the_command_line(
         last = saved["samples"][-1]
         assert [float(r["rms"]) for r in rows if r["method"] == name] == [s["rms"] for s in saved["samples"]]
         assert last["residual"] <= 0.02 and last["shots"] > 0 and last["texels"] > 0
-        # what is unshot is missing, all of it at ρ = 1/2 twice, and the books close within a few per mille
-        assert -0.06 < last["bias"] < 0 and abs(last["imbalance"]) < 0.01
+        # what is unshot is missing or was shot ahead, all of it at ρ = 1/2 twice; the books close within a few per mille
+        assert abs(last["bias"]) < 0.06 and abs(last["imbalance"]) < 0.01
         assert last["rms"] < 0.1 * saved["samples"][0]["rms"]
         # of all looks the last alone; a few per cent too dark is hardly seen
         assert [k for k, row in enumerate(saved["samples"]) if "flip" in row] == (
