@@ -1,7 +1,8 @@
 """What the passes of a shot must move at least, and the receiver pass without its arithmetic.
 
 A texel that gets light has H and r read and written once in a draw, and is read itself where it does not follow from its tile's
-corner and edges. Maps of visibility are written once and read once. Choosing reads area and r of every texel.
+corner and edges. Maps of visibility are written once and read once. Choosing reads area,
+material, H and r of every texel.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from app.solvers.shooting.options import VISIBILITIES
 from app.solvers.shooting.stages import BATCH, BLOCK_BYTES
 
 SHAPED = ("t_position_area", "t_normal_ids")  # of tiles of any shape
-CHOSEN = ("t_position_area", "t_residual")
+CHOSEN = ("t_position_area", "t_normal_ids", "t_irradiance", "t_residual")
 
 
 class Stream:

@@ -23,7 +23,7 @@ from app.render.resolve import BORDER, DisplayTexels
 from app.session import Session
 from app.solvers import SOLVERS, EnergyBook, ShootingOptions
 from app.solvers.shooting.adaptive import AdaptiveShooting
-from app.solvers.shooting.stages import ShotBuffers
+from app.solvers.shooting.stages import EMITTER, ShotBuffers
 
 __all__ = ["forest"]
 
@@ -75,11 +75,11 @@ def test_leaves_take_along_all_that_is_theirs(
         texture.write((noise * (255 if storage == "fixed8" else 1)).astype(kind).tobytes())
     own = gpu.texture(lightmap.size, 4, "f4", rng.uniform(-1, 1, (*lightmap.size, 4)).astype(np.float32).tobytes())
     buffers = ShotBuffers(gpu, lightmap)
-    buffers._tiles[:] = rng.integers(0, 3, buffers._tiles.shape)
+    buffers._tiles[:] = rng.integers(0, 3, buffers._tiles.shape) + EMITTER * rng.integers(0, 2, buffers._tiles.shape)
 
     def held() -> list[dict[Tile, bytes]]:
         assert buffers.finer.read() == buffers.finer_levels.tobytes()
-        finer = {tile: buffers._blocks(nodes.corner(slot)).tobytes() for tile, slot in tree.slots.items()}
+        finer = {tile: buffers._tiles[divmod(slot, nodes.columns)].tobytes() for tile, slot in tree.slots.items()}
         return [*(by_leaf(tree, lightmap.texture(n)) for n in leaf_textures(lightmap)), by_leaf(tree, own), finer]
 
     buffers.finer.write(buffers.finer_levels.tobytes())
@@ -250,7 +250,7 @@ def leaves_of(solution: Solution) -> list[dict[Tile, bytes] | set[Tile]]:
     solver, lightmap = tree_solver(solution), solution.lightmap
     textures = [lightmap.texture(name) for name in leaf_textures(lightmap)] + [t for t, _ in solver._carried]
     held = [by_leaf(solver.tree, texture) for texture in textures]
-    finer = {t: solver.buffers._blocks(lightmap.nodes.corner(s)).tobytes() for t, s in solver.tree.slots.items()}
+    finer = {t: solver.buffers._tiles[divmod(s, lightmap.columns)].tobytes() for t, s in solver.tree.slots.items()}
     return [*held, finer, {solver.tree.tile(slot) for slot in solver._fresh}]
 
 

@@ -13,6 +13,7 @@
 #include "shooting/belongs.glsl"
 
 const float WEAKEST = 0.1;       // a shot under a tenth of the batch's best waits for a later batch
+const float MOST_FAMILY = 8.0;    // times its own area, a patch may shoot for
 const float CANCELS = 1.0 / 256;  // under this share of Σ |R| A, Σ R A is what rounding leaves: no mean is taken from texels for it
 
 uniform sampler2D t_position_area;
@@ -146,17 +147,22 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
     return s;
 }
 
-// Whether all of a patch could shoot with a part of it; their flux
+// Whether a part of a patch can shoot for all of it: like for like, and no small rest at an edge for much more; their flux
 bool is_family(ivec2 corner_px, int size, Shooter part, out vec3 flux) {
     bool all = true;
+    float area = 0.0;
+    vec2 lit = UNLIT_YET;
     flux = vec3(0.0);
     for (int i = 0; i < size * size; ++i) {
         ivec2 px = corner_px + ivec2(i % size, i / size);
         Texel texel = texel_at(px);
         all = all && (texel.area <= 0.0 || belongs(texel, part.normal, part.chart));
-        if (texel.area > 0.0) flux += shoots(px, texel) * texel.area;
+        if (texel.area <= 0.0) continue;
+        area += texel.area;
+        lit = lit_with(lit, irradiance_at(px));
+        flux += shoots(px, texel) * texel.area;
     }
-    return all;
+    return all && part.area * MOST_FAMILY >= area && !partly_covered(lit);
 }
 
 // The patch itself, or the one in the middle of a family, which shoots for all and owes the others.

@@ -1,6 +1,6 @@
 // The light of some shots on every texel, blended into H and r:
 //
-//   ΔH_j = Σ_i r_i F_ji V_ji,   Δr_j = ρ_j ΔH_j      [Coombe03, eq. 1; F_ji from the texel to the shooter's polygon]
+//   ΔH_j = Σ_i R_i F_ji V_ji,   Δr_j = ρ_j ΔH_j      [Coombe03, eq. 1; F_ji from the texel to the shooter's polygon]
 #define FLAT 1
 #include "common/atlas.glsl"
 #include "common/albedo.glsl"

@@ -1,6 +1,5 @@
-// What the host hears of a batch, in one small late read-back: texel 0 (unshot power before the batch, that of
-// the strongest patch and of all with what is shot ahead, 0),
-// 1 the ledger so far, 2.. the rows of the first shooter.
+// What the host hears of a batch, in one small late read-back: texel 0 (unshot power before the batch, that of all patches with
+// what is shot ahead, 0, 0), 1 the ledger so far, 2.. the rows of the first shooter.
 uniform sampler2D t_runs;
 uniform sampler2D t_unshot;
 uniform sampler2D t_ledger;
@@ -13,10 +12,8 @@ void main() {
     if (entry == 0) {
         out_report = vec4(0.0);
         for (int i = 0; i < textureSize(t_runs, 0).x; ++i) {
-            vec4 run = texelFetch(t_runs, ivec2(i, 0), 0);
             out_report.x += texelFetch(t_unshot, ivec2(i, 0), 0).a;
-            out_report.y = max(out_report.y, run.x);
-            out_report.z += run.w;
+            out_report.y += texelFetch(t_runs, ivec2(i, 0), 0).a;
         }
     } else if (entry == 1) {
         out_report = vec4(0.0);

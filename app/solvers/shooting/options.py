@@ -27,14 +27,18 @@ class ShootingOptions(Options):
 
     level: int | None = option(
         None,
-        "mip level that shoots in the end: patches of 2^level texels squared, at most a leaf; unset: 2, in large scenes as many "
-        "patches as matter",
+        "mip level that shoots in the end: patches of 2^level texels squared, at most a leaf; unset: 2, or what makes 4096 "
+        "patches at most",
         minimum=0,
         maximum=MAX_LEVEL,
     )
     coarsen: bool = option(True, "shoot from larger patches first: as many as show all of the light soon")
     residual: float = option(
-        1e-3, "converged when this share of the emitted power is unshot", minimum=1e-9, maximum=1, logarithmic=True
+        1e-3,
+        "converged when this share of the emitted power is unshot, and ten times that at most lies unevenly in finest patches",
+        minimum=1e-9,
+        maximum=1,
+        logarithmic=True,
     )
     form_factor: str = option(
         "polygon", "closed form over the patch's polygon, or the papers' discs", choices=FORM_FACTORS

@@ -109,6 +109,8 @@ class Reshooting(UniformShooting):
 
     def _hear(self, choice: ChoiceStages, report: F64) -> None:
         super()._hear(choice, report)
+        if choice is not self._choice:  # of patches whose lamps have yet to shoot from finer ones
+            return
         power = float(powers_of(report[None, REPORT_HEAD:])[0]) * self._watt
         self._weak = self._weak or (power < STRONG * self._emitted.sum() and self.report.residual < MOSTLY_SHOT)
 
@@ -206,7 +208,7 @@ class Reshooting(UniformShooting):
         self._redone_at, self._redone = self._log.count, redo.end
         self._end_redo()
         self.poll(wait=True)  # or an older report would follow
-        self.report = replace(self.report, residual=self.unshot_share())
+        self.report, self._even = replace(self.report, residual=self.unshot_share()), False
         return 0
 
     def _take_back(self, redo: _Redo) -> None:

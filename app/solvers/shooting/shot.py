@@ -89,7 +89,7 @@ class AuditTargets:
 
 
 def powers_of(rows: F64) -> F64:
-    """Σ |r A| of shooters (n, SHOOTER_ROWS, 4), summed over RGB [stored units · solver area]."""
+    """Σ |R A| of shooters (n, SHOOTER_ROWS, 4), summed over RGB [stored units · solver area]."""
     return np.asarray(rows[:, 0, 3] * np.abs(rows[:, 5, :3]).sum(-1))
 
 
@@ -211,7 +211,7 @@ class ShotPasses:
         return rows[:shots, :SHOOTER_ROWS].astype(np.float64)
 
     def _add_patches(self, choice: ChoiceStages, band: int = 0, bands: int = 1) -> None:
-        """Residual power of every patch of this level, or of those in one of so many bands."""
+        """What each block of texels holds to be shot, or those in one of so many bands."""
         reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_irradiance", "t_residual", "t_leaves"
         choice.add_patches.draw(
             choice.patch_target,
@@ -222,7 +222,7 @@ class ShotPasses:
         )
 
     def _add_runs(self, choice: ChoiceStages) -> None:
-        """The strongest patch of each run of slots, and the power of all."""
+        """The strongest patch of each run of squares, and the power of all."""
         patches, unshot, lit = choice.patches
         choice.begin.draw(
             choice.candidate_target,

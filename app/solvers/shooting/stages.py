@@ -46,8 +46,8 @@ def fitting_resolution(lightmap: Lightmap, *, adaptive: bool) -> int:
     return int(np.clip(64 * round(2.0 / texel / 64), *RESOLUTIONS))
 
 
-def patch_levels(lightmap: Lightmap, options: ShootingOptions, *, adaptive: bool) -> range:
-    """Of the patches that shoot, from those that begin to the finest, as powers of 2 of texels; in quadtrees, of uniform ones."""
+def patch_levels(lightmap: Lightmap, options: ShootingOptions, *, adaptive: bool) -> list[int]:
+    """Of the patches that shoot, those that begin and the finest, as powers of 2 of texels; in quadtrees, of uniform ones."""
     top = MAX_LEVEL if adaptive else highest_level(lightmap.nodes.tile)
     texels = lightmap.nodes.surfaces.area.sum() * lightmap.charts.density**2 * (4**ROOT_LEVEL if adaptive else 1)
     last = min(LEVEL if options.level is None else options.level, top)
@@ -56,7 +56,7 @@ def patch_levels(lightmap: Lightmap, options: ShootingOptions, *, adaptive: bool
     first = last
     while options.coarsen and first < top and texels / 4 ** (first + 1) >= FIRST_PATCHES:
         first += 1
-    return range(first, last - 1, -1)
+    return [first, last] if first > last else [last]
 
 
 def _mark(marks: F32, finer: int | NDArray[np.int64]) -> None:
@@ -146,7 +146,11 @@ class ShotBuffers:
         if change.split:
             tiles[children] = held[np.arange(len(held))[:, None, None], *place]
         else:
-            np.maximum.at(tiles, tuple(at[:, None, None] for at in parents) + place, held)
+            place = tuple(at[:, None, None] for at in parents) + place
+            flags, finer = np.zeros_like(tiles), np.zeros_like(tiles)
+            np.maximum.at(flags, place, held // EMITTER)
+            np.maximum.at(finer, place, held % EMITTER)
+            tiles += flags * EMITTER + finer
         self.finer.write(self.finer_levels.tobytes())
 
     def finer_at(self, texel: tuple[int, int]) -> int:
@@ -160,10 +164,12 @@ class ShotBuffers:
         rows, columns = (side // edge for side in self.finer_levels.shape)
         return self.finer_levels.reshape(rows, edge, columns, edge).swapaxes(1, 2)
 
-    def _blocks(self, corner: tuple[int, int]) -> F32:
-        """Those of the tile that begins at this texel."""
-        (column, row), edge = (c >> BLOCK_LEVEL for c in corner), self._tile >> BLOCK_LEVEL
-        return self.finer_levels[row : row + edge, column : column + edge]
+    def finest_is(self, higher: int) -> None:
+        """For a finest level so much higher, or lower: what was divided stays as fine, since patches may be owed light there."""
+        marks = self.finer_levels
+        marks[:] = np.where(marks > 0, marks // EMITTER * EMITTER + np.maximum(marks % EMITTER + higher, 1), 0)
+        self.sound.clear()
+        self.finer.write(marks.tobytes())
 
     def all_alike(self) -> None:
         """Let nothing shoot from finer patches than other things."""

@@ -1,7 +1,8 @@
 """Progressive refinement radiosity over uniform texels [Coombe03, 3; Cohen88].
 
     while not converged:
-        i    = patch with the largest power to shoot, R_i A_i: residual and what will come back [Feda92], R_i = r_i + ρ_i a_i
+        i    = patch with the largest power to shoot, R_i A_i; R_i = r_i + ρ_i a: the residual and what will come
+               back of the ambient light [Feda92]
         see the scene from i (item buffer and depth on a hemicube)
         r_i -= R_i
         for every texel j:  ΔH_j = R_i F_ji V_ji;  H_j += ΔH_j;  r_j += ρ_j ΔH_j
@@ -78,6 +79,7 @@ class UniformShooting(ShotPasses):
         self._drop_reports()
         self.buffers.all_alike()
         self._phase, self._audits, self._even = 0, True, False
+        self._owes = len(self.stages.choices) > 1  # or may, what shot for its family
         self.shots, self.last_shot = 0, None
         self.buffers.ambient_target.clear()
         self._weigh_scene()
@@ -94,11 +96,12 @@ class UniformShooting(ShotPasses):
             self.reset()
 
     def _remake_stages(self, options: ShootingOptions) -> None:
-        fresh = self._make_stages(options)
+        fresh, finest = self._make_stages(options), self.level
         self.stages.release()
         self.stages, self.options = fresh, options
         self._phase, self._audits, self._even = min(self._phase, len(fresh.choices) - 1), True, False
-        self.buffers.all_alike()
+        self._owes |= len(fresh.choices) > 1
+        self.buffers.finest_is(self.level - finest)
         self._divide_emitters()
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
@@ -157,7 +160,7 @@ class UniformShooting(ShotPasses):
 
     @property
     def _most_power(self) -> float:
-        return self._alike if 0 < self._phase == len(self.stages.choices) - 1 else math.inf
+        return self._alike if self._owes and self._choice is self.stages.choices[-1] else math.inf
 
     @property
     def grown(self) -> bool:
@@ -341,7 +344,7 @@ class UniformShooting(ShotPasses):
         residual = report[0, 0] * self._watt / emitted if emitted > 0 else 0.0
         if choice is self._choice and residual <= max(COARSE_LEAVE, self.options.residual):
             finest = choice is self.stages.choices[-1]
-            left = float(report[0, 2]) * self._watt
+            left = float(report[0, 1]) * self._watt
             self._even = finest and left <= FINE_LEAVE * self.options.residual * float(emitted)
             if not finest:
                 self._next_phase()
@@ -350,8 +353,8 @@ class UniformShooting(ShotPasses):
             self.last_shot = self._shot_from_rows(report[REPORT_HEAD:])
 
     def _next_phase(self) -> None:
-        """Finer patches shoot from now on."""
-        self._phase += 1
+        """Finer patches shoot from now on, lamps' for themselves."""
+        self._phase, self._audits = self._phase + 1, True
 
     def _tile_sums(self) -> tuple[F64, F64, F64]:
         """Absorbed and unshot power [W] and Σ ρA, RGB and in the first Σ A, as books.frag.glsl adds them per tile."""
