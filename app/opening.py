@@ -88,10 +88,7 @@ class Opening:
             solver = SOLVERS["adaptive" if loaded.atlas.adaptive else DEFAULT_SOLVER](gpu, lightmap, options)
             undo.callback(solver.release)
             yield
-            for run in solver.passes(1).values():
-                run()
-                gpu.ctx.finish()
-                yield
+            yield from solver.warm_up(1)
             solver.reset()
             yield
             self._renderer.prepare(lightmap, interpolation)

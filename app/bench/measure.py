@@ -73,8 +73,8 @@ def opened(
 
 def warm_up(gpu: Gpu, solver: Solver[ShootingOptions]) -> None:
     """Draw once with each program, for drivers compile it then: each pass, and a step with what is not part of every one."""
-    for run in solver.passes(BATCH).values():
-        run()
+    for _ in solver.warm_up(BATCH):
+        pass
     solver.reset()
     solver.step(BATCH)
     solver.poll(wait=True)

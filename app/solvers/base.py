@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -116,7 +116,10 @@ class Solver(Protocol[OptionsT]):
         """Where all emitted energy is now. Reads every texel and waits for the GPU."""
 
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
-        """Each part of a step of so many shots by itself, to be timed and warmed up. They spoil the light: reset afterwards."""
+        """Each part of a step of so many shots by itself, to be timed. They spoil the light: reset afterwards."""
+
+    def warm_up(self, shots: int) -> Iterator[None]:
+        """Do once, in parts, all that a solve will do, so that no step waits for a driver that compiles. Spoils the light."""
 
     def patch_edge(self, texel: tuple[int, int]) -> int:
         """Texels along the edge of the largest patch that a texel (column, row) of the node set may shoot from now."""

@@ -9,6 +9,7 @@
 #include "shooting/patch_level.glsl"
 #include "shooting/candidate.glsl"
 #include "shooting/expected.glsl"
+#include "shooting/family.glsl"
 #include "shooting/shooter.glsl"
 #include "shooting/belongs.glsl"
 
@@ -165,16 +166,18 @@ bool is_family(ivec2 corner_px, int size, Shooter part, out vec3 flux) {
     return all && part.area * MOST_FAMILY >= area && !partly_covered(lit);
 }
 
-// The patch itself, or the one in the middle of a family, which shoots for all and owes the others.
+// The patch itself, or one of a family, which shoots for all and owes the others.
 Shooter shooter_for(ivec2 corner_px, int level) {
     int one = min(level, patch_levels(corner_px).shoots), size = 1 << level;
-    if (one == level) return shooter_from_patch(corner_px, size);
-    Texel lead;
-    ivec2 middle_px = leading_texel(corner_px, size, lead) >> one << one;
-    Shooter s = shooter_from_patch(middle_px, 1 << one);
+    Shooter s = shooter_from_patch(one < level ? speaker_of(corner_px, one) : corner_px, 1 << one);
+    if (one == level) return s;
     vec3 flux;
-    if (s.size_px > 0 && s.even && is_family(corner_px, size, s, flux)) s.exitance = flux / s.area;
-    return s;
+    if (s.size_px > 0 && s.even && is_family(corner_px, size, s, flux)) {
+        s.exitance = flux / s.area;
+        return s;
+    }
+    Texel lead;
+    return shooter_from_patch(leading_texel(corner_px, size, lead) >> one << one, 1 << one);
 }
 
 void main() {

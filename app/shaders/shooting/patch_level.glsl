@@ -9,8 +9,6 @@
 #include "common/leaves.glsl"
 #include "shooting/block.glsl"
 
-const int FAMILY = 1;  // levels between an emitter's patch and its family
-
 uniform sampler2D t_finer;  // 0, or 1 + how many levels the patches in each block are finer than FINEST
 
 struct Levels { int largest, finest, shoots; };  // shoots: of the patch that shoots for such a one
@@ -23,6 +21,6 @@ Levels patch_levels(ivec2 px) {
     int largest = max(min(LEVEL - leaf, HIGHEST), 0), finest = max(min(FINEST - leaf, HIGHEST), 0);
     if (finer == 0) return Levels(largest, finest, HIGHEST);
     int divided = max(min(FINEST - leaf, HIGHEST) + 1 - finer, 0);
-    int family = LEVEL > FINEST && mark >= EMITTER ? min(divided + FAMILY, max(largest, divided)) : divided;
+    int family = LEVEL > FINEST && mark >= EMITTER ? min(divided + 1, max(largest, divided)) : divided;
     return Levels(family, family, divided);
 }

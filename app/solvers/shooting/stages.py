@@ -195,10 +195,11 @@ class ChoiceStages:
         of_tile = {"TILE_SQUARES": tile >> SQUARE_LEVEL}
         reads = lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE")
         levels = {"LEVEL": level - root, "FINEST": finest - root, "EMITTER": EMITTER}
-        self.add_patches = Pass(gpu, "shooting/patches", defines=reads | of_block | levels | top)
-        self.begin = Pass(gpu, "shooting/begin", defines=of_block | of_tile | top | {"SQUARE_LEVEL": SQUARE_LEVEL})
+        square = {"SQUARE_LEVEL": SQUARE_LEVEL}
+        self.add_patches = Pass(gpu, "shooting/patches", defines=reads | of_block | levels | top | square)
+        self.begin = Pass(gpu, "shooting/begin", defines=of_block | of_tile | top | square)
         self.add_runs = Pass(gpu, "shooting/runs", defines=of_tile)
-        self.choose = Pass(gpu, "shooting/choose", defines=reads | of_block | levels | top)
+        self.choose = Pass(gpu, "shooting/choose", defines=reads | of_block | levels | top | square)
 
     def _fit(self, lightmap: Lightmap) -> None:
         width, height = lightmap.size

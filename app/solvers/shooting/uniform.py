@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -252,6 +252,17 @@ class UniformShooting(ShotPasses):
             "look out": lambda: self._for_groups(self._look_out, shots),
             "book": lambda: self._book(shots),
         }
+
+    def warm_up(self, shots: int) -> Iterator[None]:
+        """Every pass, and how finer patches are chosen."""
+        for run in self.passes(shots).values():
+            run()
+            self.gpu.ctx.finish()
+            yield
+        for self._phase in range(1, len(self.stages.choices)):
+            whole(self._pick(1))
+            self.gpu.ctx.finish()
+            yield
 
     def patch_edge(self, texel: tuple[int, int]) -> int:
         """Texels along the edge of the largest patch that a texel (column, row) of the node set may shoot from now: the level, or
