@@ -15,7 +15,6 @@ from app.compare.options import ReferenceOptions
 from app.compare.solving import solved_light
 from app.errors import UserError
 from app.gpu import Gpu
-from app.loading import CancelledError
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
 from app.render.resolve import Reference
@@ -110,7 +109,7 @@ class Comparing(Viewing):
             try:
                 if fetching.nodes.scene is self.unedited:
                     self._compare_with(fetching.result)
-            except (UserError, CancelledError) as error:
+            except UserError as error:
                 self.message = str(error)
         if self.comparison is not None:
             state = self.solver.shots, self.lightmap.version, self.lightmap.scene

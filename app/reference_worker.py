@@ -25,10 +25,11 @@ from app.solving import share_done
 
 LOADING = 0.1  # of the bar, which is then for shooting
 NICENESS = 5  # the window goes first
+INTERRUPTED = 130  # what shells call a program that Ctrl-C ended
 
 
-def solve(source: Path, target: Path) -> None:
-    """Raises UserError."""
+def solve(source: Path, target: Path) -> int:
+    """The exit code: an interrupted solve is no answer, and not written. Raises UserError."""
     given = pickle.loads(source.read_bytes())
     with gpu_context() as gpu:
         session = Session(gpu, shooting=given["shooting"], atlas=given["atlas"])
@@ -42,6 +43,8 @@ def solve(source: Path, target: Path) -> None:
             )
 
         session.solve(stop, tell)
+        if session.interrupted:
+            return INTERRUPTED
         lightmap, charts = session.lightmap, session.charts
         image = fill_gutter(*collapse(lightmap.nodes, lightmap.irradiance()))
         answer = {
@@ -54,6 +57,7 @@ def solve(source: Path, target: Path) -> None:
         }
         session.release()
     np.savez(target, **answer)
+    return 0
 
 
 def say(stage: str, share: float) -> None:
@@ -73,11 +77,10 @@ def main() -> int:
         os.nice(NICENESS)
     threading.Thread(target=end_with_parent, daemon=True).start()
     try:
-        solve(Path(sys.argv[1]), Path(sys.argv[2]))
+        return solve(Path(sys.argv[1]), Path(sys.argv[2]))
     except UserError as error:
         print(error, file=sys.stderr)
         return 2
-    return 0
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from app.session import Session
 
 TELL_SECONDS = 0.2  # between two calls of progress
+NEARLY = 0.99  # done, by what is unshot: the finest patches still shoot
 NO_LIMIT = 1 << 30  # shots: a step stops at its solver's own batch
 
 
@@ -49,7 +50,8 @@ def solve(session: Session, stop: Stop, progress: Callable[[Stats], None] | None
 def share_done(session: Session, stop: Stop) -> float:
     """Of a solve: of the shots or seconds asked for, or of the decades of residual down to the threshold, 0 to 1."""
     residual = max(session.solver.report.residual, 1e-12)
-    shares = [np.log(min(residual, 1.0)) / np.log(min(session.shooting.residual, 0.999999))]
+    decades = np.log(min(residual, 1.0)) / np.log(min(session.shooting.residual, 0.999999))
+    shares = [1.0 if session.converged else min(decades, NEARLY)]
     if stop.shots is not None:
         shares.append(session.solver.shots / stop.shots)
     if stop.seconds is not None:

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
+from app.atlas.points import barycentric
 from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents
 from app.scene.model import F32, F64, I32, Scene, Texture
 
-__all__ = ["faces_tangents", "look_up", "texel_colours"]
+__all__ = ["faces_tangents", "look_up", "texel_colours", "texture_coordinates"]
 
 SAMPLES = 2  # look-ups along each side of a texel
 BLOCK = 1 << 17  # texels in work at a time
@@ -39,17 +40,16 @@ def _colours(
     colours: F32 | None = None
     for material in np.unique(materials):
         texture = textures[int(material)]
-        coordinates = None if texture is None else (scene.uv1 if texture.texcoord else scene.uv0)
+        coordinates = None if texture is None else texture_coordinates(scene, texture)
         if texture is None or coordinates is None:
             continue
         if colours is None:
             colours = np.ones((len(face), 3), np.float32)
         levels = _mip_levels(texture.pixels)
-        lookup = np.concatenate([coordinates, np.ones_like(coordinates[..., :1])], axis=2) @ texture.uv_transform.T
         mine = np.flatnonzero((face >= 0) & (np.append(materials, -1)[face] == material))
         for block in np.split(mine, range(BLOCK, len(mine), BLOCK)):
             f = face[block]
-            at, du, dv = _footprints(charts, leaves, surfaces, scene, f, block, lookup[charts.face_triangle[f]])
+            at, du, dv = _footprints(charts, leaves, surfaces, scene, f, block, coordinates[charts.face_triangle[f]])
             colours[block] = _average(texture, levels, at, du, dv)
     return None if colours is None else colours.reshape(*surfaces.face.shape, 3)
 
@@ -66,15 +66,9 @@ def _footprints(
     t1, t2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     scale = 1 / (d1[:, :1] * d2[:, 1:] - d1[:, 1:] * d2[:, :1])
     per_u, per_v = (t1 * d2[:, 1:] - t2 * d1[:, 1:]) * scale, (t2 * d1[:, :1] - t1 * d2[:, :1]) * scale
-    # barycentric coordinates of the centroid, dropped onto the face's plane
-    corners = scene.corners[charts.face_triangle[face]]
-    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal = np.cross(e1, e2)
-    squared = np.einsum("nk,nk->n", normal, normal)
-    p = surfaces.position.reshape(-1, 3)[texel] - corners[:, 0]
-    b1 = np.einsum("nk,nk->n", np.cross(p, e2), normal) / squared
-    b2 = np.einsum("nk,nk->n", np.cross(e1, p), normal) / squared
-    at = uv[:, 0] + b1[:, None] * t1 + b2[:, None] * t2
+    position = surfaces.position.reshape(-1, 3)[texel]
+    weights = barycentric(position, scene.corners[charts.face_triangle[face]])
+    at = uv[:, 0] + weights[:, 1:2] * t1 + weights[:, 2:] * t2
     size = 0.5 ** leaves.level[texel // charts.tile**2][:, None]
     return at, per_u * size, per_v * size
 
@@ -93,6 +87,12 @@ def _average(texture: Texture, levels: list[F32], at: F64, du: F64, dv: F64) -> 
             for b in offsets:
                 total[mine] += look_up(texture, levels[number], at[mine] + a * du[mine] + b * dv[mine])
     return (total / SAMPLES**2).astype(np.float32)
+
+
+def texture_coordinates(scene: Scene, texture: Texture) -> F64 | None:
+    """(m, 3, 2) where in the texture the corners of each triangle lie; None where the scene has no coordinates for it."""
+    uv = (scene.uv0, scene.uv1)[texture.texcoord]
+    return None if uv is None else uv @ texture.uv_transform[:, :2].T + texture.uv_transform[:, 2]
 
 
 def look_up(texture: Texture, pixels: F32, at: F64) -> F32:

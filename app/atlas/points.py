@@ -58,6 +58,16 @@ def random_points(scene: Scene, count: int, seed: int) -> Points:
     return Points(sides.triangle[side], sides.back[side], random.dirichlet((1, 1, 1), count))
 
 
+def barycentric(position: F64, corners: F64) -> F64:
+    """(n, 3) weights of corners (n, 3, 3) that make positions (n, 3), or the feet of those off the plane."""
+    a, b, p = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], position - corners[:, 0]
+    normal = np.cross(a, b)
+    squared = np.einsum("nk,nk->n", normal, normal)
+    second = np.einsum("nk,nk->n", np.cross(p, b), normal) / squared
+    third = np.einsum("nk,nk->n", np.cross(a, p), normal) / squared
+    return np.stack([1 - second - third, second, third], axis=1)
+
+
 def bilinear(image: NDArray[Any], place: F64) -> F64:
     """An image (h, w, c) at places (n, 2) [its texels], whose middles lie at halves: (n, c), its edge texels beyond its edges."""
     low = np.floor(place - 0.5).astype(np.int64)

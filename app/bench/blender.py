@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from app.atlas.charts import Charts
+from app.atlas.materials import texture_coordinates
 from app.atlas.sides import scene_size
 from app.errors import UserError
 from app.scene.model import F32, Material, Scene, Texture
@@ -130,9 +131,9 @@ def _texcoords(scene: Scene, kind: str) -> np.ndarray:
     out = np.zeros((len(scene.triangles), 3, 2))
     for k, material in enumerate(scene.materials):
         texture: Texture | None = getattr(material, f"{kind}_texture")
-        uv = None if texture is None else (scene.uv0, scene.uv1)[texture.texcoord]
-        if texture is not None and uv is not None:
+        coordinates = None if texture is None else texture_coordinates(scene, texture)
+        if coordinates is not None:
             mine = scene.material_ids == k
-            out[mine] = uv[mine] @ texture.uv_transform[:, :2].T + texture.uv_transform[:, 2]
+            out[mine] = coordinates[mine]
     out[..., 1] = 1 - out[..., 1]
     return out

@@ -15,6 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from app.atlas.materials import texture_coordinates
 from app.atlas.sides import scene_size
 from app.errors import UserError
 from app.scene.model import F64, RGB, Material, Scene, Texture
@@ -141,9 +142,9 @@ def _texcoords(scene: Scene, material: Material) -> F64:
         return np.zeros((len(scene.triangles), 3, 2))
     if any((t.uv_transform != used[0].uv_transform).any() or t.texcoord != used[0].texcoord for t in used):
         raise UserError(f"material {material.name}: mitsuba takes one set of texture coordinates for all its textures")
-    uv = (scene.uv0, scene.uv1)[used[0].texcoord]
-    assert uv is not None, "a texture without coordinates"
-    return np.asarray(uv @ used[0].uv_transform[:, :2].T + used[0].uv_transform[:, 2])
+    coordinates = texture_coordinates(scene, used[0])
+    assert coordinates is not None, "a texture without coordinates"
+    return coordinates
 
 
 @dr.syntax

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app import cache
-from app.atlas.materials import look_up
+from app.atlas.materials import look_up, texture_coordinates
 from app.atlas.node_set import Frame
-from app.atlas.points import Points
+from app.atlas.points import Points, barycentric
 from app.atlas.sides import lit_sides
 from app.bench.report import FLIP, missing
 from app.bench.truth import CACHE_FILES, Truth
@@ -141,18 +141,8 @@ def _seen(gpu: Gpu, scene: Scene) -> tuple[NDArray[np.int64], Points]:
     shown = np.flatnonzero(triangle)
     position = frame.world_from_local(local[shown, :3].astype(np.float64))
     drawn = triangle[shown].astype(np.int32) - 1
-    return shown, Points(drawn, back[shown] == 1, _barycentric(scene.corners[drawn], position))
-
-
-def _barycentric(corners: F64, position: F64) -> F64:
-    """(n, 3) weights of the corners (n, 3, 3) at points (n, 3) on their triangles, or as near as rounding brings them."""
-    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal, p = np.cross(e1, e2), position - corners[:, 0]
-    squared = np.einsum("nk,nk->n", normal, normal)
-    b1 = np.einsum("nk,nk->n", np.cross(p, e2), normal) / squared
-    b2 = np.einsum("nk,nk->n", np.cross(e1, p), normal) / squared
-    weights = np.clip(np.stack([1 - b1 - b2, b1, b2], axis=1), 0.0, 1.0)
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+    weights = np.clip(barycentric(position, scene.corners[drawn]), 0.0, 1.0)  # as near as rounding brings them
+    return shown, Points(drawn, back[shown] == 1, weights / weights.sum(axis=1, keepdims=True))
 
 
 def _reflecting(scene: Scene, points: Points) -> NDArray[np.bool_]:
@@ -170,9 +160,8 @@ def _colours(scene: Scene, points: Points, kind: str) -> F64:
         mine = np.flatnonzero((used == k) & (material.double_sided | ~points.back))
         texture: Texture | None = getattr(material, f"{kind}_texture")
         out[mine] = getattr(material, kind)
-        uv = None if texture is None else (scene.uv0, scene.uv1)[texture.texcoord]
-        if texture is not None and uv is not None:
-            at = np.einsum("nk,nkc->nc", points.weights[mine], uv[points.triangle[mine]])
-            at = at @ texture.uv_transform[:, :2].T + texture.uv_transform[:, 2]
+        coordinates = None if texture is None else texture_coordinates(scene, texture)
+        if texture is not None and coordinates is not None:
+            at = np.einsum("nk,nkc->nc", points.weights[mine], coordinates[points.triangle[mine]])
             out[mine] *= look_up(texture, texture.pixels, at)
     return out

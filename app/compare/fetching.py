@@ -78,6 +78,8 @@ class Fetching:
             self._found = looked_up(work(self._progress), self.nodes)
         except MemoryError:
             self._error = UserError("not enough memory for this reference")
+        except OSError as error:
+            self._error = UserError(f"the reference: {error.strerror or error}")
         except Exception as error:  # raised again by the main thread, with its traceback
             self._error = error
 

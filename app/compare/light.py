@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from app.atlas.node_set import NodeSet
-from app.atlas.points import Points, SideIndex, bilinear
+from app.atlas.points import Points, SideIndex, barycentric, bilinear
 from app.atlas.sides import lit_sides, scene_size
 from app.bake.read import Bake
 from app.errors import UserError
@@ -137,16 +137,6 @@ def _partners(bake: Bake, scene: Scene) -> tuple[I32, NDArray[np.bool_], _Partne
 def _turned(corners: NDArray[Any], turn: Ints) -> F64:
     """(f, 3, k) with the corners of each turned so often."""
     return np.take_along_axis(corners.astype(np.float64), ((np.arange(3) + turn[:, None]) % 3)[..., None], axis=1)
-
-
-def barycentric(position: F64, corners: F64) -> F64:
-    """(n, 3) weights of corners (n, 3, 3) that make positions (n, 3), or the feet of those off the plane."""
-    a, b, p = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], position - corners[:, 0]
-    normal = np.cross(a, b)
-    squared = np.einsum("nk,nk->n", normal, normal)
-    second = np.einsum("nk,nk->n", np.cross(p, b), normal) / squared
-    third = np.einsum("nk,nk->n", np.cross(a, p), normal) / squared
-    return np.stack([1 - second - third, second, third], axis=1)
 
 
 def _alike(one: Material, other: Material) -> bool:

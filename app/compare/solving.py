@@ -63,14 +63,20 @@ def _light(found: dict[str, Any], scene: Scene) -> ReferenceLight:
 
 
 def _run_worker(source: Path, target: Path, tell: Progress) -> None:
-    """Whatever ends the wait ends the worker. It ends by itself, too, when its standard input is closed: with this process."""
+    """Whatever ends the wait ends the worker. It ends by itself, too, when its standard input is closed: with this process. In a
+    session of its own it does not hear of Ctrl-C, which is for whoever waits."""
     root = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(p for p in (root, os.environ.get("PYTHONPATH")) if p)
     command = [sys.executable, "-m", WORKER, str(source), str(target)]
     said, errors = source.with_name("said"), source.with_name("errors")
     with said.open("wb") as out, errors.open("wb") as err:
         worker = subprocess.Popen(
-            command, env={**os.environ, "PYTHONPATH": path}, stdin=subprocess.PIPE, stdout=out, stderr=err
+            command,
+            env={**os.environ, "PYTHONPATH": path},
+            stdin=subprocess.PIPE,
+            stdout=out,
+            stderr=err,
+            start_new_session=True,
         )
         try:
             while worker.poll() is None:

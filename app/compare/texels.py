@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.lightmap import Lightmap
+from app.atlas.node_set import Moves
 from app.compare.light import ReferenceLight
 from app.gpu import Gpu, Texture
 from app.scene.model import F32
@@ -35,19 +36,31 @@ class ReferenceTexels:
     def follow(self, *, whole: bool) -> None:
         """Bring it up to date with the leaves; if not ``whole``, a part of it."""
         nodes = self._lightmap.nodes
-        if self.texture.size != nodes.size:
-            self.release()
-            self._begin()
-            whole = True
+        if len(self._known) != nodes.tiles:
+            self._resize()
         if self._version == self._lightmap.version:
             return
-        keys = np.where(nodes.used, nodes.leaves.keys, -1)
+        keys = self._keys
         stale = np.flatnonzero(nodes.used & (keys != self._known))
         now = stale if whole else stale[: TEXELS_PER_FRAME // nodes.tile**2]
         self._write(now, self._light.on_tiles(nodes, now))
         self._known[now] = keys[now]
         if len(now) == len(stale):
             self._version = self._lightmap.version
+
+    @property
+    def _keys(self) -> NDArray[np.int64]:
+        """The leaf in each slot; -1 where there is none."""
+        nodes = self._lightmap.nodes
+        return np.where(nodes.used, nodes.leaves.keys, -1)
+
+    def _resize(self) -> None:
+        """The node set has got another number of slots: leaves that are known take their texels along, wherever they are now."""
+        tiles = self._lightmap.nodes.tiles
+        leaves, now, before = np.intersect1d(self._keys, self._known, return_indices=True)
+        there = leaves >= 0
+        moves = Moves(tiles, min(len(self._known), tiles), before[there], now[there])
+        self.texture, self._known = self._lightmap.moved(self.texture, moves), moves.array(self._known, -1)
 
     def _write(self, slots: NDArray[np.int64], tiles: F32) -> None:
         nodes = self._lightmap.nodes

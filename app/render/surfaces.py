@@ -51,7 +51,7 @@ class Surfaces:
 
         scale: of the false colour, where one is on. reference: for layers that compare, and to be shown as ``display.show`` asks,
         where the layer is of received light. ambient: A [W/m²], light that every surface is taken to receive
-        besides. shooter: the patch to mark: lower and upper corner (u, v, u, v) in atlas texels. whole: see
+        besides in the solution. shooter: the patch to mark: lower and upper corner (u, v, u, v) in atlas texels. whole: see
         ``DisplayTexels.resolve``; else one of many, in which new leaves shine.
         """
         lit_by = ambient if ambient and display.ambient else DARK
@@ -62,7 +62,8 @@ class Surfaces:
         if right is not None and reference is not None:
             self._others, fresh = self._fitting(self._others, display)
             now = whole or fresh or not self._sides[1]
-            shown.append((self._others.resolve(layer_name, display, whole=now, instead=True, **wanted), right))
+            others = wanted | {"ambient": DARK}  # what is unshot is the solution's
+            shown.append((self._others.resolve(layer_name, display, whole=now, instead=True, **others), right))
         elif reference is None and self._others is not None:
             self._others.release()
             self._others = None

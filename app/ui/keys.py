@@ -108,7 +108,7 @@ SHORTCUTS = (
 
 POINTER = (
     ("Click", "inspect the texel"),
-    ("Left drag", "orbit"),
+    ("Left drag", "orbit, or move the line of a split view"),
     ("Right or middle drag", "pan"),
     ("Wheel", "nearer and farther"),
     ("W A S D Q E", "fly; Shift is faster, Ctrl slower"),

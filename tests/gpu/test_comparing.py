@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import os
+import pickle
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,10 +17,14 @@ import numpy as np
 import psutil
 import pytest
 from boxes import PLAIN, SIZE, STEP, box, cornell, even, picture, put
+from forests import Forest, forest
 from gl_objects import forgotten, held
+from numpy.typing import NDArray
+from solver_scenes import table_room
 
 from app.atlas.collapse import collapse
 from app.atlas.lightmap import Lightmap
+from app.atlas.node_set import NodeSet
 from app.atlas.options import AtlasOptions
 from app.atlas.points import random_points
 from app.bake import write_bake
@@ -29,13 +39,14 @@ from app.errors import UserError
 from app.gpu import Gpu
 from app.headless import picture as shot
 from app.metrics import lit_points
+from app.reference_worker import INTERRUPTED
 from app.render.false_colour import ERRORS, colour_map
 from app.render.resolve import Reference
-from app.scene.model import F32, F64
+from app.scene.model import F32, F64, Scene
 from app.session import Session, Stop
 from app.solvers import ShootingOptions
 
-__all__ = ["box", "cornell", "forgotten"]
+__all__ = ["box", "cornell", "forest", "forgotten"]
 
 SHOOTING = ShootingOptions(resolution=64, residual=0.05)
 
@@ -227,6 +238,19 @@ def test_a_split_picture_is_half_of_each(gpu: Gpu, box: Lightmap) -> None:
     texels.release()
 
 
+def test_light_not_yet_shot_is_not_the_reference_s(gpu: Gpu, box: Lightmap) -> None:
+    texels, reference = reference_of(gpu, box, even(box, (0.5, 1.0, 2.0)))
+    display = PLAIN.replace(show="split", split=0.5)
+    without, added = (
+        picture(gpu, box, display.replace(ambient=on), reference=reference, ambient=(1.0, 1.0, 1.0))
+        for on in (False, True)
+    )
+    middle = SIZE[0] // 2
+    assert (added[:, :middle] != without[:, :middle]).any()
+    assert (added[:, middle:] == without[:, middle:]).all()
+    texels.release()
+
+
 def test_layers_without_received_light_have_no_other_side(gpu: Gpu, box: Lightmap) -> None:
     texels, reference = reference_of(gpu, box, even(box, (1.0, 1.0, 1.0)))
     for layer in ("albedo", "residual", "charts"):
@@ -255,6 +279,48 @@ def test_the_reference_follows_the_leaves(gpu: Gpu, tmp_path: Path) -> None:
     assert version > 0
     texels.release()
     session.release()
+
+
+def test_a_node_set_that_is_resized_is_not_looked_up_at_once(
+    gpu: Gpu, forest: Callable[..., Forest], rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Leaves that stay, moved or not, take their texels along; of those that are new a part comes in each frame."""
+    trees = forest(table_room())
+    for _ in range(2):
+        trees.grow()
+    families = trees.tree.merges(np.flatnonzero(trees.nodes.used))
+    trees.regrowth.apply(trees.tree.merge([family for family in families if rng.random() < 0.7]))
+    trees.write_noise(rng)
+    lightmap, nodes = trees.lightmap, trees.nodes
+    light = light_of(lightmap, lightmap.irradiance())
+    texels = ReferenceTexels(gpu, lightmap, light)
+    texels.follow(whole=True)
+    look_up, looked_up = ReferenceLight.on_tiles, []
+
+    def on_tiles(self: ReferenceLight, nodes: NodeSet, slots: NDArray[np.int64]) -> F32:
+        looked_up.append(len(slots))
+        return look_up(self, nodes, slots)
+
+    def complete() -> bool:
+        image = np.frombuffer(texels.texture.read(), np.float32).reshape(*nodes.size[::-1], 4)
+        found = nodes.tiles_from_image(image)[nodes.used][..., :3]
+        return bool((found == look_up(light, nodes, np.flatnonzero(nodes.used))).all())
+
+    monkeypatch.setattr(ReferenceLight, "on_tiles", on_tiles)
+    assert complete()
+    moves = trees.tree.resize(len(trees.tree) + 5)
+    lightmap.resize(moves)
+    texels.follow(whole=False)
+    assert len(moves.old) > 20 and sum(looked_up) == 0 and complete()
+    monkeypatch.setattr("app.compare.texels.TEXELS_PER_FRAME", 20 * nodes.tile**2)
+    rows = nodes.rows
+    trees.grow(0.3, rng)
+    texels.follow(whole=False)
+    assert nodes.rows > rows and sum(looked_up) == 20 and not complete()
+    for _ in range(-(-nodes.tiles // 20)):
+        texels.follow(whole=False)
+    assert complete() and max(looked_up) == 20 and sum(looked_up) < len(trees.tree)
+    texels.release()
 
 
 def test_without_a_reference_the_solution_is_shown(session: Session) -> None:
@@ -330,7 +396,12 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def workers() -> list[psutil.Process]:
-    return [p for p in psutil.Process().children() if "app.reference_worker" in p.cmdline()]
+    found = []
+    for process in psutil.Process().children():
+        with contextlib.suppress(psutil.NoSuchProcess):  # it may end meanwhile
+            if "app.reference_worker" in process.cmdline():
+                found.append(process)
+    return found
 
 
 def test_a_finer_solve_is_a_reference(session: Session, own_cache: Path) -> None:
@@ -355,9 +426,26 @@ def test_a_finer_solve_is_a_reference(session: Session, own_cache: Path) -> None
     assert session.comparison is not comparison and kept.stat().st_mtime_ns == written
     session.solve_reference(options.replace(residual=1e-9))
     frames(session, lambda: bool(workers()))
+    if hasattr(os, "getsid"):
+        assert all(os.getsid(worker.pid) == worker.pid for worker in workers()), "Ctrl-C would reach it"
     session.stop_fetching()
     gone = time.monotonic() + 10
     while workers():
         assert time.monotonic() < gone, "still there"
         time.sleep(0.05)
     assert session.comparison is not None and session.fetching is None
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
+def test_an_interrupted_solve_is_no_answer(cornell: Scene, tmp_path: Path) -> None:
+    source, target = tmp_path / "in.pickle", tmp_path / "out.npz"
+    shooting = SHOOTING.replace(residual=1e-9)
+    source.write_bytes(pickle.dumps({"scene": cornell, "atlas": AtlasOptions(texels=900), "shooting": shooting}))
+    command = [sys.executable, "-m", "app.reference_worker", str(source), str(target)]
+    env = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(command, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as worker:
+        assert worker.stdout is not None
+        assert any(b" shots" in line for line in worker.stdout)
+        worker.send_signal(signal.SIGINT)
+        assert worker.wait(30) == INTERRUPTED
+    assert not target.exists()

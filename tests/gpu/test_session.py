@@ -112,6 +112,13 @@ def test_solve_runs_to_convergence_and_knows_it(session: Session) -> None:
     assert share_done(session, Stop()) == 1
 
 
+def test_a_solve_that_still_shoots_is_not_all_done(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    session.solve(Stop())
+    monkeypatch.setattr(type(session.solver), "settled", property(lambda solver: False))
+    assert 0.9 < share_done(session, Stop()) < 1
+    assert share_done(session, Stop(shots=session.solver.shots)) == 1  # all that was asked for
+
+
 # -- what begins again -------------------------------------------------------------------------------------------------
 
 

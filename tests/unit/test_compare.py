@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
+import os
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +13,16 @@ import pytest
 from solver_scenes import quads_scene, room
 
 from app.atlas.charts import Charts
+from app.atlas.node_set import NodeSet
 from app.atlas.parametrize import parametrize
-from app.atlas.points import Points, bilinear
+from app.atlas.points import Points, barycentric, bilinear
 from app.bake import write_bake
 from app.bake.read import read_bake
 from app.compare.comparison import error_of
-from app.compare.light import barycentric, light_of_bake
+from app.compare.fetching import Fetching
+from app.compare.light import ReferenceLight, light_of_bake
 from app.errors import UserError
+from app.loading import Progress
 from app.scene.model import F32, Material, Scene
 
 MATERIALS = (
@@ -116,6 +121,16 @@ def test_what_cannot_be_read_is_said(tmp_path: Path) -> None:
     OpenEXR.File(header, {"RGB": np.full((4, 4, 3), np.nan, np.float32)}).write(str(exr))
     with pytest.raises(UserError, match="not finite"):
         read_bake(tmp_path)
+
+
+def test_a_full_disk_is_said() -> None:
+    def work(tell: Progress) -> ReferenceLight:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/somewhere")
+
+    scene = sheet_in_a_room()
+    fetching = Fetching(NodeSet(scene, charts_of(scene)), work)
+    with pytest.raises(UserError, match="the reference: No space left on device"):
+        assert fetching.result
 
 
 def test_barycentric_weights_make_the_point() -> None:
