@@ -346,7 +346,8 @@ def test_a_reference_stays_with_its_scene(session: Session, tmp_path: Path) -> N
     assert session.comparison is not None and session.comparison is not first
     frames(session, lambda: session.at_rest)
     error = session.comparison.error
-    assert error is not None and error.rms < 0.03  # a furnace, to a residual of 0.05 of both
+    # a furnace that reflects half; both to a residual of 0.05, which is missing twice, or was shot ahead
+    assert error is not None and error.rms < 0.1
     session.display = session.display.replace(layer="error", show="split")
     session.open_now("cornell-box")
     assert session.comparison is None

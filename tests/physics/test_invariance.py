@@ -15,7 +15,9 @@ from app.scene.model import F64, Scene
 from app.scene.shapes import transform
 
 DENSITY = 8.0  # texels/m: every edge of the room is whole patches
-SOLVE = {"residual": 1e-2, "coarsen": False, "resolution": 128}
+# Patches of two texels: with four, as far from the lamp as they are wide, it is chance which of those that mirror each other
+# fail their audits, since each changes what the others are asked with; the lamp's light then differs by 0.7 %.
+SOLVE = {"residual": 2e-3, "level": 1, "coarsen": False, "resolution": 128}
 SAME = 0.005  # the half per cent
 
 
@@ -96,7 +98,7 @@ def test_light_is_the_same(gpu: Gpu, plain: Solution, change: str) -> None:
 
     H, mine = plain.H, np.empty_like(plain.H)
     mine[match] = other.H
-    # which of two equal patches shoots first is chance, and 1 % of the light is still unshot
+    # which of two equal patches shoots first is chance, and so is where the light lies that is still unshot
     np.testing.assert_allclose(plain.means(mine), plain.means(H), rtol=SAME)
     # single texels at shadow edges see other samples of the map when it is turned
     assert np.sqrt((((mine - H) / H.mean(0)) ** 2).mean()) < SAME

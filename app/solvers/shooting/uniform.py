@@ -259,7 +259,8 @@ class UniformShooting(ShotPasses):
             run()
             self.gpu.ctx.finish()
             yield
-        for self._phase in range(1, len(self.stages.choices)):
+        for phase in range(1, len(self.stages.choices)):
+            self._phase = phase
             whole(self._pick(1))
             self.gpu.ctx.finish()
             yield
