@@ -26,7 +26,10 @@ LEAST = 1e-9  # residual that can be asked for
 BOOK = "of single shots' sums, on average: a texel is sampled at its centroid, its shooter's sight at one point"
 EACH = "and each bounce may lose what grazes, (4/R)²"
 NO_NUMBER = "every texel holds a finite number"
-NEGATIVE = "what was shot ahead is taken back by the same patch, seen from another point of it or from finer ones"
+NEGATIVE = (
+    "what was shot ahead is taken back by the same patch, seen from another point of it or from finer ones: two samples of the "
+    "map, 1/R² of the sky each, may see it the one time and not the other"
+)
 ROUNDED = 2.0**-11  # of what a half float holds, either way
 STORED = (
     "adding to a half float cuts off up to 2^-10 of what is there, to 8 bits all below 1/510: a limit of the format"
@@ -172,7 +175,13 @@ class HardCase:
         yield Claim("texels without a finite number", float(broken), 0.0, 0.0, 0.0, NO_NUMBER, exact=False)
         brightest = max(float(light.H.max()), 1e-300)
         yield Claim(
-            "darkest texel / brightest", float(light.H.min()) / brightest, 0.0, 1e-4, 1.0, NEGATIVE, exact=False
+            "darkest texel / brightest",
+            float(light.H.min()) / brightest,
+            0.0,
+            2 / light.map**2,
+            1.0,
+            NEGATIVE,
+            exact=False,
         )
         gained, lost, reason = self.book, self.book, self.book_reason
         if self.grazes:

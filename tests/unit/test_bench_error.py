@@ -10,6 +10,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -83,8 +84,8 @@ class OneSecondSteps:
     def __init__(self, clock: FakeClock) -> None:
         self._clock, self.report, self.residual = clock, self, 1.0
 
-    def passes(self, shots: int) -> dict[str, Any]:
-        return {}
+    def warm_up(self, shots: int) -> Iterator[None]:
+        return iter(())
 
     def reset(self) -> None:
         self.residual = 1.0
