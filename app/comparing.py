@@ -112,8 +112,12 @@ class Comparing(Viewing):
             except UserError as error:
                 self.message = str(error)
         if self.comparison is not None:
-            state = self.solver.shots, self.lightmap.version, self.lightmap.scene
-            self._measured = self.comparison.measure(self.solver.shots, self.seconds, state, wait=wait)
+            self._measured = self.comparison.measure(self.solver.shots, self.seconds, self._light, wait=wait)
+
+    @property
+    def _light(self) -> object:
+        """What all light depends on: another one where it is another."""
+        return self.solver.shots, self.lightmap.version, self.lightmap.scene
 
     def _compare_anew(self) -> None:
         """Another lightmap: the reference stays while the scene is the same one, cut anew."""

@@ -70,6 +70,8 @@ def bake(flags: argparse.Namespace) -> int:
         session = Session(gpu, **session_options(flags))
         _open(session, flags.scene, console)
         failure = _solve(session, flags, console)
+        if failure is None and not session.interrupted:
+            _expect(session, console)
         clock = time.perf_counter()
         lightmap = session.lightmap
         irradiance, covered = collapse(lightmap.nodes, lightmap.irradiance())
@@ -205,6 +207,7 @@ def report(session: Session) -> dict[str, Any]:
         },
         "imbalance": stats.imbalance,
         **_error(session),
+        **({} if session.expected is None else {"expected_error": session.expected._asdict()}),
         "warnings": [*session.scene.warnings, *session.charts.warnings, *_notes(session)],
     }
 
@@ -259,6 +262,17 @@ def _solve(session: Session, flags: argparse.Namespace, console: Console) -> Not
     return None
 
 
+def _expect(session: Session, console: Console) -> None:
+    """Work out how far off the light is expected to be. Ctrl-C goes without, and is noted."""
+    clock = time.perf_counter()
+    try:
+        with console.progress("gathering") as tell:
+            session.expect(lambda share: tell("the error that is expected", share))
+    except KeyboardInterrupt:
+        session.interrupted = True
+    session.load_seconds["expected error"] = time.perf_counter() - clock
+
+
 def _choose_camera(session: Session, name: str | None) -> None:
     if name is None:
         return
@@ -311,6 +325,9 @@ def _folder(path: Path) -> Iterator[None]:
 def _summary(result: dict[str, Any]) -> str:
     error = result.get("error")
     compared = "" if error is None else f", off by {error['rms']:.2%} RMS and {error['median']:.2%} in the median"
+    expected = result.get("expected_error")
+    if expected is not None:
+        compared += f", expected to be off by {expected['rms']:.1%} RMS and {expected['median']:.1%} in the median"
     state = "stopped early" if result["interrupted"] else "converged" if result["converged"] else "stopped as asked"
     return (
         f"{result['shots']} shots in {result['seconds']['shoot']:.1f} s, {result['residual']:.2%} unshot ({state}), "

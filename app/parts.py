@@ -8,7 +8,7 @@ from typing import TypeVar
 ResultT = TypeVar("ResultT")
 
 
-def whole(parts: Generator[None, None, ResultT]) -> ResultT:
+def whole(parts: Generator[object, None, ResultT]) -> ResultT:
     """Do all parts of something; what it returns."""
     while True:
         try:

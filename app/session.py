@@ -18,6 +18,8 @@ from app.atlas.options import AtlasOptions
 from app.bookkeeping import Books, Effort
 from app.comparing import Comparing
 from app.errors import UserError
+from app.expecting import Expecting
+from app.gathering.expected import ExpectedError
 from app.gpu import Gpu
 from app.history import History
 from app.loading import Loading, load
@@ -60,6 +62,7 @@ class Session(Comparing):
         self._books = Books()
         self._settled, self._busy, self._opened = True, False, False
         self._opening = Opening(gpu, self.renderer)
+        self.expecting = Expecting(gpu)
         self._then_reference: Path | None = None
         self.unedited: Scene  # the open one as it was read: the same through edits, and however it is cut
 
@@ -94,6 +97,8 @@ class Session(Comparing):
             self.hear()
         if self._opened:
             self._compare()
+            if self._resting and not self._busy:
+                self._expect()
 
     def _open_part(self, loading: Loading) -> None:
         """The next part of opening what was loaded; the scene that is open stays until the last."""
@@ -138,6 +143,7 @@ class Session(Comparing):
     def close(self) -> None:
         """Release the open scene; the session can open another."""
         if self._opened:
+            self.expecting.forget()
             self.solver.release()
             self.lightmap.release()
             self._opened = False
@@ -184,6 +190,10 @@ class Session(Comparing):
     @property
     def at_rest(self) -> bool:
         """Whether nothing changes by itself: neither light nor numbers, and no scene is on its way."""
+        return self._resting and (not self._can_expect or self.expecting.knows(self._light))
+
+    @property
+    def _resting(self) -> bool:
         return self.loading is None and not self.shooting_goes_on and self._settled and not self.comparing
 
     def advance(self, *, budget_ms: float, shots: int = 1, brisk: bool = False) -> int:
@@ -251,6 +261,27 @@ class Session(Comparing):
     def measure(self) -> None:
         """Wait for the GPU and bring ``comparison`` up to the last shot."""
         self._compare(wait=True)
+
+    @property
+    def expected(self) -> ExpectedError | None:
+        """How far off the light is expected to be, if that is known; see ``expecting`` for how far it is."""
+        return self.expecting.error if self._opened and self.expecting.knows(self._light) else None
+
+    def expect(self, progress: Callable[[float], None]) -> None:
+        """Work out ``expected`` whole, of settled light."""
+        while self._can_expect and not self.expecting.knows(self._light):
+            self._expect()
+            progress(self.expecting.share)
+
+    @property
+    def _can_expect(self) -> bool:
+        """Whether there is light to judge."""
+        return self._opened and self.solver.shots > 0 and self.scene.emits
+
+    def _expect(self) -> None:
+        """Some of the points, or none where there is nothing to do."""
+        if self._can_expect and not self.expecting.knows(self._light):
+            self.expecting.part(self.lightmap, self.books.returned, self._light)
 
     def _begin_again(self) -> None:
         self._books.begin_again()

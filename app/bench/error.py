@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import itertools
 import os
 import re
 from collections.abc import Iterable
@@ -29,8 +30,10 @@ from app.bench.truth import Truth, choose, truth_of
 from app.bench.view import SIZE, View, view_of
 from app.console import Console, Tell
 from app.errors import UserError
+from app.gathering.expected import Expectation
 from app.gpu import Gpu, gpu_context
 from app.options import from_flags
+from app.parts import whole
 from app.scene.load import load_scene
 from app.scene.model import Scene
 from app.solvers import ShootingOptions
@@ -41,7 +44,7 @@ SAMPLES = (
         Column(key, key)
         for key in ("scene", "method", "seconds", "cpu_seconds", "shots", "paths", "residual", "texels")
     ),
-    *(Column(key, key) for key in ("rms", "bias", "median", "q90", "leak", "imbalance", "flip")),
+    *(Column(key, key) for key in ("rms", "expected", "bias", "median", "q90", "leak", "imbalance", "flip")),
 )
 SUMMARY = (
     Column("method", "method"),
@@ -52,6 +55,7 @@ SUMMARY = (
     Column("cpu_seconds", "CPU s", ".2f"),
     Column("residual", "unshot", ".2%"),
     Column("rms", "RMS", ".2%"),
+    Column("expected", "expected", ".2%"),
     Column("bias", "bias", "+.2%"),
     Column("median", "median", ".2%"),
     Column("q90", "90 %", ".2%"),
@@ -62,12 +66,19 @@ SUMMARY = (
 )
 NOTES = (
     "Error of the irradiance at random points of the surfaces. RMS: root mean square over all lit points and colours, over the "
-    "mean. Bias: of the mean. Median, 90 %: quantiles of the error at each lit point, over the irradiance there. Leak: light at "
-    "dark points, over the mean at lit ones. Imbalance: emitted light that is neither absorbed, nor unshot, nor gone. s to: "
-    "seconds of solving until the RMS was that small, read between two looks; looking stops the clock, and loading is not timed. "
-    "CPU s: of all cores, which other programs on the machine do not change. FLIP: how different what the first camera sees "
+    "mean. Expected: the RMS that the solution says of itself, with no reference. Bias: of the mean. Median, 90 %: quantiles of "
+    "the error at each lit point, over the irradiance there. Leak: light at dark points, over the mean at lit ones. Imbalance: "
+    "emitted light that is neither absorbed, nor unshot, nor gone. s to: seconds of solving until the RMS was that small, read "
+    "between two looks; looking stops the clock, and loading is not timed. CPU s: of all cores, "
+    "which other programs on the machine do not change. FLIP: how different what the first camera sees "
     f"looks by this light and by the reference's, {SIZE[0]}×{SIZE[1]} pixels, 0 to 1; none where the reference has no picture.",
 )
+
+
+AT_ONCE = 8  # points that the expected error is gathered at
+STATED = 4  # looks from one at which it is to the next
+JUDGED = 1.5  # times the reference's noise, from where on an RMS says something
+TWICE = 2.0  # or half: so far off is still well expected
 
 
 @dataclass
@@ -95,6 +106,19 @@ class SceneCurves:
             rows[-1] | {"method": name} | {f"to_{level:g}": first_at(level, rows) for level in LEVELS}
             for name, rows in self.curves.items()
         ]
+
+    @property
+    def foretold(self) -> tuple[int, int]:
+        """How many looks had expected their RMS within a factor of two, and of how many that the reference can judge. Its
+        noise is none of theirs."""
+        assert self.truth is not None
+        noise, good, stated = self.truth.noise or 0.0, 0, 0
+        for row in itertools.chain.from_iterable(self.curves.values()):
+            if row.get("expected") is not None and row.get("rms", 0.0) > JUDGED * noise:
+                true = (row["rms"] ** 2 - noise**2) ** 0.5
+                good += true / TWICE <= row["expected"] <= true * TWICE
+                stated += 1
+        return good, stated
 
 
 @dataclass(frozen=True)
@@ -203,7 +227,21 @@ def _curve(gpu: Gpu, one: SceneCurves, truth: Truth, name: str, plan: Plan) -> l
         atlas, _ = plan.options("uniform")
         return PEERS[name].curve(Task(one.scene, truth, one.view, atlas, plan.seconds))
     with opened(gpu, one.scene, *plan.options(name)) as (lightmap, solver):
-        rows = solve_curve(gpu, solver, plan.seconds, lambda: look_at(lightmap, solver, truth))
+        expectation, looks = Expectation(gpu, lightmap, AT_ONCE), itertools.count()
+
+        def expected() -> Row:
+            error = whole(expectation.parts(solver.books().returned))
+            return {} if error is None else {"expected": error.rms}
+
+        def look() -> Row:
+            row = look_at(lightmap, solver, truth)
+            return row | expected() if next(looks) % STATED == 0 else row
+
+        try:
+            rows = solve_curve(gpu, solver, plan.seconds, look)
+            rows[-1] |= expected()
+        finally:
+            expectation.release()
         if one.view is not None:
             rows[-1]["flip"] = one.view.flip(irradiance_of(lightmap, one.view.points))
     return rows
@@ -225,6 +263,7 @@ def _values(one: SceneCurves, plan: Plan) -> dict[str, Any]:
         "truth": one.truth.as_dict(),
         "view": None if one.view is None else one.view.as_dict(),
         "curves": curves,
+        "foretold": one.foretold,
         "summary": one.summary,
     }
 
@@ -247,6 +286,9 @@ def document(values: dict[str, Any], scenes: Iterable[SceneCurves]) -> str:
             f"## {one.name}",
             f"{len(one.scene.triangles):,} triangles. Compared with: {truth.made}, at {len(truth.points):,} points, of which "
             f"{lit:,} are lit{noise}.",
+            "Expected RMS within a factor of two of the measured one, less the noise of the reference: at {} of {} looks.".format(
+                *one.foretold
+            ),
             markdown_table([c for c in SUMMARY if any(row.get(c.key) is not None for row in one.summary)], one.summary),
         ]
     return "\n\n".join(parts)

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from app.atlas.options import AtlasOptions
+from app.gathering.expected import ExpectedError
 from app.render.camera import CameraView
 from app.render.options import DisplayOptions
 from app.scene.model import Material
@@ -66,6 +67,8 @@ class FakeSession:
         self.fetching: SimpleNamespace | None = None
         self.comparison: SimpleNamespace | None = None
         self.reference_texels = 124816
+        self.expected = ExpectedError(0.016, -0.003, 0.006, 240)
+        self.expecting = SimpleNamespace(share=1.0)
         cameras = (SimpleNamespace(name="front", world_from_camera=np.eye(4), yfov=0.7),)
         self.scene = SimpleNamespace(materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras)
         self.unedited = self.scene

@@ -21,6 +21,10 @@ MEANINGS = {
     "split": "The solution left of the line, the reference right of it; drag the line: V",
     "error": "How far the irradiance of each texel is from the reference, over the reference: X",
 }
+EXPECTED = (
+    "Of irradiance, with no reference: what random points of the surfaces receive of all that they see now, gathered by "
+    "hemicubes, against what the texels have there"
+)
 FINER = (
     "The scene as it is now is solved once more, with more texels and further, in a process of its own. That shows what texels, "
     "patches and unshot light cost; an error of the method itself is in both."
@@ -30,6 +34,8 @@ FINER = (
 def draw(session: Session, state: State) -> None:
     """The whole panel."""
     comparison = session.comparison
+    if widgets.fold("Expected error"):
+        _expected(session)
     if comparison is None:
         widgets.wrapped("A reference is a bake of this scene, or a finer solve of it.", theme.DIM)
     else:
@@ -75,6 +81,18 @@ def _views(session: Session, state: State) -> None:
             show(session, state, view)
         imgui.pop_style_color()
         widgets.tooltip(MEANINGS[view])
+
+
+def _expected(session: Session) -> None:
+    """What the solution says of itself, once light is at rest."""
+    error = session.expected
+    if error is not None:
+        widgets.facts("expected", [("RMS", widgets.percent(error.rms)), ("Median", widgets.percent(error.median))])
+    elif session.shooting_goes_on or not 0 < session.expecting.share < 1:
+        widgets.dim("known when shooting pauses or ends")
+    else:
+        imgui.progress_bar(session.expecting.share, imgui.ImVec2(-1, 0), "")
+    widgets.tooltip(EXPECTED)
 
 
 def _error(session: Session, comparison: Comparison) -> None:
