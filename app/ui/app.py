@@ -113,6 +113,7 @@ class Ui:
             bool(state.toasts)
             or state.flight is not None
             or state.drag_button >= 0
+            or state.flying
             or self._dialog.waiting
             or self._bakes.waiting
         )
@@ -121,7 +122,8 @@ class Ui:
     def held(self) -> bool:
         """Whether a hand is at a control or moves the view."""
         self.use()
-        return bool(imgui.is_any_item_active()) or self.state.drag_button >= 0 or self.state.split_held
+        state = self.state
+        return bool(imgui.is_any_item_active()) or state.drag_button >= 0 or state.split_held or state.flying
 
     def take_requests(self) -> list[Request]:
         """What the host has to do, once."""

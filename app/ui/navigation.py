@@ -56,8 +56,7 @@ def navigate(session: Session, state: State, seconds: float) -> None:
         _drag(session, state, x, y, height)
     if inside and io.mouse_wheel:
         session.view.dolly(DOLLY_PER_NOTCH**io.mouse_wheel)
-    if not io.want_text_input:
-        _fly(session, state, io, seconds)
+    state.flying = not io.want_text_input and _fly(session, state, io, seconds)
     _advance_flight(session, state, seconds)
     _refresh(session, state, seconds)
     _marker(session, state)
@@ -77,12 +76,14 @@ def _drag(session: Session, state: State, x: float, y: float, height: float) -> 
         session.view.pan(-io.mouse_delta.x / height, io.mouse_delta.y / height)
 
 
-def _fly(session: Session, state: State, io: Any, seconds: float) -> None:
+def _fly(session: Session, state: State, io: Any, seconds: float) -> bool:
+    """Whether a key of flight is held."""
     step = [float(imgui.is_key_down(plus)) - float(imgui.is_key_down(minus)) for plus, minus in FLY]
     if any(step):
         state.flight = None
         pace = FLY_SPEED * session.lightmap.frame.scale * (FAST if io.key_shift else SLOW if io.key_ctrl else 1.0)
         session.view.fly(*(s * pace * seconds for s in step))
+    return any(step)
 
 
 def focus(session: Session, state: State) -> None:

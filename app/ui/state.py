@@ -96,6 +96,7 @@ class State:
     inset_age: float = 0.0
     drag_button: int = -1
     split_held: bool = False
+    flying: bool = False
     compared: bool = False
     flight: Flight | None = None
     material: int = 0

@@ -144,6 +144,15 @@ def test_a_hand_holds_from_press_to_release(
     assert not desk.ui.held
 
 
+def test_a_key_of_flight_holds_the_view(desk: Desk) -> None:
+    desk.ui.io.add_key_event(imgui.Key.w, True)
+    desk.frames(2)
+    assert desk.ui.held and desk.ui.moving
+    desk.ui.io.add_key_event(imgui.Key.w, False)
+    desk.frames(2)
+    assert not desk.ui.held and not desk.ui.moving
+
+
 def test_an_error_becomes_a_toast(gpu: Gpu, where: dict[str, tuple[float, float]]) -> None:
     desk = Desk(gpu, FakeSession(), (1920, 1080))
 
