@@ -9,6 +9,7 @@ from app.gathering.expected import Expectation, ExpectedError
 from app.gpu import Gpu
 from app.scene.model import F64
 
+SECONDS = 10.0  # that are spent on it, unless fewer points would be too few
 AT_ONCE = 2  # points per part: 30 ms on a software rasteriser
 
 
@@ -37,7 +38,7 @@ class Expecting:
             self.changed()
             if self._expectation is None:
                 self._expectation = Expectation(self._gpu, lightmap, AT_ONCE)
-            self._of, self._parts = state, self._expectation.parts(returned)
+            self._of, self._parts = state, self._expectation.parts(returned, SECONDS)
         elif self._parts is not None:
             try:
                 self.share = next(self._parts)

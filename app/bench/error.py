@@ -75,6 +75,7 @@ NOTES = (
 )
 
 
+SECONDS = 5.0  # for the expected error, unless fewer points would be too few
 AT_ONCE = 8  # points that the expected error is gathered at
 STATED = 4  # looks from one at which it is to the next
 JUDGED = 1.5  # times the reference's noise, from where on an RMS says something
@@ -230,7 +231,7 @@ def _curve(gpu: Gpu, one: SceneCurves, truth: Truth, name: str, plan: Plan) -> l
         expectation, looks = Expectation(gpu, lightmap, AT_ONCE), itertools.count()
 
         def expected() -> Row:
-            error = whole(expectation.parts(solver.books().returned))
+            error = whole(expectation.parts(solver.books().returned, SECONDS))
             return {} if error is None else {"expected": error.rms}
 
         def look() -> Row:

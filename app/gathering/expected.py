@@ -9,6 +9,7 @@ e₁ and e₂ are of two hemicubes above each point, turned at random: what thei
 
 from __future__ import annotations
 
+import time
 from collections.abc import Generator
 from typing import NamedTuple
 
@@ -23,6 +24,7 @@ from app.metrics import bias, lit_points, median_local
 from app.scene.model import F64
 
 POINTS, SEED = 256, 7
+FEWEST = 64  # points that are enough where they take long
 TURNS = 2  # hemicubes above each point
 LEAST_LOST = 1e-3  # of light that leaves surfaces: below, what comes back would be noise many times over
 
@@ -46,11 +48,14 @@ class Expectation:
         self._probe, self._gather = Probe(gpu, lightmap, points), Gather(gpu, lightmap, TURNS * at_once)
         self._at_once = at_once
 
-    def parts(self, returned: F64) -> Generator[float, None, ExpectedError | None]:
-        """Look, some points in each part; yields the share done. returned: s, RGB. None where no point is lit."""
+    def parts(self, returned: F64, seconds: float) -> Generator[float, None, ExpectedError | None]:
+        """Look, some points in each part; yields the share done. returned: s, RGB. After so many seconds FEWEST points are
+        enough. None where no point is lit."""
         solution, read = self._probe.look(), []
-        looked = None
+        looked, end = None, time.perf_counter() + seconds
         for first in range(0, POINTS, self._at_once):
+            if first >= FEWEST and time.perf_counter() > end:
+                break
             now = slice(first, first + self._at_once)
             position, normal = (np.repeat(x[now], TURNS, axis=0) for x in (self._position, self._normal))
             before, looked = looked, self._gather.look(position, normal, self._turn[now].ravel())
@@ -59,8 +64,8 @@ class Expectation:
             yield min(first + self._at_once, POINTS) / POINTS
         assert looked is not None
         read.append(self._gather.irradiance(looked))
-        gathered = np.concatenate(read)[: TURNS * POINTS].reshape(POINTS, TURNS, 3)
-        return expected_error(self._probe.irradiance(solution), gathered, returned)
+        gathered = np.concatenate(read).reshape(-1, TURNS, 3)[:POINTS]
+        return expected_error(self._probe.irradiance(solution)[: len(gathered)], gathered, returned)
 
     def release(self) -> None:
         self._probe.release()

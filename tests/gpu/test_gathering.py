@@ -16,7 +16,7 @@ from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
 from app.atlas.points import random_points
 from app.bench.points import irradiance_of
-from app.gathering.expected import POINTS, TURNS, Expectation, expected_error
+from app.gathering.expected import FEWEST, POINTS, TURNS, Expectation, expected_error
 from app.gathering.gather import Gather, tangents
 from app.gpu import Gpu
 from app.metrics import bias, lit_points, relative_rms
@@ -134,6 +134,16 @@ def test_nothing_is_expected_of_the_dark_or_the_broken(broken: float) -> None:
     assert expected_error(black + broken, np.ones((9, TURNS, 3)), np.zeros(3)) is None
 
 
+def test_time_that_is_up_leaves_some_points(gpu: Gpu, box: Lightmap) -> None:
+    box.light_target.clear(*[1.0] * 3, 0.0)
+    expectation = Expectation(gpu, box, 8)
+    all_of_them, some = (whole(expectation.parts(np.zeros(3), seconds)) for seconds in (np.inf, 0.0))
+    assert all_of_them is not None and some is not None
+    assert 0 < some.points <= FEWEST < all_of_them.points <= POINTS
+    assert some.rms == pytest.approx(all_of_them.rms, rel=0.5)
+    expectation.release()
+
+
 @pytest.mark.parametrize("residual", [0.3, 0.03])
 def test_a_furnace_knows_what_it_lacks(gpu: Gpu, residual: float) -> None:
     """H = E / (1 - ρ) everywhere: how far off a solve is that stopped early is known exactly."""
@@ -144,7 +154,7 @@ def test_a_furnace_knows_what_it_lacks(gpu: Gpu, residual: float) -> None:
     H = irradiance_of(half.lightmap, points)
     truth = np.full_like(H, 3.0 / (1 - 0.5))
     expectation = Expectation(gpu, half.lightmap, 16)
-    error = whole(expectation.parts(half.book.returned))
+    error = whole(expectation.parts(half.book.returned, np.inf))
     assert error is not None and error.points == POINTS
     # what is unshot is not even: its light that comes back is taken to be
     assert error.rms == pytest.approx(relative_rms(H, truth), rel=0.2)
@@ -165,7 +175,7 @@ def test_shadows_on_coarse_texels_are_expected_to_be_off(gpu: Gpu) -> None:
     errors = []
     for one in (coarse, fine):
         expectation = Expectation(gpu, one.lightmap, 16)
-        error = whole(expectation.parts(one.book.returned))
+        error = whole(expectation.parts(one.book.returned, np.inf))
         assert error is not None
         errors.append(error.rms)
         expectation.release()
