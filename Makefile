@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
+PYTEST := $(BIN)/python -m pytest -n 2 --dist worksteal
 
 .PHONY: run test setup lint
 
@@ -9,8 +10,8 @@ run: $(VENV)/.run
 	$(BIN)/glowtree view
 
 test: $(VENV)/.dev lint
-	$(BIN)/python -m pytest
-	$(BIN)/python -m pytest tests/gpu tests/physics --gl41 -m "not long"
+	$(PYTEST)
+	$(PYTEST) tests/gpu tests/physics --gl41 -m "not long"
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

@@ -45,6 +45,7 @@ class ReportingSession(Session):
                 "frame": self.frame,
                 "name": self.name,
                 "running": self.running,
+                "at_rest": self.at_rest,
                 "shots": self.solver.shots if self.opened else 0,
                 "exposure": self.display.exposure,
                 "message": self.message,
