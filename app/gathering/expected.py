@@ -4,7 +4,8 @@
     e = d + s d̄ / (1 - s)            what B lacks comes from everywhere: of light that leaves surfaces a share s comes back
     relative RMS = √(mean e₁e₂) / mean (H + e)
 
-e₁ and e₂ are of two hemicubes above each point, turned at random: what their samples get wrong cancels in the mean.
+e₁ and e₂ are of two hemicubes above each point, turned at random: what their samples get wrong cancels in the mean. Few bright
+points may hold most of the error, so more points lie where light is: means are weighted with 1 / p, p ∝ 1 + H / H̄.
 """
 
 from __future__ import annotations
@@ -14,16 +15,17 @@ from collections.abc import Generator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.atlas.lightmap import Lightmap
 from app.atlas.points import random_points
 from app.compare.probe import Probe
 from app.gathering.gather import Gather
 from app.gpu import Gpu
-from app.metrics import bias, lit_points, median_local
+from app.metrics import DARK, local_errors
 from app.scene.model import F64
 
-POINTS, SEED = 256, 7
+CANDIDATES, POINTS, SEED = 4096, 256, 7  # points that are even in area, and those of them that are looked from
 FEWEST = 64  # points that are enough where they take long
 TURNS = 2  # hemicubes above each point
 LEAST_LOST = 1e-3  # of light that leaves surfaces: below, what comes back would be noise many times over
@@ -42,47 +44,68 @@ class Expectation:
     """Of one lightmap, ``at_once`` points at a time. Whoever makes it releases it."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, at_once: int) -> None:
-        points = random_points(lightmap.scene, POINTS, SEED)
+        points = random_points(lightmap.scene, CANDIDATES, SEED)
         self._position, self._normal = points.positions_normals(lightmap.scene)
-        self._turn = np.random.default_rng(SEED).uniform(0, 2 * np.pi, (POINTS, TURNS))
         self._probe, self._gather = Probe(gpu, lightmap, points), Gather(gpu, lightmap, TURNS * at_once)
         self._at_once = at_once
 
     def parts(self, returned: F64, seconds: float) -> Generator[float, None, ExpectedError | None]:
         """Look, some points in each part; yields the share done. returned: s, RGB. After so many seconds FEWEST points are
         enough. None where no point is lit."""
-        solution, read = self._probe.look(), []
-        looked, end = None, time.perf_counter() + seconds
+        random, end, read = np.random.default_rng(SEED), time.perf_counter() + seconds, []
+        looked = self._probe.look()
+        yield 0.0
+        solution = self._probe.irradiance(looked)
+        chosen, weights = choose(solution, random)
+        turn = random.uniform(0, 2 * np.pi, (POINTS, TURNS))
+        position, normal = (np.repeat(x[chosen], TURNS, axis=0) for x in (self._position, self._normal))
+        before = None
         for first in range(0, POINTS, self._at_once):
             if first >= FEWEST and time.perf_counter() > end:
                 break
-            now = slice(first, first + self._at_once)
-            position, normal = (np.repeat(x[now], TURNS, axis=0) for x in (self._position, self._normal))
-            before, looked = looked, self._gather.look(position, normal, self._turn[now].ravel())
+            now = slice(TURNS * first, TURNS * (first + self._at_once))
+            looked = self._gather.look(position[now], normal[now], turn.ravel()[now])
             if before is not None:  # one part late: nothing waits
                 read.append(self._gather.irradiance(before))
+            before = looked
             yield min(first + self._at_once, POINTS) / POINTS
-        assert looked is not None
-        read.append(self._gather.irradiance(looked))
+        assert before is not None
+        read.append(self._gather.irradiance(before))
         gathered = np.concatenate(read).reshape(-1, TURNS, 3)[:POINTS]
-        return expected_error(self._probe.irradiance(solution)[: len(gathered)], gathered, returned)
+        count = len(gathered)
+        return expected_error(solution[chosen][:count], gathered, weights[:count], returned)
 
     def release(self) -> None:
         self._probe.release()
         self._gather.release()
 
 
-def expected_error(solution: F64, gathered: F64, returned: F64) -> ExpectedError | None:
-    """Of irradiance (n, 3) that was gathered at the same points as (n, 2, 3). None where no point is lit, or the light is not
-    finite."""
+def choose(solution: F64, random: np.random.Generator) -> tuple[NDArray[np.int64], F64]:
+    """POINTS of the candidates by their irradiance (n, 3), and the weight of each (POINTS,) in means."""
+    light = np.maximum(np.nan_to_num(solution).mean(1), 0.0)
+    wanted = 1.0 + light / max(float(light.mean()), 1e-300)
+    chosen = random.choice(len(solution), POINTS, p=wanted / wanted.sum())
+    return chosen, np.asarray(1.0 / wanted[chosen])
+
+
+def expected_error(solution: F64, gathered: F64, weights: F64, returned: F64) -> ExpectedError | None:
+    """Of irradiance (n, 3) that was gathered at the same points as (n, 2, 3), with weights (n,). None where no point is lit, or
+    the light is not finite."""
     if not np.isfinite(solution).all() or not np.isfinite(gathered).all():
         return None
+    share = weights / weights.sum()
     lacking = gathered - solution[:, None]
-    comes_back = returned / np.maximum(1 - returned, LEAST_LOST) * lacking.mean((0, 1))
+    comes_back = returned / np.maximum(1 - returned, LEAST_LOST) * (share @ lacking.mean(1))
     truth = gathered.mean(1) + comes_back
-    if not truth.mean() > 0:
+    if not share @ truth.mean(1) > 0:
         return None
-    lit = lit_points(truth)
+    lit = truth.mean(1) > DARK * (share @ truth.mean(1))
+    share = share[lit] / share[lit].sum()
     first, second = (lacking[lit] + comes_back).transpose(1, 0, 2)
-    rms = float(np.sqrt(max((first * second).mean(), 0.0)) / truth[lit].mean())
-    return ExpectedError(rms, bias(solution[lit], truth[lit]), median_local(solution[lit], truth[lit]), int(lit.sum()))
+    mean = float(share @ truth[lit].mean(1))
+    rms = float(np.sqrt(max(share @ (first * second).mean(1), 0.0))) / mean
+    off = float(share @ (solution[lit] - truth[lit]).mean(1)) / mean
+    local = local_errors(solution[lit], truth[lit])
+    order = np.argsort(local)
+    median = float(local[order][np.searchsorted(np.cumsum(share[order]), 0.5)])
+    return ExpectedError(rms, off, median, int(lit.sum()))
