@@ -31,15 +31,18 @@ def reference() -> Truth:
     return dense_truth(load_scene(SCENE), count=POINTS)
 
 
-def error_row(gpu: Gpu, atlas: AtlasOptions) -> Row:
-    """Error, texels, shots and seconds of a solve, however long it takes."""
-    truth = reference()
-    with opened(gpu, SCENE, atlas, ShootingOptions(residual=CONVERGED)) as (lightmap, solver):
+def error_row(gpu: Gpu, atlas: AtlasOptions, gradient: float | None = None) -> Row:
+    """Error, texels, shots and seconds of a solve, however long it takes. gradient: of quadtrees."""
+    truth, options = reference(), ShootingOptions(residual=CONVERGED)
+    if gradient is not None:
+        options = options.replace(gradient=gradient)
+    with opened(gpu, SCENE, atlas, options) as (lightmap, solver):
         run = shoot(gpu, solver, np.inf)
         E = irradiance_of(lightmap, truth.points)
         texels = lightmap.texel_count
-    row: Row = {"subdivision": "adaptive" if atlas.adaptive else "uniform", "tile": atlas.tile, "texels": texels}
+    row: Row = {"subdivision": "adaptive" if atlas.adaptive else "uniform", "tile": atlas.tile, "gradient": gradient}
     row |= {
+        "texels": texels,
         "shots": run.shots,
         "seconds": run.seconds,
         "rms": relative_rms(E, truth.E),

@@ -27,7 +27,8 @@ TRIANGLES = (1_000, 3_000, 10_000, 30_000, 100_000, 300_000)
 TEXELS = (10_000, 30_000, 100_000, 300_000, 1_000_000, 4_000_000)
 AT_TEXELS, AT_TRIANGLES = 100_000, 10_000  # of the sweep over the other
 CONVERGENCE = ("museum", 31_000)
-EQUAL_TEXELS, EQUAL_TILES = (8_000, 32_000, 128_000, 256_000), (16, 8)  # uniform texels; adaptive leaves
+EQUAL_TEXELS = 8_000, 32_000, 128_000, 256_000  # uniform ones
+EQUAL_TREES = (16, 0.5), (8, 0.5), (8, 0.25)  # texels along a leaf, gradient
 Measure = Callable[[Gpu, float], Row]
 
 
@@ -204,8 +205,8 @@ def _coombe_1() -> Table:
 
 
 def _equal() -> Table:
-    def job(label: str, atlas: AtlasOptions) -> tuple[str, Measure]:
-        return label, lambda gpu, _: equal.error_row(gpu, atlas)
+    def job(label: str, atlas: AtlasOptions, gradient: float | None = None) -> tuple[str, Measure]:
+        return label, lambda gpu, _: equal.error_row(gpu, atlas, gradient)
 
     return Table(
         "equal",
@@ -219,6 +220,7 @@ def _equal() -> Table:
         (
             Column("subdivision", "subdivision"),
             Column("tile", "tile"),
+            Column("gradient", "gradient", ".2f"),
             Column("texels", "texels", ","),
             Column("shots", "shots", ","),
             Column("seconds", "s", ".1f"),
@@ -232,7 +234,10 @@ def _equal() -> Table:
         ),
         (
             *(job(f"{texels:,} uniform texels", AtlasOptions(texels=texels)) for texels in EQUAL_TEXELS),
-            *(job(f"leaves of {tile}", AtlasOptions(adaptive=True, tile=tile)) for tile in EQUAL_TILES),
+            *(
+                job(f"leaves of {tile}, gradient {gradient:g}", AtlasOptions(adaptive=True, tile=tile), gradient)
+                for tile, gradient in EQUAL_TREES
+            ),
         ),
         Plot("seconds", ("rms",), "subdivision", ("s", "relative RMS")),
         equal.compared,
