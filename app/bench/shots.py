@@ -2,7 +2,8 @@
 
 The Cornell box is cut three times, then a museum and a grotto of the paper's sizes. A shot is timed alone, as the viewer shoots,
 and in batches, as the headless solver does (means over the shots made); the passes of a batch one by one, each to the end of its
-GPU work, for the shooters that the solve chooses (medians, divided by the shots of a batch). What bounds them is measured beside
+GPU work, for the shooters that the solve chooses (medians, divided by the shots of a batch). Audits, of the first strong shots of
+a solve only, are timed by themselves. What bounds them is measured beside
 them, in turns: the bytes that they must move (stream.py) against a plain copy, and the receiver pass without its arithmetic.
 """
 
@@ -11,7 +12,7 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
 from app.atlas.lightmap import Lightmap
@@ -24,6 +25,7 @@ from app.gpu import Gpu, gpu_context
 from app.loading import load
 from app.options import from_flags
 from app.solvers import ShootingOptions, Solver, UniformShooting
+from app.solvers.shooting.shot import AuditTargets
 from app.solvers.shooting.stages import BATCH
 
 SIZES = (
@@ -50,7 +52,10 @@ BOUNDS = (
     Column("stream_ms", "ms, reads and blends", ".2f"),
     Column("bound", "bound by"),
 )
-NOTE = f"Milliseconds per shot, and of each pass per shot of a batch of {BATCH}."
+NOTE = (
+    f"Milliseconds per shot, and of each pass per shot of a batch of {BATCH}. Audit: of one shot that is tried before it is "
+    "made, which the first, strong ones of a solve are; the shots here are not."
+)
 BOUNDS_NOTE = (
     "What bounds a shot of a batch: the megabytes that all its passes must move at least, at what rate they do, and its share of "
     "a copy's in the same run. Then the receiver pass by itself; beside its time that of a copy of as many bytes, and of the "
@@ -58,6 +63,19 @@ BOUNDS_NOTE = (
     "copy's rate; by arithmetic where leaving it out saves half of the time or more; by fragments where reads and blends do not "
     "reach half of the copy's rate by themselves, so that memory waits for the renderer; else by several of them."
 )
+
+
+class Unaudited(UniformShooting):
+    """As later in a solve, when shots are no longer strong enough to be tried before they are made."""
+
+    def _fails(self, shots: int) -> Generator[None, None, bool]:
+        yield from ()
+        return False
+
+    def try_one(self) -> None:
+        """An audit of the first of the batch."""
+        with AuditTargets(self.gpu, self.lightmap) as targets:
+            self._hand_out(targets, 0, 1.0)
 
 
 def bench_shots(flags: argparse.Namespace) -> int:
@@ -77,14 +95,15 @@ def bench_shots(flags: argparse.Namespace) -> int:
 def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions) -> dict[str, Any]:
     nodes = load(name, AtlasOptions(texels=texels)).nodes
     lightmap = Lightmap(gpu, nodes, storage=options.storage)
-    solver = UniformShooting(gpu, lightmap, options)
+    solver = Unaudited(gpu, lightmap, options)
     ms_per_shot(gpu, solver, 1, WARM_UP)
     single_ms = ms_per_shot(gpu, solver, 1, SECONDS)
     ms_per_shot(gpu, solver, BATCH, WARM_UP)
     shot_ms = ms_per_shot(gpu, solver, BATCH, SECONDS)
     stream, copy = Stream(gpu, solver), Copy(gpu, lightmap.size)
-    times = passes_ms(gpu, solver, SECONDS, {"stream": stream.run, "copy": copy.run})
-    stream_ms, copy_ms = times.pop("stream"), times.pop("copy")
+    beside = {"stream": stream.run, "copy": copy.run, "audit": solver.try_one}
+    times = passes_ms(gpu, solver, SECONDS, beside)
+    stream_ms, copy_ms, audit_ms = (times.pop(name) for name in beside)
     row = {
         "scene": name,
         "triangles": len(nodes.scene.triangles),
@@ -92,6 +111,7 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions) -> dict
         "shot_ms": shot_ms,
         "single_shot_ms": single_ms,
         "pass_ms": times,
+        "audit_ms": audit_ms * BATCH,
     }
     row |= bounds(times, stream.moved(), stream_ms, copy.moved / (BATCH * copy_ms * 1e-3))
     copy.release()
@@ -162,10 +182,11 @@ def bounds(pass_ms: Mapping[str, float], moved: Mapping[str, float], stream_ms: 
 def _table(values: dict[str, Any]) -> str:
     """Markdown."""
     labels = list(values["sizes"][0]["pass_ms"])
-    head = ["scene", "triangles", "texels", f"shot, of {BATCH}", "shot, alone", *labels]
+    head = ["scene", "triangles", "texels", f"shot, of {BATCH}", "shot, alone", *labels, "audit"]
     lines = []
     for row in values["sizes"]:
         numbers = [row["shot_ms"], row["single_shot_ms"], *(row["pass_ms"][label] for label in labels)]
+        numbers.append(row["audit_ms"])
         lines.append([row["scene"], f"{row['triangles']:,}", f"{row['texels']:,}", *(f"{n:.2f}" for n in numbers)])
     parts = [values["renderer"], NOTE, markdown(head, lines), BOUNDS_NOTE, markdown_table(BOUNDS, values["sizes"])]
     return "\n\n".join(parts)
