@@ -322,8 +322,10 @@ def _plot(folder: Path, values: dict[str, Any], scenes: Iterable[SceneCurves], c
         assert one.truth is not None
         texels = "" if one.texels is None else f", {one.texels:,} uniform texels"
         title = f"{one.name}{texels}\n{values['renderer']}; {processor()}, {os.cpu_count()} cores"
-        curves = {_label(name, rows, one.texels): rows for name, rows in one.curves.items()}
-        draw_curves(folder / f"{one.file}.png", title, curves, tuple(PEERS), one.truth.noise)
+        labels = {name: _label(name, rows, one.texels) for name, rows in one.curves.items()}
+        curves = {labels[name]: rows for name, rows in one.curves.items()}
+        peers = tuple(label for name, label in labels.items() if name in PEERS)
+        draw_curves(folder / f"{one.file}.png", title, curves, peers, one.truth.noise)
 
 
 def _label(name: str, rows: list[Row], texels: int | None) -> str:

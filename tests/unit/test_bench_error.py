@@ -12,6 +12,7 @@ import textwrap
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from solver_scenes import grey, quads_scene, room
 
 from app.atlas.options import AtlasOptions
 from app.atlas.points import random_points
-from app.bench import curve, truth
+from app.bench import curve, error, truth
 from app.bench.error import TITLE
 from app.bench.measure import opened, warm_up
 from app.bench.methods import DEFAULT_METHODS, METHODS, method_names
@@ -28,6 +29,7 @@ from app.bench.peers import PEERS
 from app.bench.report import FLIP, missing
 from app.bench.truth import Truth
 from app.cli import ERROR_SCENES, build_parser, run
+from app.console import Console
 from app.gpu import Gpu
 from app.options import specs
 from app.scene.load import load_scene
@@ -298,6 +300,19 @@ def test_a_plot_has_a_line_for_each_curve(tmp_path: Path, monkeypatch: pytest.Mo
     assert by_time.get_xscale() == by_time.get_yscale() == by_shots.get_xscale() == "log"
 
 
+def test_a_peer_with_texels_of_its_own_is_drawn_as_a_peer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plots = pytest.importorskip("app.bench.plots", reason="of the extra bench", exc_type=ImportError)
+    drawn: list[Any] = []
+    monkeypatch.setattr(plots, "draw_curves", lambda *values: drawn.append(values))
+    one: Any = error.SceneCurves("a", "a", quads_scene(room(), (grey(0.5, 1.0),)), "closed-form")
+    one.truth = SimpleNamespace(noise=None)
+    one.curves = {"uniform": [{"texels": 10}], "adaptive": [{"texels": 7}], "cycles": [{"texels": 9}], "mitsuba": [{}]}
+    error._plot(tmp_path, {"renderer": "r"}, [one], Console())
+    ((_, _, curves, peers, _),) = drawn
+    assert list(curves) == ["uniform", "adaptive, 7 texels", "cycles, 9 texels", "mitsuba"]
+    assert peers == ("cycles, 9 texels", "mitsuba")
+
+
 def test_mitsuba_beside_us(tmp_path: Path) -> None:
     if (reason := truth.no_tracer()) is not None:
         pytest.skip(reason)
@@ -312,7 +327,6 @@ def test_mitsuba_beside_us(tmp_path: Path) -> None:
 def test_ctrl_c_keeps_finished_curves(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    from app.bench import error
 
     measured = error.solve_curve
 
