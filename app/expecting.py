@@ -10,7 +10,10 @@ from app.gpu import Gpu
 from app.scene.model import F64
 
 SECONDS = 10.0  # that are spent on it, unless fewer points would be too few
-AT_ONCE = 2  # points per part: 30 ms on a software rasteriser
+MAPS, MANY = (
+    4,
+    20_000,
+)  # hemicubes per part, one where a scene has so many triangles: 30 ms of a Cornell box in software
 
 
 class Expecting:
@@ -37,7 +40,9 @@ class Expecting:
         if self._of != state:
             self.changed()
             if self._expectation is None:
-                self._expectation = Expectation(self._gpu, lightmap, AT_ONCE)
+                self._expectation = Expectation(
+                    self._gpu, lightmap, MAPS if len(lightmap.scene.triangles) < MANY else 1
+                )
             self._of, self._parts = state, self._expectation.parts(returned, SECONDS)
         elif self._parts is not None:
             try:
@@ -47,6 +52,8 @@ class Expecting:
 
     def changed(self) -> None:
         """The light is another one."""
+        if self._parts is not None:
+            self._parts.close()
         self._of, self._parts, self.error, self.share = None, None, None, 0.0
 
     def forget(self) -> None:

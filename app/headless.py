@@ -70,8 +70,7 @@ def bake(flags: argparse.Namespace) -> int:
         session = Session(gpu, **session_options(flags))
         _open(session, flags.scene, console)
         failure = _solve(session, flags, console)
-        if failure is None and not session.interrupted:
-            _expect(session, console)
+        whole = failure is not None or session.interrupted or _expect(session, console)
         clock = time.perf_counter()
         lightmap = session.lightmap
         irradiance, covered = collapse(lightmap.nodes, lightmap.irradiance())
@@ -86,7 +85,7 @@ def bake(flags: argparse.Namespace) -> int:
         raise UserError(f"{failure}; {flags.output} has the light of all texels but {lost}")
     result = {"output": [str(path) for path in vars(files).values()], **result}
     console.result(result, f"{flags.output}: {_summary(result)}")
-    return 130 if result["interrupted"] else 0
+    return 130 if result["interrupted"] or not whole else 0
 
 
 def view_or_shot(flags: argparse.Namespace) -> int:
@@ -262,15 +261,17 @@ def _solve(session: Session, flags: argparse.Namespace, console: Console) -> Not
     return None
 
 
-def _expect(session: Session, console: Console) -> None:
-    """Work out how far off the light is expected to be. Ctrl-C goes without, and is noted."""
+def _expect(session: Session, console: Console) -> bool:
+    """Work out how far off the light is expected to be. False where Ctrl-C goes without."""
     clock = time.perf_counter()
     try:
         with console.progress("gathering") as tell:
             session.expect(lambda share: tell("the error that is expected", share))
     except KeyboardInterrupt:
-        session.interrupted = True
+        console.warn("stopped: nothing is said of the error that is expected")
+        return False
     session.load_seconds["expected error"] = time.perf_counter() - clock
+    return True
 
 
 def _choose_camera(session: Session, name: str | None) -> None:

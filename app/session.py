@@ -87,8 +87,9 @@ class Session(Comparing):
             raise UserError(f"{self.loading.name} is loading: cut {self.name} anew before or after that")
         self._opening.begin(Loading(self.unedited, atlas))
 
-    def poll(self) -> None:
-        """Once per frame: hear from the GPU, and swap in a scene that has finished loading, a part of it per frame."""
+    def poll(self, *, brisk: bool = False) -> None:
+        """Once per frame: hear from the GPU, and swap in a scene that has finished loading, a part of it per frame. brisk: a hand
+        is at the controls, what can wait does."""
         self._busy = False
         if self.loading is not None and (self.loading.ended or self.loading.cancelled):
             self._busy = True
@@ -97,7 +98,7 @@ class Session(Comparing):
             self.hear()
         if self._opened:
             self._compare()
-            if self._resting and not self._busy:
+            if self._quiet and not self._busy and not brisk:
                 self._expect()
 
     def _open_part(self, loading: Loading) -> None:
@@ -190,11 +191,13 @@ class Session(Comparing):
     @property
     def at_rest(self) -> bool:
         """Whether nothing changes by itself: neither light nor numbers, and no scene is on its way."""
-        return self._resting and (not self._can_expect or self.expecting.knows(self._light))
+        known = not self._can_expect or self.expecting.knows(self._light)
+        return self._quiet and known and not self.comparing
 
     @property
-    def _resting(self) -> bool:
-        return self.loading is None and not self.shooting_goes_on and self._settled and not self.comparing
+    def _quiet(self) -> bool:
+        """Whether the light stays as it is by itself, and no other scene is on its way."""
+        return self.loading is None and not self.shooting_goes_on and self._settled
 
     def advance(self, *, budget_ms: float, shots: int = 1, brisk: bool = False) -> int:
         """Make up to ``shots`` shots within ``budget_ms``; returns how many. None when paused or converged, nor in a frame that
@@ -202,6 +205,7 @@ class Session(Comparing):
         if not self._opened or self._busy or not self.shooting_goes_on:
             return 0
         self._settled = False
+        self.expecting.changed()
         made = self._pace.advance(self.solver, budget_ms, shots, brisk=brisk)
         self.seconds += self._pace.lap()
         return made
@@ -209,6 +213,7 @@ class Session(Comparing):
     def shoot(self, shots: int = 1) -> int:
         """Up to ``shots`` shots, of one batch at most, also when paused or converged; how many."""
         self._settled = False
+        self.expecting.changed()
         return self.solver.step(shots)
 
     def solve(self, stop: Stop, progress: Callable[[Stats], None] | None = None) -> None:
@@ -264,7 +269,7 @@ class Session(Comparing):
 
     @property
     def expected(self) -> ExpectedError | None:
-        """How far off the light is expected to be, if that is known; see ``expecting`` for how far it is."""
+        """How far off the light is expected to be: None as long as it is not known, see ``expecting``, or nothing is lit."""
         return self.expecting.error if self._opened and self.expecting.knows(self._light) else None
 
     def expect(self, progress: Callable[[float], None]) -> None:
@@ -290,6 +295,7 @@ class Session(Comparing):
     def _begin(self) -> None:
         self.seconds, self._settled = 0.0, True
         self.effort.begin()
+        self.expecting.changed()
         self._pace.begin()
         self.gpu.timers.reset()
         self.history = History()

@@ -220,7 +220,7 @@ class ViewerWindow(WindowConfig):
         """Collect what is ready, shoot within the budget, draw, do what was asked for."""
         session, state, look = self._session, self._ui.state, True
         try:
-            session.poll()
+            session.poll(brisk=self._ui.held)
             shoot, look = self._turns.next(frame_time) if session.shooting_goes_on else (False, True)
             if shoot:
                 pace = state.pace

@@ -186,7 +186,7 @@ class NodeSet:
 
     @functools.cached_property
     def drawn(self) -> DrawnTriangles:
-        """The triangles for pictures: no bake needs them."""
+        """The triangles as they are seen: for pictures, and from points."""
         return drawn_triangles(self.scene, self.charts, self.frame.local_from_world(self.scene.positions))
 
     @functools.cached_property

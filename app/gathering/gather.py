@@ -17,8 +17,6 @@ from app.scene.model import F64
 RESOLUTION = 128  # px, along a hemicube's edge
 BLOCK = 16  # px, added up at once
 VIEWS = 5
-COPLANAR = 2e-6  # see common/item.glsl
-OFF = 2 * COPLANAR  # solver frame: so far off its own surface a point sees from
 
 
 class Gather:
@@ -35,7 +33,7 @@ class Gather:
         self._sample_target = gpu.target(self._samples, depth=self._depth)
         self._sum_target = gpu.target(self._sums)
         defines = lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
-        self._gather = Pass(gpu, "gathering/gather", defines=defines | {"RESOLUTION": RESOLUTION})
+        self._gather = Pass(gpu, "gathering/gather", defines=defines | {"RESOLUTION": RESOLUTION, "VIEWS": VIEWS})
         self._add = Pass(gpu, "gathering/add", defines={"BLOCK": BLOCK})
 
     def look(self, position: F64, normal: F64, turn: F64) -> ReadBack:
@@ -43,7 +41,7 @@ class Gather:
         hemicube about its normal; n at most ``maps``."""
         lightmap, count = self._lightmap, len(position)
         rows = np.zeros((self.maps, 3, 4), np.float32)
-        rows[:count, 0, :3] = lightmap.frame.local_from_world(position) + OFF * normal
+        rows[:count, 0, :3] = lightmap.frame.local_from_world(position)
         rows[:count, 1, :3] = tangents(normal, turn)
         rows[:count, 2, :3] = normal
         self._points.write(rows.tobytes())

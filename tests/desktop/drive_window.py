@@ -37,8 +37,8 @@ class ReportingSession(Session):
         self.places: dict[str, tuple[float, float]] = {}
         self.picked: str | None = None
 
-    def poll(self) -> None:
-        super().poll()
+    def poll(self, *, brisk: bool = False) -> None:
+        super().poll(brisk=brisk)
         self.frame += 1
         if self.frame % EVERY == 0:
             state = {

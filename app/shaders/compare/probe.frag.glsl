@@ -1,6 +1,5 @@
 // Irradiance at points of the atlas, one per pixel, bilinear. Texels that cover nothing repeat their nearest neighbour, as in a bake.
-#include "common/pages.glsl"
-#include "common/tile.glsl"
+#include "common/texel_at.glsl"
 uniform sampler2D t_points;  // uv [texels of level 0]
 uniform sampler2D t_position_area;
 uniform sampler2D t_irradiance;
@@ -13,10 +12,8 @@ const vec2 NEIGHBOURS[9] = vec2[](
     vec2(0, 0), vec2(0, -1), vec2(-1, 0), vec2(1, 0), vec2(0, 1), vec2(-1, -1), vec2(1, -1), vec2(-1, 1), vec2(1, 1));
 
 vec4 texel_at(vec2 uv) {
-    ivec2 slot = slot_at(uv);
-    if (slot.y < 0) return vec4(0.0);
-    vec3 leaf = texelFetch(t_leaves, slot, 0).xyz;
-    ivec2 px = slot * TILE + clamp(ivec2(floor(uv / leaf.z - leaf.xy * float(TILE))), 0, TILE - 1);
+    ivec2 px = texel_px_at(uv);
+    if (px.y < 0) return vec4(0.0);
     bool covered = texelFetch(t_position_area, px, 0).w > 0.0;
     return covered ? vec4(texelFetch(t_irradiance, px, 0).rgb * u_unit, 1.0) : vec4(0.0);
 }

@@ -1,4 +1,5 @@
 // All surfaces from points, each in a random turn about its normal: hemicubes one above the other, all views in one draw.
+#define VIEWS 5
 #include "common/item.glsl"
 #include "projections/hemicube.glsl"
 
@@ -16,12 +17,10 @@ out gl_PerVertex {
 out vec4 v_uv;
 flat out ivec2 v_view;  // view, map
 
-const int VIEWS = 5;
-
 void main() {
     int view = gl_InstanceID % VIEWS, map = gl_InstanceID / VIEWS;
-    vec3 origin = texelFetch(t_points, ivec2(0, map), 0).xyz;
     vec3 x = texelFetch(t_points, ivec2(1, map), 0).xyz, z = texelFetch(t_points, ivec2(2, map), 0).xyz;
+    vec3 origin = texelFetch(t_points, ivec2(0, map), 0).xyz + 2.0 * COPLANAR * z;  // off its own surface
     vec3 v = view_from_local(view, (in_position - origin) * mat3(x, cross(z, x), z));
     vec2 maps_px = MAP_PX * vec2(1.0, float(u_maps));
     vec2 centre_ndc = 2.0 * (view_origin_px(view) + vec2(0.0, float(map) * MAP_PX.y)) / maps_px - 1.0;

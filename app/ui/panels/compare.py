@@ -88,10 +88,12 @@ def _expected(session: Session) -> None:
     error = session.expected
     if error is not None:
         widgets.facts("expected", [("RMS", widgets.percent(error.rms)), ("Median", widgets.percent(error.median))])
-    elif session.shooting_goes_on or not 0 < session.expecting.share < 1:
-        widgets.dim("known when shooting pauses or ends")
-    else:
+    elif session.at_rest:
+        widgets.dim("nothing is lit")
+    elif session.expecting.share > 0:
         imgui.progress_bar(session.expecting.share, imgui.ImVec2(-1, 0), "")
+    else:
+        widgets.dim("known when shooting pauses or ends")
     widgets.tooltip(EXPECTED)
 
 
