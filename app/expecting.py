@@ -10,10 +10,8 @@ from app.gpu import Gpu
 from app.scene.model import F64
 
 SECONDS = 10.0  # that are spent on it, unless fewer points would be too few
-MAPS, MANY = (
-    4,
-    20_000,
-)  # hemicubes per part, one where a scene has so many triangles: 30 ms of a Cornell box in software
+MAPS = 4  # hemicubes per part: 30 ms of a Cornell box in software
+MANY = 20_000  # triangles from which on it is one
 
 
 class Expecting:
@@ -40,9 +38,8 @@ class Expecting:
         if self._of != state:
             self.changed()
             if self._expectation is None:
-                self._expectation = Expectation(
-                    self._gpu, lightmap, MAPS if len(lightmap.scene.triangles) < MANY else 1
-                )
+                maps = MAPS if len(lightmap.scene.triangles) < MANY else 1
+                self._expectation = Expectation(self._gpu, lightmap, maps)
             self._of, self._parts = state, self._expectation.parts(returned, SECONDS)
         elif self._parts is not None:
             try:

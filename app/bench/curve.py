@@ -24,7 +24,7 @@ from app.solvers import ShootingOptions, Solver
 from app.solvers.shooting.stages import BATCH
 
 GROWTH = 2.0**0.25  # of the time from one look to the next
-LEVELS = (0.05, 0.02, 0.01)  # relative RMS that a solve should come down to
+LEVELS = (0.05, 0.04, 0.02, 0.01)  # relative RMS that a solve should come down to
 
 
 class Stopwatch:

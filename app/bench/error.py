@@ -39,6 +39,7 @@ from app.scene.model import Scene
 from app.solvers import ShootingOptions
 
 TITLE = "Error against time"
+CLOCKS = {"seconds": "s", "cpu_seconds": "CPU s"}  # what is read when a curve comes down to a level
 SAMPLES = (
     *(
         Column(key, key)
@@ -62,7 +63,11 @@ SUMMARY = (
     Column("leak", "leak", ".3%"),
     Column("imbalance", "imbalance", "+.2%"),
     Column("flip", "FLIP", ".4f", FLIP),
-    *(Column(f"to_{level:g}", f"s to {level:.0%}", ".2f") for level in LEVELS),
+    *(
+        Column(f"{key}_to_{level:g}", f"{head} to {level:.0%}", ".2f")
+        for key, head in CLOCKS.items()
+        for level in LEVELS
+    ),
 )
 NOTES = (
     "Error of the irradiance at random points of the surfaces. RMS: root mean square over all lit points and colours, over the "
@@ -104,7 +109,9 @@ class SceneCurves:
     def summary(self) -> list[Row]:
         """The end of each curve, and when it had come down to each level."""
         return [
-            rows[-1] | {"method": name} | {f"to_{level:g}": first_at(level, rows) for level in LEVELS}
+            rows[-1]
+            | {"method": name}
+            | {f"{key}_to_{level:g}": first_at(level, rows, key) for key in CLOCKS for level in LEVELS}
             for name, rows in self.curves.items()
         ]
 

@@ -88,7 +88,7 @@ class Expectation:
 
 def choose(solution: F64, random: np.random.Generator) -> tuple[NDArray[np.int64], F64]:
     """POINTS of the candidates by their irradiance (n, 3), and the weight of each (POINTS,) in means."""
-    light = np.maximum(np.nan_to_num(solution).mean(1), 0.0)
+    light = np.maximum(solution.mean(1), 0.0)
     wanted = 1.0 + light / max(float(light.mean()), 1e-300)
     chosen = random.choice(len(solution), POINTS, p=wanted / wanted.sum())
     return chosen, np.asarray(1.0 / wanted[chosen])

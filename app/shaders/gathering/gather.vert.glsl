@@ -1,7 +1,6 @@
 // All surfaces from points, each in a random turn about its normal: hemicubes one above the other, all views in one draw.
 #define VIEWS 5
-#include "common/item.glsl"
-#include "projections/hemicube.glsl"
+#include "projections/hemicube_views.glsl"
 
 uniform sampler2D t_points;  // a row for each map: origin, first axis, normal
 uniform int u_maps;
@@ -22,13 +21,9 @@ void main() {
     vec3 x = texelFetch(t_points, ivec2(1, map), 0).xyz, z = texelFetch(t_points, ivec2(2, map), 0).xyz;
     vec3 origin = texelFetch(t_points, ivec2(0, map), 0).xyz + 2.0 * COPLANAR * z;  // off its own surface
     vec3 v = view_from_local(view, (in_position - origin) * mat3(x, cross(z, x), z));
-    vec2 maps_px = MAP_PX * vec2(1.0, float(u_maps));
-    vec2 centre_ndc = 2.0 * (view_origin_px(view) + vec2(0.0, float(map) * MAP_PX.y)) / maps_px - 1.0;
-    gl_Position = vec4(centre_ndc * v.z + 2.0 * HALF_R * v.xy / maps_px, v.z - 2.0 * COPLANAR, v.z);
-    gl_ClipDistance[0] = v.z + v.x;
-    gl_ClipDistance[1] = v.z - v.x;
-    gl_ClipDistance[2] = view == 0 ? v.z + v.y : v.y;
-    gl_ClipDistance[3] = v.z - v.y;
+    gl_Position = clip_from_view(view, v, map, u_maps);
+    vec4 inside = inside_view(view, v);
+    for (int plane = 0; plane < 4; ++plane) gl_ClipDistance[plane] = inside[plane];
     v_uv = vec4(in_uv_front, in_uv_back);
     v_view = ivec2(view, map);
 }

@@ -12,6 +12,7 @@ a box, it is not. So strong batches are audited before they shoot, and shoot fro
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -105,7 +106,7 @@ def rows_of(size: tuple[int, int], band: int, bands: int) -> tuple[int, int, int
     return None if bands == 1 else (0, lower, width, upper - lower)
 
 
-class ShotPasses:
+class ShotPasses(ABC):
     """What a shot is made of. Whoever shoots owns the lightmap's light, sets these and says when."""
 
     gpu: Gpu
@@ -119,18 +120,18 @@ class ShotPasses:
     _area: float  # of all texels, solver frame
 
     @property
+    @abstractmethod
     def _choice(self) -> ChoiceStages:
         """Among the patches that shoot now."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def _most_power(self) -> float:
         """Beyond which it does not matter who shoots first, see rank.glsl [stored units · solver area]."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _finest_of(self, shot: Shot) -> tuple[int, int, int, int]:
         """Its patch, and the finest level of patches there, as buffers.shoot_finer takes them."""
-        raise NotImplementedError
 
     def _for_groups(self, part: Callable[[int, int], None], shots: int) -> None:
         """Do this part of a step for all its shots, as many at once as there are maps for."""
