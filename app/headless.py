@@ -73,7 +73,7 @@ def bake(flags: argparse.Namespace) -> int:
         whole = failure is not None or session.interrupted or _expect(session, console)
         clock = time.perf_counter()
         lightmap = session.lightmap
-        irradiance, covered = collapse(lightmap.nodes, lightmap.irradiance())
+        irradiance, covered = collapse(lightmap.nodes, lightmap.irradiance(ambient=True))
         session.load_seconds["read back"] = time.perf_counter() - clock
         finite = np.asarray(np.isfinite(irradiance).all(-1))
         lost = int((covered & ~finite).sum())

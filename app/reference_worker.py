@@ -46,7 +46,7 @@ def solve(source: Path, target: Path) -> int:
         if session.interrupted:
             return INTERRUPTED
         lightmap, charts = session.lightmap, session.charts
-        image = fill_gutter(*collapse(lightmap.nodes, lightmap.irradiance()))
+        image = fill_gutter(*collapse(lightmap.nodes, lightmap.irradiance(ambient=True)))
         answer = {
             "image": image,
             "triangle": charts.face_triangle,

@@ -18,7 +18,7 @@ from app.render.items import ItemImage
 from app.render.options import DisplayOptions
 from app.render.resolve import Reference
 from app.render.surfaces import Rect
-from app.scene.model import RGB, Camera
+from app.scene.model import Camera
 from app.solvers import EnergyBook, ShootingOptions, Solver
 
 
@@ -76,7 +76,6 @@ class Viewing(ABC):
             self.view,
             self.shown,
             reference=self._reference(whole=whole),
-            ambient=self._ambient,
             shooter=self._shooter_rect,
             scale=scale,
             samples=samples,
@@ -87,14 +86,6 @@ class Viewing(ABC):
         """Set the exposure from the light of the scene."""
         mean_residual = self.books.unshot / max(self.books.area, 1e-300)
         self.display = self.display.replace(exposure=exposure_of(self.lightmap, mean_residual))
-
-    @property
-    def _ambient(self) -> RGB | None:
-        """Ambient radiosity of the light not yet shot [W/m²], for display only."""
-        if not self.display.ambient:
-            return None
-        red, green, blue = self.books.ambient
-        return float(red), float(green), float(blue)
 
     @property
     def _shooter_rect(self) -> Rect | None:

@@ -6,6 +6,7 @@ Node-set textures hold the leaf tiles of t×t texels side by side [Coombe03, 4.2
     t_normal_ids     RG32UI   unit normal (octahedral, 2×snorm16), facet << MATERIAL_BITS | material (facet from 1)
     t_irradiance     storage  H [W/m²]: light received so far, so that radiosity B = E + ρH at any ρ, also 0
     t_residual       storage  r [W/m²]: exitance not yet shot
+    t_ambient        RGBA32F  one texel, a: what the rest of the solve will about add to H, and pictures and bakes show with it
     t_albedo, t_emission      only where a material has such a texture: the factor is in the material table
 
 and tables: t_pages and t_leaves (where a place of the virtual atlas is in the node set, and what its slots hold), t_facets,
@@ -57,6 +58,8 @@ class Lightmap:
         corners, triangles = nodes.occluders
         self.occluders = Mesh(gpu, corners.tobytes(), OCCLUDER_FORMAT, indices=triangles.tobytes())
         self.receivers = receiver_meshes(gpu, nodes.flat_spans, nodes.shaped_tiles)
+        self._textures["t_ambient"] = gpu.texture((1, 1), 4, "f4")
+        self.ambient_target = gpu.target(self._textures["t_ambient"])
         self.version = 0  # counts changes of the leaves
         self._targets: list[Framebuffer] = []
         self.set_storage(storage)
@@ -226,6 +229,7 @@ class Lightmap:
         """H = 0, r = E: nothing has been shot [Coombe03, 3]."""
         self.unit = max((np.pi * max(m.emission) for m in self.scene.materials), default=0.0) or 1.0
         self.light_target.clear()
+        self.ambient_target.clear()
         self._emit.draw(
             self.residual_target,
             textures=self.textures("t_position_area", "t_normal_ids", "t_materials", "t_emission"),
@@ -233,13 +237,19 @@ class Lightmap:
         )
 
     def release(self) -> None:
-        self.gpu.release_all(*self._targets, *self._textures.values(), self.occluders, *self.receivers.values())
+        self.gpu.release_all(*self._targets, self.ambient_target, *self._textures.values())
+        self.gpu.release_all(self.occluders, *self.receivers.values())
 
     # -- read-back -----------------------------------------------------------------------------------------------------
 
-    def irradiance(self) -> F32:
-        """H of every tile (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""
-        return self._read("t_irradiance")
+    def irradiance(self, *, ambient: bool = False) -> F32:
+        """H of every tile (tiles, t, t, 3) f32 [W/m²]; ``ambient``: H + a, with what is still to come, see common/ambient.glsl.
+        Waits for the GPU."""
+        H = self._read("t_irradiance")
+        if not ambient:
+            return H
+        a = np.frombuffer(self._textures["t_ambient"].read(), np.float32)[:3] * np.float32(self.unit)
+        return np.asarray(H + np.clip(a, -np.abs(H), np.abs(H)))
 
     def residual(self) -> F32:
         """r of every tile (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""

@@ -32,8 +32,8 @@ def open_above(scene: Scene, points: Points, reach: float) -> NDArray[np.bool_]:
 
 
 def irradiance_of(lightmap: Lightmap, points: Points) -> F64:
-    """(n, 3) [W/m²], bilinear."""
-    image = fill_gutter(*collapse(lightmap.nodes, lightmap.irradiance()))
+    """(n, 3) [W/m²], bilinear, as a bake would hold it: with what is still to come."""
+    image = fill_gutter(*collapse(lightmap.nodes, lightmap.irradiance(ambient=True)))
     return light_at(image, lightmap.charts, points)
 
 

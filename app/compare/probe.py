@@ -31,7 +31,7 @@ class Probe:
         self._pass.draw(
             self._target,
             textures={"t_points": self._points}
-            | lightmap.textures("t_pages", "t_leaves", "t_position_area", "t_irradiance"),
+            | lightmap.textures("t_pages", "t_leaves", "t_position_area", "t_irradiance", "t_ambient"),
             uniforms={
                 "u_unit": lightmap.unit,
                 "u_pages": (float(lightmap.columns), lightmap.nodes.pages_per_texel),

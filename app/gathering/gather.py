@@ -50,7 +50,7 @@ class Gather:
             self._sample_target,
             textures={"t_points": self._points}
             | lightmap.textures("t_pages", "t_leaves", "t_normal_ids", "t_materials", "t_irradiance")
-            | lightmap.textures("t_albedo", "t_emission"),
+            | lightmap.textures("t_ambient", "t_albedo", "t_emission"),
             uniforms={
                 "u_maps": self.maps,
                 "u_unit": lightmap.unit,

@@ -13,7 +13,6 @@ from app.render.options import DisplayOptions
 from app.render.pick import Picker, PickHit
 from app.render.resolve import Reference
 from app.render.surfaces import Rect, Surfaces
-from app.scene.model import RGB
 
 GL_DEPTH_CLAMP = 0x864F  # OpenGL 3.2: what lies before the near plane is drawn at it instead of being cut away
 
@@ -54,7 +53,6 @@ class FrameRenderer:
         display: DisplayOptions,
         *,
         reference: Reference | None = None,
-        ambient: RGB | None = None,
         shooter: Rect | None = None,
         scale: Scale | None = None,
         samples: int = 1,
@@ -63,8 +61,8 @@ class FrameRenderer:
         """Draw into the lower left ``size`` (width, height) [px] of ``target``.
 
         reference: for ``display.show`` and for layers that compare; None where there is none.
-        ambient: A [W/m²] for ``display.ambient``. shooter: the patch to mark for ``display.last_shooter``: (u, v, u, v) in
-        atlas texels. scale: of the false colour; left out, it is found from the light, which waits for the GPU.
+        shooter: the patch to mark for ``display.last_shooter``: (u, v, u, v) in atlas texels. scale: of the false colour; left
+        out, it is found from the light, which waits for the GPU.
         samples: per pixel along each axis. whole: show all light as it is now; False bounds the work of a frame, a large
         lightmap is then brought up to date over several. Raises GpuError for a picture larger than a texture can be.
         """
@@ -84,7 +82,6 @@ class FrameRenderer:
             display,
             scale=scale,
             reference=reference,
-            ambient=ambient,
             shooter=shooter,
             whole=whole,
         )

@@ -28,8 +28,8 @@ class Layer:
 
 LAYER_SHADERS = {
     "combined": Layer("combined", "t_irradiance", defines=("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")),
-    "irradiance": Layer("light", "t_irradiance"),
-    "residual": Layer("light", "t_residual"),
+    "irradiance": Layer("irradiance", "t_irradiance"),
+    "residual": Layer("residual", "t_residual"),
     "albedo": Layer("albedo", defines=("MATERIAL_BITS", "ALBEDO_TEXTURE")),
     "charts": Layer("charts", smooth=False, checker=0.12, defines=("MATERIAL_BITS",)),
     "leaves": Layer("leaves", smooth=False, checker=0.12, defines=("TILE",)),

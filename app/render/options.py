@@ -27,7 +27,6 @@ class DisplayOptions(Options):
     exposure: float = option(0.0, "exposure; where not given, found from the light", unit="EV", minimum=-24, maximum=24)
     tone_map: str = option("agx", "tone curve", choices=TONE_MAPS)
     interpolation: str = option("bilinear", "what is shown between the middles of texels", choices=INTERPOLATIONS)
-    ambient: bool = option(False, "add the ambient estimate of light not yet shot (Cohen et al. 1988); display only")
     grid: bool = option(False, "draw texels and tiles, in a quadtree each level in its colour")
     last_shooter: bool = option(False, "mark the patch that shot last")
     false_colour: str = option("off", "false colour with a legend: lux or cd/m²", choices=FALSE_COLOURS)

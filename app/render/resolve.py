@@ -23,12 +23,11 @@ from app.render.edges import Kind, reached_from
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS, Layer
 from app.render.options import DisplayOptions
-from app.scene.model import RGB
 
 # Texels around each tile: as many as interpolation at its edge reaches beyond it
 BORDER = {"nearest": 1, "bilinear": 1, "bicubic": 2}
 TEXELS_PER_FRAME = 1 << 16  # that are brought up to date in one frame, where not all must be
-LAYER_TABLES = ("t_normal_ids", "t_materials", "t_albedo", "t_emission", "t_facets", "t_leaves")
+LAYER_TABLES = ("t_normal_ids", "t_materials", "t_albedo", "t_emission", "t_facets", "t_leaves", "t_ambient")
 PLACES_WIDTH = 256  # of the table of places; pixels divide by it: a constant, a power of two
 T = TypeVar("T")
 
@@ -53,6 +52,7 @@ class DisplayTexels:
         self._unlit = gpu.texture((len(sides), 2), 4, "f1")
         self._unlit_target = gpu.target(self._unlit)
         self._version, self._keys = lightmap.version, self._leaf_keys()
+        self._nothing = gpu.texture((1, 1), 4, "f4", bytes(16))
         self._tables = {
             "t_sides": gpu.texture((len(sides), 1), 1, "u4", sides.tobytes()),
             "t_charts": self._chart_table(),
@@ -81,7 +81,6 @@ class DisplayTexels:
         display: DisplayOptions,
         *,
         scale: Scale | None,
-        ambient: RGB,
         whole: bool,
         reference: Reference | None = None,
         instead: bool = False,
@@ -98,7 +97,6 @@ class DisplayTexels:
         first, rows = self._band(whole)
         uniforms |= {
             "u_unit": lightmap.unit,
-            "u_ambient": ambient,
             "u_target_texel": 1.0 / (lightmap.charts.density * lightmap.frame.scale),
         }
         textures = self._tables | lightmap.textures(*LAYER_TABLES)
@@ -107,6 +105,7 @@ class DisplayTexels:
             textures["t_reference"], uniforms["u_dark"] = reference
         if reference is not None and instead:
             textures["t_light"], uniforms["u_unit"] = reference.texture, 1.0
+            textures["t_ambient"] = self._nothing  # what is unshot is the solution's
         uniforms |= {"u_size": self.size, "u_pages": self._pages}
         textures |= lightmap.textures("t_pages", "t_position_area")
 
@@ -179,7 +178,7 @@ class DisplayTexels:
     def release(self) -> None:
         self._edges.release()
         targets = (self._target, self._unlit_target, self._source_target)
-        self._gpu.release_all(*targets, self._colour, self._unlit, *self._tables.values())
+        self._gpu.release_all(*targets, self._colour, self._unlit, self._nothing, *self._tables.values())
 
     def _band(self, whole: bool) -> tuple[int, int]:
         """First row and number of rows to resolve now; their sources are there."""

@@ -12,12 +12,11 @@ from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
 from app.render.resolve import BORDER, PLACES_WIDTH, DisplayTexels, Reference
 from app.render.surface_mesh import SurfaceMesh
-from app.scene.model import F64, RGB
+from app.scene.model import F64
 
 Rect = tuple[float, float, float, float]
 Part = tuple[int, int, int, int] | None
 NOWHERE: Rect = (-1e6, -1e6, -1e6, -1e6)
-DARK: RGB = (0.0, 0.0, 0.0)
 
 
 class Surfaces:
@@ -43,27 +42,23 @@ class Surfaces:
         *,
         scale: Scale | None = None,
         reference: Reference | None = None,
-        ambient: RGB | None = None,
         shooter: Rect | None = None,
         whole: bool = True,
     ) -> None:
         """Draw the layer into ``target``, which has depth, over what is there.
 
         scale: of the false colour, where one is on. reference: for layers that compare, and to be shown as ``display.show`` asks,
-        where the layer is of received light. ambient: A [W/m²], light that every surface is taken to receive
-        besides in the solution. shooter: the patch to mark: lower and upper corner (u, v, u, v) in atlas texels. whole: see
-        ``DisplayTexels.resolve``; else one of many, in which new leaves shine.
+        where the layer is of received light. shooter: the patch to mark: lower and upper corner (u, v, u, v) in atlas texels.
+        whole: see ``DisplayTexels.resolve``; else one of many, in which new leaves shine.
         """
-        lit_by = ambient if ambient and display.ambient else DARK
         self._live = not whole
-        wanted: dict[str, Any] = {"scale": scale, "ambient": lit_by, "reference": reference}
+        wanted: dict[str, Any] = {"scale": scale, "reference": reference}
         shown: list[tuple[dict[str, Texture], Part]] = []
         left, right = _parts(layer_name, display, reference, target.size)
         if right is not None and reference is not None:
             self._others, fresh = self._fitting(self._others, display)
             now = whole or fresh or not self._sides[1]
-            others = wanted | {"ambient": DARK}  # what is unshot is the solution's
-            shown.append((self._others.resolve(layer_name, display, whole=now, instead=True, **others), right))
+            shown.append((self._others.resolve(layer_name, display, whole=now, instead=True, **wanted), right))
         elif reference is None and self._others is not None:
             self._others.release()
             self._others = None

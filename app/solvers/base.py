@@ -51,11 +51,6 @@ class EnergyBook:
         return float(self.imbalance.sum()) / total if total > 0 else 0.0
 
     @property
-    def ambient(self) -> F64:
-        """Ambient radiosity of the light not yet shot, RGB [W/m²] [Cohen88, eq. 9]: mean unshot exitance over 1 - mean albedo."""
-        return np.asarray(self.unshot / self.area / np.maximum(1.0 - self.reflectance, 1e-3))
-
-    @property
     def returned(self) -> F64:
         """Share of the light leaving surfaces that they send out again, RGB [-]: ρ̄ H / (H + escaped), H what they receive."""
         received = self.absorbed / np.maximum(1.0 - self.reflectance, 1e-3)

@@ -47,6 +47,11 @@ def put(lightmap: Lightmap, name: str, tiles: F64) -> None:
     lightmap.texture(name).write(np.ascontiguousarray(image, np.float32).tobytes())
 
 
+def put_ambient(lightmap: Lightmap, a: tuple[float, float, float]) -> None:
+    """Ambient light (RGB) [W/m²]."""
+    lightmap.texture("t_ambient").write((np.array([*a, 0.0], np.float32) / np.float32(lightmap.unit)).tobytes())
+
+
 def even(lightmap: Lightmap, H: tuple[float, float, float]) -> F64:
     """The same light on every texel that covers a surface, none on the others."""
     return (lightmap.nodes.surfaces.area > 0)[..., None] * np.array(H)

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-from boxes import PLAIN, SIZE, STEP, box, cornell, even, picture, put
+from boxes import PLAIN, SIZE, STEP, box, cornell, even, picture, put, put_ambient
 from forests import Forest, forest
 from gl_objects import forgotten, held
 from numpy.typing import NDArray
@@ -95,6 +95,7 @@ def test_the_probe_reads_quadtrees(gpu: Gpu) -> None:
     assert np.ptp(lightmap.nodes.leaves.level[lightmap.nodes.used]) > 0
     tiles = smooth(lightmap)
     put(lightmap, "t_irradiance", tiles)
+    put_ambient(lightmap, (0.0, 0.0, 0.0))
     points = random_points(session.scene, 500, 2)
     probe = Probe(gpu, lightmap, points)
     local = lightmap.frame.local_from_world(points.positions_normals(session.scene)[0])
@@ -116,7 +117,7 @@ def session(gpu: Gpu) -> Iterator[Session]:
 
 def baked(session: Session, folder: Path, factor: float = 1.0) -> Path:
     """The light of a session, times a factor."""
-    irradiance, covered = collapse(session.lightmap.nodes, session.lightmap.irradiance())
+    irradiance, covered = collapse(session.lightmap.nodes, session.lightmap.irradiance(ambient=True))
     report = {"texels": session.lightmap.texel_count, "residual": session.stats.residual}
     write_bake(folder, session.scene, session.charts, np.float32(factor) * irradiance, covered, report)
     return folder
@@ -168,7 +169,8 @@ def test_a_texel_has_its_reference(session: Session, tmp_path: Path) -> None:
     tile, row, column = (int(n[7]) for n in np.nonzero(lightmap.nodes.surfaces.area > 0))
     corner = lightmap.nodes.corner(tile)
     texel = corner[0] + column, corner[1] + row
-    assert session.reference_at(texel) == pytest.approx(3 * lightmap.light_at(texel)[0], rel=1e-5)
+    there = lightmap.irradiance(ambient=True)[tile, row, column]
+    assert session.reference_at(texel) == pytest.approx(3 * there, rel=1e-5)
     comparison, nodes = session.comparison, lightmap.nodes
     assert comparison is not None
     image = np.frombuffer(comparison.texels.texture.read(), np.float32).reshape(*nodes.size[::-1], 4)
@@ -240,11 +242,12 @@ def test_a_split_picture_is_half_of_each(gpu: Gpu, box: Lightmap) -> None:
 
 def test_light_not_yet_shot_is_not_the_reference_s(gpu: Gpu, box: Lightmap) -> None:
     texels, reference = reference_of(gpu, box, even(box, (0.5, 1.0, 2.0)))
-    display = PLAIN.replace(show="split", split=0.5)
-    without, added = (
-        picture(gpu, box, display.replace(ambient=on), reference=reference, ambient=(1.0, 1.0, 1.0))
-        for on in (False, True)
-    )
+    put(box, "t_irradiance", even(box, (1.0, 1.0, 1.0)))
+    display, made = PLAIN.replace(show="split", split=0.5), []
+    for a in (0.0, 1.0):
+        put_ambient(box, (a, a, a))
+        made.append(picture(gpu, box, display, reference=reference))
+    without, added = made
     middle = SIZE[0] // 2
     assert (added[:, :middle] != without[:, :middle]).any()
     assert (added[:, middle:] == without[:, middle:]).all()

@@ -36,11 +36,11 @@ def test_display_texels_follow_the_leaves(
             trees.shrink()
         depths.add(trees.nodes.depth)
         trees.write_noise(np.random.default_rng(len(depths)))
-        known.resolve("irradiance", options, scale=None, ambient=(0, 0, 0), whole=change == "none")
+        known.resolve("irradiance", options, scale=None, whole=change == "none")
         for _ in range(-(-known.size[1] * known.size[0] // resolve.TEXELS_PER_FRAME)):
-            known.resolve("irradiance", options, scale=None, ambient=(0, 0, 0), whole=False)
+            known.resolve("irradiance", options, scale=None, whole=False)
         fresh = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.nodes), BORDER[interpolation])
-        fresh.resolve("irradiance", options, scale=None, ambient=(0, 0, 0), whole=True)
+        fresh.resolve("irradiance", options, scale=None, whole=True)
         for what, expected in tables(fresh).items():
             np.testing.assert_array_equal(tables(known)[what], expected, err_msg=f"{what} after {change}")
         fresh.release()

@@ -65,7 +65,7 @@ def shown(gpu: Gpu, trees: Forest, interpolation: str, light: F64) -> NDArray[np
     trees.write({"t_irradiance": np.repeat(linear[..., None], 3, -1) * np.pi / trees.lightmap.unit})
     display = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.nodes), BORDER[interpolation])
     options = DisplayOptions(layer="irradiance", tone_map="clamp", interpolation=interpolation)
-    textures = display.resolve("irradiance", options, scale=None, ambient=(0, 0, 0), whole=True)
+    textures = display.resolve("irradiance", options, scale=None, whole=True)
     texture = textures["t_display"]
     raw = np.frombuffer(texture.read(), np.uint8).reshape(texture.height, texture.width, 4)[..., 0] / 255
     display.release()

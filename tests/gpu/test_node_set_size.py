@@ -155,7 +155,7 @@ def test_display_texels_are_the_same(
     options = DisplayOptions(layer="irradiance", tone_map="clamp", interpolation=interpolation)
 
     def shown(display: DisplayTexels, *, whole: bool) -> dict[Tile, bytes]:
-        display.resolve("irradiance", options, scale=None, ambient=(0, 0, 0), whole=whole)
+        display.resolve("irradiance", options, scale=None, whole=whole)
         slots = np.flatnonzero(trees.nodes.used).tolist()
         return {trees.tree.tile(slot): tables(display)["colours"][nth].tobytes() for nth, slot in enumerate(slots)}
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from boxes import PLAIN, SIZE, STEP, box, cornell, even, hits, picture, put, some_pixels, view_of
+from boxes import PLAIN, SIZE, STEP, box, cornell, even, hits, picture, put, put_ambient, some_pixels, view_of
 from numpy.typing import NDArray
 from pictures import framing, tone_map
 
@@ -141,13 +141,20 @@ def test_right_way_up_and_round(gpu: Gpu, box: Lightmap) -> None:
     assert right[1] > 2 * right[2]
 
 
-def test_ambient_light_is_added_for_display_only(gpu: Gpu, box: Lightmap) -> None:
-    put(box, "t_irradiance", even(box, (2.0, 3.0, 4.0)))
-    lit = picture(gpu, box)
-    put(box, "t_irradiance", even(box, (0.0, 0.0, 0.0)))
-    ambient = (2.0, 3.0, 4.0)
-    assert (picture(gpu, box, PLAIN.replace(ambient=True), ambient=ambient) == lit).all()
-    assert (picture(gpu, box, PLAIN, ambient=ambient) != lit).any()
+@pytest.mark.parametrize("layer", ["combined", "irradiance"])
+def test_what_is_still_to_come_is_shown_with_what_has_arrived(gpu: Gpu, box: Lightmap, layer: str) -> None:
+    """At most as much again, and darker where light was taken away."""
+    display = PLAIN.replace(layer=layer)
+    put(box, "t_irradiance", even(box, (4.0, 2.0, 1.5)))
+    lit = picture(gpu, box, display)
+    put(box, "t_irradiance", even(box, (2.0, 1.5, 2.0)))
+    assert (picture(gpu, box, display) != lit).any()
+    put_ambient(box, (3.0, 0.5, -0.5))
+    assert (picture(gpu, box, display) == lit).all()
+    H, covered = box.irradiance(ambient=True), box.nodes.surfaces.area > 0
+    np.testing.assert_allclose(H[covered], np.broadcast_to((4.0, 2.0, 1.5), H[covered].shape), rtol=1e-6)
+    np.testing.assert_allclose(box.irradiance()[covered][:, 0], 2.0, rtol=1e-6)
+    put_ambient(box, (0.0, 0.0, 0.0))
 
 
 # -- sides without texels ----------------------------------------------------------------------------------------------

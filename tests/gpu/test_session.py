@@ -358,7 +358,7 @@ def test_a_picked_point_is_found_again_in_a_tree_that_grew(gpu: Gpu) -> None:
     target = gpu.target(texture)
     session.draw(target, (64, 48))
     first = {at: session.pick(*at) for at in ((10, 24), (32, 40), (40, 44), (40, 12))}
-    session.solve(Stop(shots=300))
+    session.solve(Stop(shots=500))
     again = {at: read_again(session, picked) for at, picked in first.items()}
     assert any(again[at].texel != first[at].texel for at in first), "leaves have split under some of the points"
     for at, picked in again.items():

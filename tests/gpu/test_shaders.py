@@ -40,6 +40,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "FINEST": (0, MAX_LEVEL),
     "LEVELS": (LEVELS,),
     "EMITTER": (EMITTER,),
+    "PAYS": FLAG,
     "KEEPS": FLAG,
     "VIEWS": tuple({p.views for p in PROJECTIONS.values()}),
     "MATERIAL_BITS": (16,),

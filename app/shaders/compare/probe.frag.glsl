@@ -1,11 +1,12 @@
-// Irradiance at points of the atlas, one per pixel, bilinear. Texels that cover nothing repeat their nearest neighbour, as in a bake.
+// Irradiance at points of the atlas, with what is still to come, one per pixel, bilinear. Texels that cover nothing repeat their nearest neighbour, as in a bake.
+#include "common/ambient.glsl"
 #include "common/texel_at.glsl"
 uniform sampler2D t_points;  // uv [texels of level 0]
 uniform sampler2D t_position_area;
 uniform sampler2D t_irradiance;
 uniform float u_unit;  // W/m² per stored unit
 
-layout(location = 0) out vec4 out_irradiance;  // H [W/m²]; w: 0 where no texel is near
+layout(location = 0) out vec4 out_irradiance;  // H + a [W/m²]; w: 0 where no texel is near
 
 // Nearest first, in the order of app/bake/gutter.py: u, v
 const vec2 NEIGHBOURS[9] = vec2[](
@@ -15,7 +16,8 @@ vec4 texel_at(vec2 uv) {
     ivec2 px = texel_px_at(uv);
     if (px.y < 0) return vec4(0.0);
     bool covered = texelFetch(t_position_area, px, 0).w > 0.0;
-    return covered ? vec4(texelFetch(t_irradiance, px, 0).rgb * u_unit, 1.0) : vec4(0.0);
+    vec3 H = texelFetch(t_irradiance, px, 0).rgb;
+    return covered ? vec4((H + ambient_of(H)) * u_unit, 1.0) : vec4(0.0);
 }
 
 vec4 filled(vec2 uv, float texel) {

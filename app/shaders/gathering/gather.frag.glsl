@@ -1,6 +1,7 @@
-// What a sample of the map adds to the irradiance: B = E + ρH of the texel that it sees, times its delta form factor. [Cohen85]
+// What a sample of the map adds to the irradiance: B = E + ρ(H + a) of the texel that it sees, times its delta form factor. [Cohen85]
 #include "common/atlas.glsl"
 #include "common/albedo.glsl"
+#include "common/ambient.glsl"
 #include "common/exitance.glsl"
 #include "common/item.glsl"
 #include "common/texel_at.glsl"
@@ -22,8 +23,8 @@ vec3 radiosity_at(vec2 uv) {
     uint ids = texelFetch(t_normal_ids, px, 0).y;
     if (facet_from_ids(ids) == 0u) return vec3(0.0);
     uint material = material_from_ids(ids);
-    vec3 H = texelFetch(t_irradiance, px, 0).rgb * u_unit;
-    return exitance_of(t_materials, material, px) + albedo_of(t_materials, material, px) * H;
+    vec3 H = texelFetch(t_irradiance, px, 0).rgb;
+    return exitance_of(t_materials, material, px) + albedo_of(t_materials, material, px) * (H + ambient_of(H)) * u_unit;
 }
 
 void main() {

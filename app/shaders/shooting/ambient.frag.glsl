@@ -3,8 +3,12 @@
 //   Φ f (1 + ρf + ρ²f² + …) / A = Φ f / (A (1 - ρf))
 //
 // Φ: unshot power; ρ: mean albedo; f: share of what was shot until now that stayed in the scene; A: area of all texels.
-uniform sampler2D t_unshot;  // of runs: Σ r A, and Σ |Σ r A| over tiles, summed over RGB
+#include "shooting/shooter.glsl"
+
+uniform sampler2D t_unshot;  // of runs: Σ r A, and Σ |Σ r A| over tiles, summed over RGB, before the batch
 uniform sampler2D t_ledger;
+uniform sampler2D t_shooters;
+uniform int u_shots;  // of a batch that has shot since
 uniform vec3 u_albedo;
 uniform float u_area;  // solver frame
 
@@ -16,6 +20,11 @@ const float CANCELS = 1e-6;  // under this share of Σ |Σ r A| over tiles, Σ r
 void main() {
     vec4 sum = vec4(0.0);
     for (int i = 0; i < textureSize(t_unshot, 0).x; ++i) sum += texelFetch(t_unshot, ivec2(i, 0), 0);
+    vec3 batch = vec3(0.0);
+    for (int shot = 0; shot < u_shots; ++shot) {
+        Shooter s = load_shooter(t_shooters, shot);
+        if (s.size_px > 0) batch += s.exitance * s.area;
+    }
     vec3 unshot = mix(vec3(0.0), sum.rgb, greaterThan(abs(sum.rgb), vec3(CANCELS * sum.a)));
     vec3 shot = vec3(0.0), gone = vec3(0.0);
     for (int i = 0; i < textureSize(t_ledger, 0).x; ++i) {
@@ -24,5 +33,6 @@ void main() {
     }
     vec3 stays = clamp(1.0 - gone / max(shot, vec3(1e-30)), 0.0, 1.0);
     stays = mix(vec3(0.0), stays, greaterThan(shot, vec3(0.0)));
+    unshot -= batch * (1.0 - u_albedo * stays);  // what it shot, and what surfaces keep of that to shoot
     out_ambient = vec4(unshot * stays / max(u_area * max(1.0 - u_albedo * stays, LEAST_LOST), 1e-30), 0.0);
 }

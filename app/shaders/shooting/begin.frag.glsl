@@ -4,7 +4,6 @@
 #define HIGHEST 4
 
 #include "shooting/candidate.glsl"
-#include "shooting/rank.glsl"
 #include "shooting/square.glsl"
 
 uniform sampler2D t_patches;
@@ -40,14 +39,14 @@ vec4 begins_in(ivec2 corner) {
         if (!is_patch(corner - within, level, flux)) continue;
         if (within != ivec2(0)) return vec4(0.0);
         float power = power_of(flux);
-        return candidate(rank_of(power, corner * BLOCK, level), corner * BLOCK, level, power);
+        return candidate(power, corner * BLOCK, level, power);
     }
     vec4 best = vec4(0.0);
     for (int k = 0; k < SQUARE * SQUARE; ++k) {
         ivec2 block = corner + ivec2(k % SQUARE, k / SQUARE);
         vec4 one = texelFetch(t_patches, block, 0);
         float power = power_of(one.rgb);
-        if (is_part(one)) one = candidate(rank_of(power, block * BLOCK, BLOCK_LEVEL), block * BLOCK, BLOCK_LEVEL, power);
+        if (is_part(one)) one = candidate(power, block * BLOCK, BLOCK_LEVEL, power);
         best = vec4(one.x > best.x ? one.xyz : best.xyz, best.w + one.w);
     }
     return best;

@@ -1,4 +1,4 @@
-// A patch that may shoot: (rank, x, 8 y + level, power of all that it stands for), with x, y its lower corner [texels]. What is
+// A patch that may shoot: (power, x, 8 y + level, power of all that it stands for), with x, y its lower corner [texels]. What is
 // part of a larger one has a negative a instead, and its flux in rgb.
 #include "shooting/block.glsl"
 
@@ -7,8 +7,8 @@ const vec2 UNLIT_YET = vec2(3e38, 0.0);  // least and greatest irradiance of no 
 const float COVERED = 0.05;  // a texel that has so little of the irradiance of its patch's brightest lies under something
 
 float power_of(vec3 flux) { return dot(abs(flux), vec3(1.0)); }
-vec4 candidate(float rank, ivec2 corner_px, int level, float all) {
-    return vec4(rank, corner_px.x, corner_px.y * LEVELS + level, all);
+vec4 candidate(float power, ivec2 corner_px, int level, float all) {
+    return vec4(power, corner_px.x, corner_px.y * LEVELS + level, all);
 }
 ivec2 corner_of(vec4 candidate) { return ivec2(int(candidate.y), int(candidate.z) / LEVELS); }
 int level_of(vec4 candidate) { return int(candidate.z) % LEVELS; }

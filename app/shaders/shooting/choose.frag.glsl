@@ -23,6 +23,7 @@ uniform sampler2D t_materials;
 uniform sampler2D t_irradiance;
 uniform sampler2D t_residual;
 uniform sampler2D t_runs;
+uniform float u_least;  // power that is worth a shot
 
 layout(location = 0) out vec4 out_row;
 
@@ -166,6 +167,17 @@ bool is_family(ivec2 corner_px, int size, Shooter part, out vec3 flux) {
     return all && part.area * MOST_FAMILY >= area && !partly_covered(lit);
 }
 
+// One of a family that shoots at once: the others have their turn in the same batch, so that none of it is missing, or there
+// twice, for long.
+Shooter shooter_among(ivec2 corner_px, int level, int member) {
+    int one = min(level, patch_levels(corner_px).shoots);
+    if (one < level) return shooter_from_patch(corner_px + (ivec2(member % FAMILY, member / FAMILY) << one), 1 << one);
+    Shooter s;
+    s.size_px = 0;
+    if (member == 0) s = shooter_from_patch(corner_px, 1 << one);
+    return s;
+}
+
 // The patch itself, or one of a family, which shoots for all and owes the others.
 Shooter shooter_for(ivec2 corner_px, int level) {
     int one = min(level, patch_levels(corner_px).shoots), size = 1 << level;
@@ -181,11 +193,14 @@ Shooter shooter_for(ivec2 corner_px, int level) {
 }
 
 void main() {
-    int shot = int(gl_FragCoord.y);
-    vec4 run = ranked_run(shot);
+    const int TURNS = PAYS == 1 ? FAMILY * FAMILY : 1;  // of one candidate
+    int shot = int(gl_FragCoord.y), rank = shot / TURNS;
+    vec4 run = ranked_run(rank);
     Shooter s;
     s.size_px = 0;
-    if (run.x > 0.0 && (shot == 0 || run.x >= WEAKEST * ranked_run(0).x))
-        s = shooter_for(corner_of(run), level_of(run));
+    if (run.x > u_least && (rank == 0 || run.x >= WEAKEST * ranked_run(0).x)) {
+        ivec2 corner_px = corner_of(run);
+        s = PAYS == 1 ? shooter_among(corner_px, level_of(run), shot % TURNS) : shooter_for(corner_px, level_of(run));
+    }
     out_row = s.size_px > 0 ? shooter_row(s, int(gl_FragCoord.x)) : vec4(0.0);
 }

@@ -8,7 +8,7 @@ uniform sampler2D t_unshot;
 uniform int u_runs;   // a multiple of the squares of a tile
 uniform int u_slots;  // up to the last that is used
 
-layout(location = 0) out vec4 out_run;     // candidate of the highest rank; a: power of all
+layout(location = 0) out vec4 out_run;     // the strongest candidate; a: power of all
 layout(location = 1) out vec4 out_unshot;  // Σ r A, and Σ of its absolute values over tiles
 
 void main() {

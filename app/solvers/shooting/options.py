@@ -33,6 +33,9 @@ class ShootingOptions(Options):
         maximum=MAX_LEVEL,
     )
     coarsen: bool = option(True, "shoot from larger patches first: as many as show all of the light soon")
+    ambient: bool = option(
+        True, "show and bake what is unshot as even ambient light (Cohen et al. 1988), at most as much as has arrived"
+    )
     residual: float = option(
         1e-3,
         "converged when this share of the emitted power is unshot, and ten times that at most lies unevenly in finest patches",

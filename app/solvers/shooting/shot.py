@@ -126,8 +126,8 @@ class ShotPasses(ABC):
 
     @property
     @abstractmethod
-    def _most_power(self) -> float:
-        """Beyond which it does not matter who shoots first, see rank.glsl [stored units · solver area]."""
+    def _least_power(self) -> float:
+        """That is worth a shot [stored units · solver area]."""
 
     @abstractmethod
     def _finest_of(self, shot: Shot) -> tuple[int, int, int, int]:
@@ -218,7 +218,6 @@ class ShotPasses(ABC):
             choice.patch_target,
             textures=self.lightmap.textures(*reads)
             | {"t_finer": self.buffers.finer, "t_ambient": self.buffers.ambient},
-            uniforms={"u_most": self._most_power},
             scissor=rows_of(choice.patches[0].size, band, bands),
         )
 
@@ -228,7 +227,6 @@ class ShotPasses(ABC):
         choice.begin.draw(
             choice.candidate_target,
             textures={"t_patches": patches, "t_unshot": unshot, "t_lit": lit},
-            uniforms={"u_most": self._most_power},
         )
         candidates, unshot = choice.candidates
         choice.add_runs.draw(
@@ -246,6 +244,7 @@ class ShotPasses(ABC):
             )
             | self.lightmap.textures("t_materials", "t_albedo")
             | {"t_runs": self.buffers.runs, "t_ambient": self.buffers.ambient, "t_finer": self.buffers.finer},
+            uniforms={"u_least": self._least_power},
             viewport=(0, 0, SHOOTER_ROWS, shots),
         )
         self.buffers.shooter_target.read_into(self.buffers.shooter_blocks, components=4, dtype="f4")
@@ -348,17 +347,18 @@ class ShotPasses(ABC):
             blend="add",
             viewport=(0, 0, shots, LEDGER_ROWS),
         )
-        self._expect()
+        self._expect(shots)
 
-    def _expect(self) -> None:
-        """See what all that is unshot will make come back."""
-        if self.lightmap.storage == "fixed8":  # which cannot owe light
-            return
-        self.stages.expect.draw(
-            self.buffers.ambient_target,
-            textures={"t_unshot": self.buffers.unshot, "t_ledger": self.buffers.ledger},
-            uniforms={"u_albedo": self._albedo, "u_area": self._area},
-        )
+    def _expect(self, shots: int = 0) -> None:
+        """See what all that is unshot after so many shots will make come back: shown; shot ahead where storage can owe light."""
+        shown, ahead = self.lightmap.ambient_target, self.buffers.ambient_target
+        for target in [shown] * self.options.ambient + [ahead] * (self.lightmap.storage != "fixed8"):
+            self.stages.expect.draw(
+                target,
+                textures={"t_unshot": self.buffers.unshot, "t_ledger": self.buffers.ledger}
+                | {"t_shooters": self.buffers.shooters},
+                uniforms={"u_shots": shots, "u_albedo": self._albedo, "u_area": self._area},
+            )
 
     def _shot_from_rows(self, rows: F64) -> Shot:
         frame, corner, edge = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3])), int(edges_of(rows))

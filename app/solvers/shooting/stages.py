@@ -114,21 +114,32 @@ class ShotBuffers:
             _mark(self.finer_levels[rows, columns], max(finest + 2 - (edge.bit_length() - 1), 1))
         self.finer.write(self.finer_levels.tobytes())
 
-    def divide(self, power: F64, most: float, largest: NDArray[np.int64], finest: NDArray[np.int64]) -> None:
-        """Let no patch hold more than so much power (slots, t, t) of texels; largest, finest (slots,): levels of patches."""
+    def divide(
+        self,
+        power: F64,
+        most: float,
+        largest: NDArray[np.int64],
+        finest: NDArray[np.int64],
+        above: NDArray[np.int64],
+    ) -> None:
+        """Let no patch hold more than so much power (slots, t, t) of texels; largest, finest (slots,): levels of patches. Where
+        texels of uniform size, finer by ``above`` levels (slots,), hold more by themselves, each is its own: one would shoot for
+        four beside which nothing else counts."""
         edge, highest = self._tile, highest_level(self._tile)
         level = np.full((len(power), edge, edge), highest)
         for one in range(highest, 0, -1):
             squares = power.reshape(-1, edge >> one, 1 << one, edge >> one, 1 << one).sum((2, 4)) > most
             level[squares.repeat(1 << one, 1).repeat(1 << one, 2)] = one - 1
         blocks = edge >> BLOCK_LEVEL
-        level = level.reshape(-1, blocks, 1 << BLOCK_LEVEL, blocks, 1 << BLOCK_LEVEL).min((2, 4))
+        in_blocks = -1, blocks, 1 << BLOCK_LEVEL, blocks, 1 << BLOCK_LEVEL
+        shares = (power <= most * 4.0 ** above[:, None, None]).reshape(in_blocks).all((2, 4))
+        level = level.reshape(in_blocks).min((2, 4))
         largest, finest = largest[:, None, None], finest[:, None, None]
         finer = np.where(level < largest, np.maximum(finest + 1 - level, 1), 0)
         place = np.divmod(np.arange(len(power)), self._tiles.shape[1])
         tiles = self._tiles[place]
         _mark(tiles, finer)
-        self._tiles[place] = tiles % EMITTER + EMITTER * (finer > 0)
+        self._tiles[place] = tiles % EMITTER + EMITTER * ((finer > 0) & shares)
         self.finer.write(self.finer_levels.tobytes())
 
     def hand_down(self, change: Change) -> None:
@@ -183,10 +194,12 @@ class ShotBuffers:
 
 class ChoiceStages:
     """Choosing among patches of one level and smaller ones; in quadtrees, of that level at the root and of finer ones below.
-    finest: the level that will shoot in the end."""
+    finest: the level that will shoot in the end; pays: whether only emitters' families shoot, all of one at once."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, level: int, finest: int, *, adaptive: bool) -> None:
-        self._gpu, self.level = gpu, level
+    def __init__(
+        self, gpu: Gpu, lightmap: Lightmap, level: int, finest: int, *, adaptive: bool, pays: bool = False
+    ) -> None:
+        self._gpu, self.level, self.pays = gpu, level, pays
         self._fit(lightmap)
         tile = lightmap.nodes.tile
         root, top = ROOT_LEVEL if adaptive else 0, {"HIGHEST": highest_level(tile)}
@@ -194,9 +207,9 @@ class ChoiceStages:
         of_block["LEVELS"] = LEVELS
         of_tile = {"TILE_SQUARES": tile >> SQUARE_LEVEL}
         reads = lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE")
-        levels = {"LEVEL": level - root, "FINEST": finest - root, "EMITTER": EMITTER}
+        levels = {"LEVEL": level - root, "FINEST": finest - root, "EMITTER": EMITTER, "PAYS": pays}
         square = {"SQUARE_LEVEL": SQUARE_LEVEL}
-        self.add_patches = Pass(gpu, "shooting/patches", defines=reads | of_block | levels | top | square)
+        self.add_patches = Pass(gpu, "shooting/patches", defines=reads | of_block | levels | top)
         self.begin = Pass(gpu, "shooting/begin", defines=of_block | of_tile | top | square)
         self.add_runs = Pass(gpu, "shooting/runs", defines=of_tile)
         self.choose = Pass(gpu, "shooting/choose", defines=reads | of_block | levels | top | square)
@@ -244,6 +257,8 @@ class ShotStages:
         self._gpu, self.projection, self._visibility = gpu, PROJECTIONS[options.projection], options.visibility
         levels = patch_levels(lightmap, options, adaptive=adaptive)
         self.choices = [ChoiceStages(gpu, lightmap, level, levels[-1], adaptive=adaptive) for level in levels]
+        if len(levels) > 1:
+            self.choices.insert(1, ChoiceStages(gpu, lightmap, *levels, adaptive=adaptive, pays=True))
         self.resolution = options.resolution or fitting_resolution(lightmap, adaptive=adaptive)
         width, height = self.map_size = self.projection.size(self.resolution)
         self.most_maps = max(1, min(BATCH, MAPS_TEXELS // (width * height)))

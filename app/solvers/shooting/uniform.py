@@ -14,7 +14,6 @@ Works badly where the middle of a patch sees something else than the rest of it 
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
@@ -44,7 +43,8 @@ from app.solvers.shooting.stages import (
 # more here and less there: light that hardly leaves its corner. So they end once they hold so many times the residual asked for.
 COARSE_LEAVE, FINE_LEAVE = 5e-3, 10
 MOST = 0.02  # of the emitted power: emitters of more are divided, one lamp into 50 patches at least: shadows add up to soft ones
-ALIKE = 1 / 16  # of that: among finest patches that hold more, each has its turn, see rank.glsl
+PAID = 1 / 16  # of that: families that owe no more may pay when others shoot as much
+FAMILY = 4  # patches, see family.glsl
 WHOLE = object()  # no part is left
 REPORT_LAG = 2  # read-backs in flight before the oldest is looked at
 
@@ -79,7 +79,6 @@ class UniformShooting(ShotPasses):
         self._drop_reports()
         self.buffers.all_alike()
         self._phase, self._audits, self._even = 0, True, False
-        self._owes = len(self.stages.choices) > 1  # or may, what shot for its family
         self.shots, self.last_shot = 0, None
         self.buffers.ambient_target.clear()
         self._weigh_scene()
@@ -100,9 +99,11 @@ class UniformShooting(ShotPasses):
         self.stages.release()
         self.stages, self.options = fresh, options
         self._phase, self._audits, self._even = min(self._phase, len(fresh.choices) - 1), True, False
-        self._owes |= len(fresh.choices) > 1
         self.buffers.finest_is(self.level - finest)
         self._divide_emitters()
+        self.lightmap.ambient_target.clear()
+        if self.shots:
+            self._expect()
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light that is there stays, and the difference is shot, negative too [Chen90]. Begins
@@ -124,7 +125,7 @@ class UniformShooting(ShotPasses):
             self._scale_light(factor)
         before, self._phase, self._audits, self._even = self.lightmap.scene.materials, 0, True, False
         self.lightmap.edit_materials(materials, factor)
-        self._weigh_scene(at_least=self._alike * float(factor.max()))
+        self._weigh_scene(at_least=self._paid * float(factor.max()))
         if not np.allclose([m.emission for m in materials], [m.emission * factor for m in before]):
             self._divide_emitters()
         self.report = replace(self.report, residual=self.unshot_share())
@@ -141,7 +142,7 @@ class UniformShooting(ShotPasses):
         sums, _, reflectance = self._tile_sums()
         self._area = float(sums[3]) / self._watt
         self._albedo = tuple((reflectance[:3] / max(sums[3], 1e-300)).tolist())
-        self._alike = max(ALIKE * MOST * float(self._emitted.sum()) / self._watt, at_least)
+        self._paid = max(PAID * MOST * float(self._emitted.sum()) / self._watt, at_least)
 
     def _divide_emitters(self) -> None:
         """Let no patch hold much of the light, but where 8 bits do not hold what a small one gives. What was divided stays so:
@@ -151,7 +152,7 @@ class UniformShooting(ShotPasses):
         power = self.lightmap.emission().sum(-1, dtype=np.float64) * self.lightmap.nodes.surfaces.area
         slots = np.arange(len(power))
         largest, finest = (self._levels_of(slots, choice) for choice in (self._choice, self.stages.choices[-1]))
-        self.buffers.divide(power, MOST * self._emitted.sum(), largest, finest)
+        self.buffers.divide(power, MOST * self._emitted.sum(), largest, finest, self._levels_above(slots))
 
     @property
     def _choice(self) -> ChoiceStages:
@@ -159,8 +160,8 @@ class UniformShooting(ShotPasses):
         return self.stages.choices[self._phase]
 
     @property
-    def _most_power(self) -> float:
-        return self._alike if self._owes and self._choice is self.stages.choices[-1] else math.inf
+    def _least_power(self) -> float:
+        return self._paid if self._choice.pays else 0.0
 
     @property
     def grown(self) -> bool:
@@ -233,7 +234,7 @@ class UniformShooting(ShotPasses):
         self.finish()
         runs = np.zeros((self.buffers.runs.width, 4), np.float32)
         level = self.patch_edge(corner).bit_length() - 1
-        runs[0] = 1.0, corner[0], corner[1] * LEVELS + level, 0.0
+        runs[0] = 1e38, corner[0], corner[1] * LEVELS + level, 0.0
         self.buffers.runs.write(runs.tobytes())
         self._describe(self._choice, 1)
         row = self._shooter_rows(1)
@@ -323,7 +324,10 @@ class UniformShooting(ShotPasses):
     # -- one shot ------------------------------------------------------------------------------------------------------
 
     def _parts(self, shots: int, bands: int) -> Generator[None, None, int]:
-        """A step, from choosing to the report, its longest passes in so many bands; how many shots. [Coombe03, 3]"""
+        """A step, from choosing to the report, its longest passes in so many bands; how many shots: of families that pay, whole
+        ones. [Coombe03, 3]"""
+        if self._choice.pays:
+            shots = max(shots // FAMILY, 1) * FAMILY
         yield from self._choose(shots, bands)
         self._zero(shots)
         yield
@@ -354,7 +358,10 @@ class UniformShooting(ShotPasses):
         """report (REPORT_HEAD + SHOOTER_ROWS, 4), see report.frag.glsl; choice: the level that it is about."""
         emitted = self._emitted.sum()
         residual = report[0, 0] * self._watt / emitted if emitted > 0 else 0.0
-        if choice is self._choice and residual <= max(COARSE_LEAVE, self.options.residual):
+        if choice is self._choice and choice.pays:
+            if report[REPORT_HEAD + 5, 3] == 0:
+                self._next_phase()
+        elif choice is self._choice and residual <= max(COARSE_LEAVE, self.options.residual):
             finest = choice is self.stages.choices[-1]
             left = float(report[0, 1]) * self._watt
             self._even = finest and left <= FINE_LEAVE * self.options.residual * float(emitted)

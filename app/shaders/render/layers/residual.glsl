@@ -1,4 +1,4 @@
-// Irradiance H or residual r as the radiance that a white surface would have of it.
+// Residual r as the radiance that a white surface would have of it.
 #include "common/atlas.glsl"
 uniform sampler2D t_light;
 uniform float u_unit;  // W/m² per stored unit
