@@ -11,7 +11,7 @@ from app.atlas.lightmap import STORAGE
 from app.atlas.node_set import TABLE_WIDTH
 from app.atlas.options import AtlasOptions
 from app.atlas.quadtree import quadtree_nodes
-from app.atlas.texels import uniform_leaves
+from app.atlas.texels import texel_count, uniform_leaves
 from app.console import Console
 from app.loading import read_and_unfold
 from app.options import from_flags
@@ -50,7 +50,7 @@ def info(flags: argparse.Namespace) -> int:
         "charts": charts.chart_count,
         "unfolded_by": charts.method,
         "texels_per_metre": charts.density,
-        "texels": nodes.texel_count if atlas.adaptive else len(uniform_leaves(charts, int(math.log2(charts.tile)))),
+        "texels": nodes.texel_count if atlas.adaptive else texel_count(charts),
         "tiles": tiles,
         "tile_edge": charts.tile,
         "atlas": list(charts.size),

@@ -10,7 +10,7 @@ shoot are whole. A *facet* is a connected flat piece of one chart: nothing in it
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ class Charts:
     chart_rects (c, 4) i32: x, y, width, height of each chart in whole texels.
     dark_faces: number of sides left out because nothing in the scene lies in front of them.
     method: how the charts were made, e.g. ``12 rectangles, 932 xatlas charts``.
+    hidden_uv (k, 3, 2) f64, hidden_face (k,): pieces of faces that something lies on, no part of any texel, see contacts.py.
     """
 
     size: tuple[int, int]
@@ -48,9 +49,14 @@ class Charts:
     dark_faces: int
     method: str
     warnings: tuple[str, ...] = ()
+    hidden_uv: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3, 2)))
+    hidden_face: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
     def with_faces(self, faces: NDArray[np.int64]) -> Charts:
         """Only those faces, in that order."""
+        now = np.full(len(self.face_triangle), -1, np.int64)
+        now[faces] = np.arange(len(faces))
+        hidden = now[self.hidden_face]
         return dataclasses.replace(
             self,
             face_triangle=self.face_triangle[faces],
@@ -58,6 +64,8 @@ class Charts:
             face_uv=self.face_uv[faces],
             face_chart=self.face_chart[faces],
             face_facet=self.face_facet[faces],
+            hidden_uv=self.hidden_uv[hidden >= 0],
+            hidden_face=hidden[hidden >= 0],
         )
 
     @property

@@ -97,7 +97,9 @@ class NodeSet:
         self.leaves = Leaves(none, none, none)
         shape = (0, self.tile, self.tile)
         vectors, colours = np.zeros((*shape, 3)), np.zeros((*shape, 3), np.float32)
-        self.surfaces = TexelSurfaces(vectors, np.zeros(shape), colours, np.zeros(shape, np.int32), vectors)
+        self.surfaces = TexelSurfaces(
+            vectors, np.zeros(shape), colours, np.zeros(shape, np.int32), vectors, np.zeros(shape, bool)
+        )
         self.albedo_tiles = None if cut.albedo is None else colours
         self.emission_tiles = None if cut.emission is None else colours
         self._kinds, self.used = np.zeros(0, KIND), np.zeros(0, bool)

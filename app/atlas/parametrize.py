@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import ALIGN, DEFAULT_TILE, GAP, Charts
+from app.atlas.contacts import hidden_pieces
 from app.atlas.packing import MAX_SIDE, outlines, pack
 from app.atlas.rectangles import Rectangles, find_rectangles
 from app.atlas.sides import Sides, distinct_rows, facets, lit_sides, scene_size, totals, weld
@@ -89,6 +90,7 @@ def parametrize(
     charts = _place(layout, lit, facet, density, tile)
     report("pack", 1.0)
     face_uv, face_chart, face_facet, rects, size = charts
+    hidden_uv, hidden_face = hidden_pieces(scene, points, corners, facet, lit.triangle, lit.back, face_uv, density)
     return Charts(
         size=size,
         tile=tile,
@@ -102,6 +104,8 @@ def parametrize(
         dark_faces=lit.dark,
         method=method,
         warnings=warnings,
+        hidden_uv=hidden_uv,
+        hidden_face=hidden_face,
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.atlas.contacts import hidden_points
 from app.atlas.sides import lit_sides
 from app.scene.model import F64, Scene
 
@@ -49,13 +50,14 @@ class SideIndex:
 
 
 def random_points(scene: Scene, count: int, seed: int) -> Points:
-    """Even in area on all sides that light can reach."""
+    """Even in area on all sides that light can reach, less those that something lies on: ``count`` at most."""
     random = np.random.default_rng(seed)
     sides = lit_sides(scene)
     area = scene.normals_areas[1][sides.triangle]
     order = np.lexsort((sides.back, sides.triangle))
     side = random.choice(order, count, p=area[order] / area.sum())
-    return Points(sides.triangle[side], sides.back[side], random.dirichlet((1, 1, 1), count))
+    points = Points(sides.triangle[side], sides.back[side], random.dirichlet((1, 1, 1), count))
+    return points.only(~hidden_points(scene, points.triangle, points.back, points.weights))
 
 
 def barycentric(position: F64, corners: F64) -> F64:

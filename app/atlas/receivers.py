@@ -109,7 +109,7 @@ def _flat_tiles(t: TileTexels) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
         .reshape(count, -1)
         .all(1, where=covered.reshape(count, -1))
     )
-    flat &= np.abs((du * dv).sum(-1)) < FLAT_ERROR * whole
+    flat &= (np.abs((du * dv).sum(-1)) < FLAT_ERROR * whole) & covered.any((1, 2))
     corner = _corners(t, facet)
     steps = np.arange(t.facet.shape[2]) + 0.5
     for row in range(t.facet.shape[1]):  # one row of all tiles at a time: bounded memory

@@ -23,6 +23,7 @@ from app.scene.model import F32, F64, I32, Scene
 BLOCK = 1 << 16  # candidate texels in work at a time
 # Fragments below this share of the texel, or of a smaller triangle, are rounding where an edge runs along a texel's.
 SLIVER = 1e-9
+LEAST_SEEN = 1e-3  # of a texel, that is not hidden: less is no place to look from
 
 I64 = NDArray[np.int64]
 
@@ -55,7 +56,7 @@ class TexelSurfaces:
     position (n, t, t, 3) f64: centroid of the covered surface [m], where curved a mean that may lie off it;
     area (n, t, t) f64 [m²], 0 where nothing is covered; normal (n, t, t, 3) f32: unit area-weighted mean,
     towards the lit side; face (n, t, t) i32: the face with the largest share, -1 where nothing is covered;
-    leading (n, t, t, 3) f64: centroid of that share alone [m].
+    leading (n, t, t, 3) f64: centroid of that share alone [m]; cut (n, t, t): whether something lies on a part of it, or all.
     """
 
     position: F64
@@ -63,6 +64,7 @@ class TexelSurfaces:
     normal: F32
     face: I32
     leading: F64
+    cut: NDArray[np.bool_]
 
 
 def faces_tangents(scene: Scene, charts: Charts) -> tuple[F64, F64]:
@@ -85,12 +87,31 @@ def uniform_leaves(charts: Charts, level: int = 0) -> Leaves:
     return Leaves(np.full(len(key), level, np.int32), x, y)
 
 
+def texel_count(charts: Charts) -> int:
+    """Texels of level 0 that cover a surface which something may see."""
+    columns = charts.size[0]
+    count = len(uniform_leaves(charts, int(math.log2(charts.tile))))
+    near = np.isin(charts.face_facet, charts.face_facet[charts.hidden_face])
+
+    def shares(uv: F64) -> tuple[I64, F64]:
+        parts = list(_fragments(uv))
+        key = np.concatenate([np.empty(0, np.int64), *(part.y * columns + part.x for part in parts)])
+        texel, which = np.unique(key, return_inverse=True)
+        share = np.concatenate([np.empty(0), *(part.share for part in parts)])
+        return texel, np.bincount(which.reshape(-1), share, len(texel)).astype(np.float64)
+
+    (texel, covered), (hidden_texel, hidden) = shares(charts.face_uv[near]), shares(charts.hidden_uv)
+    whole = covered[np.searchsorted(texel, hidden_texel)]
+    return count - int(np.count_nonzero(whole - hidden < LEAST_SEEN * whole))
+
+
 def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurfaces:
     """Where each texel of the leaves lies in the world, how much surface it covers, and which way that faces."""
     shape = (len(leaves), charts.tile, charts.tile)
     texels = math.prod(shape)
     area, best = np.zeros(texels), np.zeros(texels)
     face = np.full(texels, -1, np.int32)
+    cut = np.zeros(texels, bool)
     moment, normal, lead = np.zeros((3, texels)), np.zeros((3, texels)), np.zeros((3, texels))
     origin = scene.corners[charts.face_triangle, 0]
     normals, areas = scene.normals_areas
@@ -115,6 +136,8 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
                 np.add.at(normal[k], slot, covered * towards[f, k])
                 lead[k, slot[leading]] = centre[leading]
             np.add.at(area, slot, covered)
+        _take_away(charts, leaves, int(level), per_texel, origin, tangents, towards, (area, moment, normal), cut)
+    face[area <= 0] = -1
     with np.errstate(invalid="ignore", divide="ignore"):
         position = np.where(area > 0, moment / area, 0.0)
         length = np.linalg.norm(normal, axis=0)
@@ -127,7 +150,36 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
         normal=np.ascontiguousarray(normal.T, dtype=np.float32).reshape(*shape, 3),
         face=face.reshape(shape),
         leading=np.ascontiguousarray(lead.T).reshape(*shape, 3),
+        cut=cut.reshape(shape),
     )
+
+
+def _take_away(
+    charts: Charts,
+    leaves: Leaves,
+    level: int,
+    per_texel: F64,
+    origin: F64,
+    tangents: F64,
+    towards: F64,
+    sums: tuple[F64, F64, F64],
+    cut: NDArray[np.bool_],
+) -> None:
+    """Take the pieces that something lies on from area (n,), moment, normal (3, n) of texels of a level; cut (n,): of which."""
+    area, moment, normal = sums
+    before, size = area.copy(), 0.5**level
+    windows = _windows(charts.hidden_uv / size, leaves, level, charts.tile)
+    for part in _fragments(charts.hidden_uv / size, windows):
+        f, slot = charts.hidden_face[windows.face[part.pair]], windows.slot(part)
+        hidden = part.share * per_texel[f] * size**2
+        du, dv = part.u * size - charts.face_uv[f, 0, 0], part.v * size - charts.face_uv[f, 0, 1]
+        for k in range(3):
+            centre = origin[f, k] + du * tangents[0, f, k] + dv * tangents[1, f, k]
+            np.add.at(moment[k], slot, -hidden * centre)
+            np.add.at(normal[k], slot, -hidden * towards[f, k])
+        np.add.at(area, slot, -hidden)
+        cut[slot] = True
+    area[area < LEAST_SEEN * before] = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -153,7 +153,7 @@ def _closed_form(scene: Scene, samples: int, tell: Tell) -> Truth:
     material = scene.materials[scene.material_ids[0]]
     B = np.pi * np.array(material.emission) / (1 - np.array(material.albedo))
     points = random_points(scene, POINTS, POINTS_SEED)
-    return Truth("closed-form", points, np.tile(B, (POINTS, 1)), None, "closed form, B = E / (1 - ρ)", 0.0)
+    return Truth("closed-form", points, np.tile(B, (len(points), 1)), None, "closed form, B = E / (1 - ρ)", 0.0)
 
 
 # -- dense -------------------------------------------------------------------------------------------------------------

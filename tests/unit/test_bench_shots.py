@@ -48,7 +48,7 @@ def test_bytes_of_a_texel_follow_from_its_formats(gpu: Gpu, storage: str, light:
 @pytest.mark.parametrize("visibility", ["item-id", "combined"])
 def test_the_stream_draws_the_texels_of_the_receiver_pass_and_changes_no_light(gpu: Gpu, visibility: str) -> None:
     options = ShootingOptions(visibility=visibility)
-    with opened(gpu, "museum", AtlasOptions(texels=8_000), options) as (lightmap, solver):
+    with opened(gpu, "cornell-box", AtlasOptions(texels=8_000), options) as (lightmap, solver):
         assert isinstance(solver, UniformShooting) and set(lightmap.receivers) == {True, False}
         solver.reset()
         solver.step(BATCH)

@@ -142,6 +142,16 @@ class ShotBuffers:
         self._tiles[place] = tiles % EMITTER + EMITTER * ((finer > 0) & shares)
         self.finer.write(self.finer_levels.tobytes())
 
+    def divide_at(self, places: NDArray[np.bool_], finer: int) -> None:
+        """Let patches be so much finer in blocks that hold any of these texels (slots, t, t), see patch_level.glsl."""
+        blocks = self._tile >> BLOCK_LEVEL
+        held = places.reshape(-1, blocks, 1 << BLOCK_LEVEL, blocks, 1 << BLOCK_LEVEL).any((2, 4))
+        place = np.divmod(np.arange(len(places)), self._tiles.shape[1])
+        tiles = self._tiles[place]
+        _mark(tiles, np.where(held, finer, 0).astype(np.int64))
+        self._tiles[place] = tiles
+        self.finer.write(self.finer_levels.tobytes())
+
     def hand_down(self, change: Change) -> None:
         """Let leaves that came shoot as fine as what was in their place."""
         self.sound.clear()

@@ -45,6 +45,7 @@ COARSE_LEAVE, FINE_LEAVE = 5e-3, 10
 MOST = 0.02  # of the emitted power: emitters of more are divided, one lamp into 50 patches at least: shadows add up to soft ones
 PAID = 1 / 16  # of that: families that owe no more may pay when others shoot as much
 FAMILY = 4  # patches, see family.glsl
+FEET = 2  # 1 + by how many levels patches at the foot of what stands on them are finer than the finest: they light it from near
 WHOLE = object()  # no part is left
 REPORT_LAG = 2  # read-backs in flight before the oldest is looked at
 
@@ -83,6 +84,7 @@ class UniformShooting(ShotPasses):
         self.buffers.ambient_target.clear()
         self._weigh_scene()
         self._divide_emitters()
+        self.buffers.divide_at(self.lightmap.nodes.surfaces.cut, FEET)
         self.report = StepReport(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
 
     def set_options(self, options: ShootingOptions) -> None:
