@@ -3,14 +3,16 @@
 Under it no light comes and nobody looks, but texels that it hides in part would be as dark as their hidden share, and spread
 that around the foot of what stands there. So such pieces of surface are no part of any texel.
 
-A triangle c, or one that would close a body without a bottom, hides a side f where it lies in the plane of f, faces against it,
-and bounds a body that rises in front of f: all surfaces that meet c in a corner lie behind c, and face away from it. A wall
-without thickness between two rooms has theirs in front of it.
+A facet c hides a side f where it lies a little before the plane of f: a lamp under a ceiling, a rug. Where it lies in that
+plane, c, or what would close a body without a bottom, must face against f and bound a body that rises in front of f: all
+triangles that meet c in a corner lie behind c, and face away from it. A wall without thickness between two rooms has theirs in
+front of it.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,8 @@ from app.atlas.sides import FLAT, FLAT_ANGLE, facets, scene_size, weld
 from app.scene.model import F64, I32, Scene
 
 GAP = 0.05  # of a texel: what is no farther from a surface lies on it
+LEAST = 1e-9  # of a face, that a piece is: less is rounding
+MOST_NEAR = 4096  # pieces in one plane, of those that are not one: their pairs would take too long
 SHARED = 1e-3  # of a piece, that another may hide too
 
 
@@ -40,32 +44,74 @@ def hidden_pieces(
     the atlas; density [texels/m]."""
     size = scene_size(scene)
     within, points = max(GAP / density, FLAT * size), points - points.min(0)
-    caps = _caps(points, triangles, FLAT * size)
-    triangles, facet = np.concatenate([triangles, caps]), np.append(facet, np.full(len(caps), -1, np.int32))
+    caps, cap = _caps(points, triangles, FLAT * size)
+    count = int(facet.max(initial=-1)) + 1
+    triangles, facet = np.concatenate([triangles, caps]), np.append(facet, count + cap)
     corners = points[triangles]
     normals = np.concatenate([scene.normals_areas[0], _normals(points[caps])])
-    lids = np.flatnonzero(_thickness(corners, triangles, normals, FLAT * size) > 2 * within)  # else of one thin body
-    if not len(lids):
-        return np.empty((0, 3, 2)), np.empty(0, np.int64)
-    towards = normals[face_triangle] * np.where(face_back, -1.0, 1.0)[:, None]
-    height = np.einsum("fk,fk->f", towards, corners[face_triangle, 0])
+    flats = _Flats.of(corners, facet)
+    ends = np.flatnonzero(
+        _thickness(corners, triangles, facet, normals, FLAT * size) > 2 * within
+    )  # else of one thin body
+    sheets = np.arange(count)
+    lids, body = np.concatenate([ends, sheets, sheets]), np.arange(len(ends) + 2 * count) < len(ends)
+    normal, point = normals[flats.largest], corners[flats.largest, 0]
+    down = np.concatenate([-normal[ends], normal[sheets], -normal[sheets]])
+    sides, side = np.unique(2 * facet[face_triangle].astype(np.int64) + face_back, return_inverse=True)
+    own, up = sides // 2, normal[sides // 2] * np.where(sides % 2 == 1, -1.0, 1.0)[:, None]
     # planes as points (normal, height): angles in units of what is flat, distances in units of the gap
     units = np.array([FLAT_ANGLE, FLAT_ANGLE, FLAT_ANGLE, within])
-    planes = np.column_stack([-normals, -np.einsum("mk,mk->m", normals, corners[:, 0])])[lids]
-    near = cKDTree(planes / units).query_ball_point(np.column_stack([towards, height]) / units, 1.0)
-    least, most = corners.min(1) - within, corners.max(1) + within
-    pieces, owners = [], []
-    for face in np.flatnonzero([len(some) > 0 for some in near]).tolist():
-        f, lid = face_triangle[face], lids[near[face]]
-        lid = lid[(facet[lid] != facet[f]) & (least[lid] <= most[f]).all(1) & (most[lid] >= least[f]).all(1)]
-        mine: list[F64] = []
-        for polygon in _on_face(corners[f], corners[lid], face_uv[face]):
-            piece = _clip(polygon, face_uv[face])
-            if len(piece) > 2 and not _overlaps(piece, mine):
-                mine += [np.array((piece[0], piece[k], piece[k + 1])) for k in range(1, len(piece) - 1)]
-        pieces += mine
-        owners += [face] * len(mine)
+    tree = cKDTree(np.column_stack([down, np.einsum("lk,lk->l", down, point[lids])]) / units)
+    planes = np.column_stack([up, np.einsum("sk,sk->s", up, point[own])]) / units
+    few = np.flatnonzero(tree.query_ball_point(planes, 1.0, return_length=True) <= MOST_NEAR)
+    faces_of = np.split(np.argsort(side.reshape(-1), kind="stable"), np.cumsum(np.bincount(side.reshape(-1)))[:-1])
+    pieces: list[F64] = []
+    owners: list[int] = []
+    for one, near in zip(few.tolist(), tree.query_ball_point(planes[few], 1.0), strict=True):
+        mine, lid = own[one], lids[near]
+        above = (point[lid] - point[mine]) @ up[one] > FLAT * size
+        lid = np.unique(lid[(body[near] | above) & (lid != mine)])
+        lid = lid[
+            ((flats.least[lid] <= flats.most[mine] + within) & (flats.most[lid] >= flats.least[mine] - within)).all(1)
+        ]
+        others = np.concatenate([np.empty(0, np.int64), *(flats.members[k] for k in lid)])
+        for face in faces_of[one].tolist() if len(others) else []:
+            hidden = _hidden_of(corners[face_triangle[face]], corners[others], face_uv[face], within)
+            pieces += hidden
+            owners += [face] * len(hidden)
     return np.array(pieces).reshape(-1, 3, 2), np.array(owners, np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Flats:
+    """Flat pieces of triangles: members of each, the largest of them (n,), and the box around them, least and most (n, 3)."""
+
+    members: list[NDArray[np.int64]]
+    largest: NDArray[np.int64]
+    least: F64
+    most: F64
+
+    @staticmethod
+    def of(corners: F64, facet: I32) -> _Flats:
+        """corners (m, 3, 3), facet (m,): every number from 0 occurs."""
+        edges = corners[:, 1:] - corners[:, :1]
+        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        order = np.lexsort((-area, facet))
+        members = np.split(order, np.flatnonzero(np.diff(facet[order])) + 1)
+        first = np.flatnonzero(np.diff(facet[order], prepend=-1))
+        least = np.minimum.reduceat(corners[order].min(1), first)
+        return _Flats(members, order[first], least, np.maximum.reduceat(corners[order].max(1), first))
+
+
+def _hidden_of(corners: F64, others: F64, uv: F64, within: float) -> list[F64]:
+    """What triangles (n, 3, 3) [m] hide of a face, corners (3, 3) [m] at uv (3, 2): triangles (3, 2)."""
+    near = (others.min(1) <= corners.max(0) + within).all(1) & (others.max(1) >= corners.min(0) - within).all(1)
+    hidden: list[F64] = []
+    for polygon in _on_face(corners, others[near], uv):
+        piece = _clip(polygon, uv)
+        if len(piece) > 2 and _area(piece) > LEAST * _area(list(uv)) and not _overlaps(piece, hidden):
+            hidden += [np.array((piece[0], piece[k], piece[k + 1])) for k in range(1, len(piece) - 1)]
+    return hidden
 
 
 def _overlaps(polygon: list[F64], others: list[F64]) -> bool:
@@ -101,8 +147,8 @@ def hidden_points(scene: Scene, triangle: I32, back: NDArray[np.bool_], weights:
     return hidden
 
 
-def _thickness(corners: F64, triangles: I32, normals: F64, flat: float) -> F64:
-    """(m,) how far a body reaches behind each triangle that ends one, next to it: triangles that meet it in a corner are all
+def _thickness(corners: F64, triangles: I32, facet: I32, normals: F64, flat: float) -> F64:
+    """(facets,) how far a body reaches behind each facet that ends one, next to it: triangles that meet it in a corner are all
     behind and face away. 0 where it ends none."""
     count = len(triangles)
     has = coo_array((np.ones(3 * count, bool), (np.repeat(np.arange(count), 3), triangles.reshape(-1)))).tocsr()
@@ -112,13 +158,15 @@ def _thickness(corners: F64, triangles: I32, normals: F64, flat: float) -> F64:
     away = np.einsum("pk,pk->p", centre[other] - centre[one], normals[other]) > 0
     aside = np.abs(heights).max(1) > flat
     wrong = (heights.max(1) > flat) | (aside & ~away)
-    deep = np.zeros(count)
-    np.maximum.at(deep, one, -heights.min(1))
-    return np.where(np.bincount(one, wrong, count) == 0, deep, 0.0)
+    deep = np.zeros(int(facet.max(initial=-1)) + 1)
+    np.maximum.at(deep, facet[one], -heights.min(1))
+    deep[facet[one[wrong]]] = 0.0
+    return deep
 
 
-def _caps(points: F64, triangles: I32, flat: float) -> I32:
-    """(c, 3) triangles that would close bodies which have no bottom: each a fan in a loop of open edges, flat and convex."""
+def _caps(points: F64, triangles: I32, flat: float) -> tuple[I32, I32]:
+    """(c, 3) triangles that would close bodies which have no bottom, each a fan in a loop of open edges, flat and convex; the
+    number of each loop (c,)."""
     start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
     used = np.sort(np.stack([start, end], 1), axis=1)
     _, which, uses = np.unique(used, axis=0, return_inverse=True, return_counts=True)
@@ -138,7 +186,8 @@ def _caps(points: F64, triangles: I32, flat: float) -> I32:
         fan = np.array([(loop[0], loop[k], loop[k + 1]) for k in range(1, len(loop) - 1)], np.int32).reshape(-1, 3)
         if after == first and len(fan) and _flat_and_convex(points[loop], flat):
             caps.append(fan)
-    return np.concatenate([np.empty((0, 3), np.int32), *caps])
+    loops = np.repeat(np.arange(len(caps)), [len(fan) for fan in caps]).astype(np.int32)
+    return np.concatenate([np.empty((0, 3), np.int32), *caps]), loops
 
 
 def _flat_and_convex(loop: F64, flat: float) -> bool:
