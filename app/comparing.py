@@ -117,7 +117,7 @@ class Comparing(Viewing):
     @property
     def _light(self) -> object:
         """What all light depends on: another one where it is another."""
-        return self.solver.shots, self.lightmap.version, self.lightmap.scene
+        return self.solver.shots, self.lightmap.version, self.lightmap.scene, self.solver.options.ambient
 
     def _compare_anew(self) -> None:
         """Another lightmap: the reference stays while the scene is the same one, cut anew."""

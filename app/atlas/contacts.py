@@ -4,8 +4,8 @@ Under it no light comes and nobody looks, but texels that it hides in part would
 that around the foot of what stands there. So such pieces of surface are no part of any texel.
 
 A facet c hides a side f where it lies a little before the plane of f: a lamp under a ceiling, a rug. Where it lies in that
-plane, c, or what would close a body without a bottom, must face against f and bound a body that rises in front of f: all
-triangles that meet c in a corner lie behind c, and face away from it. A wall without thickness between two rooms has theirs in
+plane, c, or what would close a body that has no bottom, must face against f and bound a body that rises in front of f: all
+triangles that meet c in an edge lie behind c, and face away from it. A wall without thickness between two rooms has theirs in
 front of it.
 """
 
@@ -15,8 +15,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from app.atlas.sides import FLAT, FLAT_ANGLE, facets, scene_size, weld
@@ -24,8 +26,62 @@ from app.scene.model import F64, I32, Scene
 
 GAP = 0.05  # of a texel: what is no farther from a surface lies on it
 LEAST = 1e-9  # of a face, that a piece is: less is rounding
-MOST_NEAR = 4096  # pieces in one plane, of those that are not one: their pairs would take too long
-SHARED = 1e-3  # of a piece, that another may hide too
+MOST_NEAR = 4096  # facets in one plane, beyond which what lies in it is not looked for: soups of loose triangles
+MOST_CORNERS = 256  # of a loop that a cap closes: its triangles all meet in one corner
+BLOCK = 1 << 14  # triangles whose neighbours are looked at at once
+
+I64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Hidden:
+    """Pieces of faces that something lies on: their corners (k, 3, 2) in the atlas [texels], and the face of each (k,);
+    left_out: sides in whose plane more lies than is looked at."""
+
+    uv: F64
+    face: I64
+    left_out: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Facets:
+    """Flat pieces of triangles, those of the scene first. corners (m, 3, 3); members: triangles of each facet; normal, point
+    (n, 3): their planes; least, most (n, 3): boxes around them; depth (n,): see _depths; scene: how many are the scene's."""
+
+    corners: F64
+    members: list[I64]
+    normal: F64
+    point: F64
+    least: F64
+    most: F64
+    depth: F64
+    scene: int
+
+    @staticmethod
+    def of(points: F64, triangles: I32, facet: I32, double_sided: NDArray[np.bool_], flat: float) -> _Facets:
+        """points (n, 3), triangles (m, 3), facet (m,), whether their material has two sides (m,)."""
+        count = int(facet.max(initial=-1)) + 1
+        caps, cap = _caps(points, triangles, double_sided, flat)
+        triangles, facet = (
+            np.concatenate([triangles, caps]),
+            np.concatenate([facet.astype(np.int64), count + cap.astype(np.int64)]),
+        )
+        corners = points[triangles]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(normals, axis=1)
+        normals /= np.maximum(area, np.finfo(float).tiny)[:, None]
+        order = np.lexsort((-area, facet))
+        first = np.flatnonzero(np.diff(facet[order], prepend=-1))
+        return _Facets(
+            corners,
+            np.split(order, first[1:]),
+            normals[order[first]],
+            corners[order[first], 0],
+            np.minimum.reduceat(corners[order].min(1), first),
+            np.maximum.reduceat(corners[order].max(1), first),
+            _depths(corners, triangles, facet, normals, flat),
+            count,
+        )
 
 
 def hidden_pieces(
@@ -37,96 +93,28 @@ def hidden_pieces(
     face_back: NDArray[np.bool_],
     face_uv: F64,
     density: float,
-) -> tuple[F64, NDArray[np.int64]]:
-    """Pieces of faces that something lies on: their corners (k, 3, 2) in the atlas [texels], and the face of each (k,).
-
-    points (n, 3), triangles (m, 3): welded; facet (m,) of them; face_triangle (f,), face_back (f,), face_uv (f, 3, 2): sides in
-    the atlas; density [texels/m]."""
-    size = scene_size(scene)
-    within, points = max(GAP / density, FLAT * size), points - points.min(0)
-    caps, cap = _caps(points, triangles, FLAT * size)
-    count = int(facet.max(initial=-1)) + 1
-    triangles, facet = np.concatenate([triangles, caps]), np.append(facet, count + cap)
-    corners = points[triangles]
-    normals = np.concatenate([scene.normals_areas[0], _normals(points[caps])])
-    flats = _Flats.of(corners, facet)
-    ends = np.flatnonzero(
-        _thickness(corners, triangles, facet, normals, FLAT * size) > 2 * within
-    )  # else of one thin body
-    sheets = np.arange(count)
-    lids, body = np.concatenate([ends, sheets, sheets]), np.arange(len(ends) + 2 * count) < len(ends)
-    normal, point = normals[flats.largest], corners[flats.largest, 0]
-    down = np.concatenate([-normal[ends], normal[sheets], -normal[sheets]])
+) -> Hidden:
+    """points (n, 3), triangles (m, 3): welded; facet (m,) of them; face_triangle (f,), face_back (f,), face_uv (f, 3, 2): sides
+    in the atlas; density [texels/m]."""
+    flat = FLAT * scene_size(scene)
+    within = max(GAP / density, flat)
+    two = np.array([m.double_sided for m in scene.materials])[scene.material_ids]
+    all_ = _Facets.of(points - points.min(0), triangles, facet, two, flat)
     sides, side = np.unique(2 * facet[face_triangle].astype(np.int64) + face_back, return_inverse=True)
-    own, up = sides // 2, normal[sides // 2] * np.where(sides % 2 == 1, -1.0, 1.0)[:, None]
-    # planes as points (normal, height): angles in units of what is flat, distances in units of the gap
-    units = np.array([FLAT_ANGLE, FLAT_ANGLE, FLAT_ANGLE, within])
-    tree = cKDTree(np.column_stack([down, np.einsum("lk,lk->l", down, point[lids])]) / units)
-    planes = np.column_stack([up, np.einsum("sk,sk->s", up, point[own])]) / units
-    few = np.flatnonzero(tree.query_ball_point(planes, 1.0, return_length=True) <= MOST_NEAR)
     faces_of = np.split(np.argsort(side.reshape(-1), kind="stable"), np.cumsum(np.bincount(side.reshape(-1)))[:-1])
-    pieces: list[F64] = []
-    owners: list[int] = []
-    for one, near in zip(few.tolist(), tree.query_ball_point(planes[few], 1.0), strict=True):
-        mine, lid = own[one], lids[near]
-        above = (point[lid] - point[mine]) @ up[one] > FLAT * size
-        lid = np.unique(lid[(body[near] | above) & (lid != mine)])
-        lid = lid[
-            ((flats.least[lid] <= flats.most[mine] + within) & (flats.most[lid] >= flats.least[mine] - within)).all(1)
-        ]
-        others = np.concatenate([np.empty(0, np.int64), *(flats.members[k] for k in lid)])
-        for face in faces_of[one].tolist() if len(others) else []:
-            hidden = _hidden_of(corners[face_triangle[face]], corners[others], face_uv[face], within)
-            pieces += hidden
-            owners += [face] * len(hidden)
-    return np.array(pieces).reshape(-1, 3, 2), np.array(owners, np.int64)
-
-
-@dataclass(frozen=True, eq=False)
-class _Flats:
-    """Flat pieces of triangles: members of each, the largest of them (n,), and the box around them, least and most (n, 3)."""
-
-    members: list[NDArray[np.int64]]
-    largest: NDArray[np.int64]
-    least: F64
-    most: F64
-
-    @staticmethod
-    def of(corners: F64, facet: I32) -> _Flats:
-        """corners (m, 3, 3), facet (m,): every number from 0 occurs."""
-        edges = corners[:, 1:] - corners[:, :1]
-        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-        order = np.lexsort((-area, facet))
-        members = np.split(order, np.flatnonzero(np.diff(facet[order])) + 1)
-        first = np.flatnonzero(np.diff(facet[order], prepend=-1))
-        least = np.minimum.reduceat(corners[order].min(1), first)
-        return _Flats(members, order[first], least, np.maximum.reduceat(corners[order].max(1), first))
-
-
-def _hidden_of(corners: F64, others: F64, uv: F64, within: float) -> list[F64]:
-    """What triangles (n, 3, 3) [m] hide of a face, corners (3, 3) [m] at uv (3, 2): triangles (3, 2)."""
-    near = (others.min(1) <= corners.max(0) + within).all(1) & (others.max(1) >= corners.min(0) - within).all(1)
-    hidden: list[F64] = []
-    for polygon in _on_face(corners, others[near], uv):
-        piece = _clip(polygon, uv)
-        if len(piece) > 2 and _area(piece) > LEAST * _area(list(uv)) and not _overlaps(piece, hidden):
-            hidden += [np.array((piece[0], piece[k], piece[k + 1])) for k in range(1, len(piece) - 1)]
-    return hidden
-
-
-def _overlaps(polygon: list[F64], others: list[F64]) -> bool:
-    """Whether a convex polygon shares more than an edge with any of some triangles: what lies on that is hidden already."""
-    if not others:
-        return False
-    corners = np.array(others)
-    meets = ((corners.min(1) < np.max(polygon, axis=0)) & (corners.max(1) > np.min(polygon, axis=0))).all(1)
-    return any(_area(_clip(np.array(polygon), triangle)) > SHARED * _area(polygon) for triangle in corners[meets])
-
-
-def _area(polygon: list[F64]) -> float:
-    """Of a convex one."""
-    x, y = np.array(polygon).reshape(-1, 2).T
-    return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
+    own, up = sides // 2, all_.normal[sides // 2] * np.where(sides % 2 == 1, -1.0, 1.0)[:, None]
+    lids, left_out = _lids(all_, own, up, within, flat)
+    pieces, owners = [np.empty((0, 3, 2))], [np.empty(0, np.int64)]
+    for one, lid in lids:
+        faces = faces_of[one]
+        corners = all_.corners[face_triangle[faces]]
+        axes = np.linalg.svd(up[one : one + 1])[2][1:].T  # (3, 2), of the plane
+        lying = shapely.polygons(np.concatenate([all_.corners[all_.members[k]] for k in lid]) @ axes)
+        cover = shapely.union_all(lying[shapely.area(lying) > 0])
+        piece, which = _cut(corners @ axes, cover)
+        pieces.append(_on_faces(piece, corners[which] @ axes, face_uv[faces[which]]))
+        owners.append(faces[which])
+    return Hidden(np.concatenate(pieces), np.concatenate(owners), left_out)
 
 
 def hidden_points(scene: Scene, triangle: I32, back: NDArray[np.bool_], weights: F64) -> NDArray[np.bool_]:
@@ -136,9 +124,9 @@ def hidden_points(scene: Scene, triangle: I32, back: NDArray[np.bool_], weights:
     own = np.tile(np.eye(3)[:, 1:], (len(sides), 1, 1))  # of each side, the weights of its second and third corner
     facet = facets(points, corners, scene.material_ids, scene_size(scene))
     at = (sides // 2).astype(np.int32), sides % 2 == 1, own
-    pieces, owner = hidden_pieces(scene, points, corners, facet, *at, math.inf)
+    found = hidden_pieces(scene, points, corners, facet, *at, math.inf)
     hidden = np.zeros(len(triangle), bool)
-    for piece, one in zip(pieces, owner.tolist(), strict=True):
+    for piece, one in zip(found.uv, found.face.tolist(), strict=True):
         mine = np.flatnonzero(side.reshape(-1) == one)
         from_corners = weights[mine, None, 1:] - piece
         edge = np.roll(piece, -1, axis=0) - piece
@@ -147,35 +135,81 @@ def hidden_points(scene: Scene, triangle: I32, back: NDArray[np.bool_], weights:
     return hidden
 
 
-def _thickness(corners: F64, triangles: I32, facet: I32, normals: F64, flat: float) -> F64:
-    """(facets,) how far a body reaches behind each facet that ends one, next to it: triangles that meet it in a corner are all
+def _lids(all_: _Facets, own: I64, up: F64, within: float, flat: float) -> tuple[list[tuple[int, I64]], int]:
+    """Sides that something may lie on, and the facets that do; how many were left out. own, up: facet and normal of each side."""
+    ends = np.flatnonzero(all_.depth > 2 * within)  # else of one thin body
+    sheets = np.arange(all_.scene)
+    lids, body = np.concatenate([ends, sheets, sheets]), np.arange(len(ends) + 2 * len(sheets)) < len(ends)
+    down = np.concatenate([-all_.normal[ends], all_.normal[sheets], -all_.normal[sheets]])
+    # planes as points (normal, height): angles in units of what is flat, distances in units of the gap
+    units = np.array([FLAT_ANGLE, FLAT_ANGLE, FLAT_ANGLE, within])
+    tree = cKDTree(np.column_stack([down, (down * all_.point[lids]).sum(1)]) / units)
+    planes = np.column_stack([up, (up * all_.point[own]).sum(1)]) / units
+    few = np.flatnonzero(tree.query_ball_point(planes, 1.0, return_length=True) <= MOST_NEAR)
+    found = []
+    for one, near in zip(few.tolist(), tree.query_ball_point(planes[few], 1.0), strict=True):
+        mine, lid = own[one], lids[near]
+        height = (all_.point[lid] - all_.point[mine]) @ up[one]
+        lies = ((height > flat) | body[near] & (height >= -flat)) & (lid != mine)
+        lies &= (all_.least[lid] <= all_.most[mine] + within).all(1) & (
+            all_.most[lid] >= all_.least[mine] - within
+        ).all(1)
+        if lies.any():
+            found.append((one, np.unique(lid[lies])))
+    return found, len(planes) - len(few)
+
+
+def _cut(faces: F64, cover: shapely.Geometry) -> tuple[F64, I64]:
+    """What of triangles (n, 3, 2) is covered: triangles (k, 3, 2), and of which (k,)."""
+    given = shapely.polygons(faces)
+    shapely.prepare(cover)
+    meets = np.flatnonzero((shapely.area(given) > 0) & shapely.intersects(given, cover))
+    inside = shapely.intersection(given[meets], cover)
+    made, which = shapely.get_parts(shapely.constrained_delaunay_triangles(inside), return_index=True)
+    kept = shapely.area(made) > LEAST * shapely.area(given[meets[which]])
+    corners = shapely.get_coordinates(made[kept]).reshape(-1, 4, 2)[:, :3]
+    return np.asarray(corners), meets[which[kept]]
+
+
+def _on_faces(pieces: F64, faces: F64, uv: F64) -> F64:
+    """Triangles (n, 3, 2) in a plane, by the maps of faces there (n, 3, 2) to uv (n, 3, 2)."""
+    edges, uv_edges = faces[:, 1:] - faces[:, :1], uv[:, 1:] - uv[:, :1]
+    return np.asarray(uv[:, :1] + (pieces - faces[:, :1]) @ np.linalg.inv(edges) @ uv_edges)
+
+
+def _depths(corners: F64, triangles: I32, facet: I32, normals: F64, flat: float) -> F64:
+    """(facets,) how far a body reaches behind each facet that ends one, next to it: triangles that meet it in an edge are all
     behind and face away. 0 where it ends none."""
-    count = len(triangles)
-    has = coo_array((np.ones(3 * count, bool), (np.repeat(np.arange(count), 3), triangles.reshape(-1)))).tocsr()
-    one, other = (has @ has.T).nonzero()
-    heights = np.einsum("pck,pk->pc", corners[other] - corners[one, :1], normals[one])
-    centre = corners.mean(1)
-    away = np.einsum("pk,pk->p", centre[other] - centre[one], normals[other]) > 0
-    aside = np.abs(heights).max(1) > flat
-    wrong = (heights.max(1) > flat) | (aside & ~away)
+    count, centre = len(triangles), corners.mean(1)
+    has = coo_array((np.ones(3 * count, bool), (np.repeat(np.arange(count), 3), _edges(triangles)[0]))).tocsr()
     deep = np.zeros(int(facet.max(initial=-1)) + 1)
-    np.maximum.at(deep, facet[one], -heights.min(1))
-    deep[facet[one[wrong]]] = 0.0
+    wrong = np.zeros(len(deep), bool)
+    for first in range(0, count, BLOCK):
+        one, other = (has[first : first + BLOCK] @ has.T).nonzero()
+        one = one + first
+        one, other = one[facet[one] != facet[other]], other[facet[one] != facet[other]]
+        heights = np.einsum("pck,pk->pc", corners[other] - corners[one, :1], normals[one])
+        away = np.einsum("pk,pk->p", centre[other] - centre[one], normals[other]) > 0
+        aside = np.abs(heights).max(1) > flat
+        wrong[facet[one[(heights.max(1) > flat) | (aside & ~away)]]] = True
+        np.maximum.at(deep, facet[one], -heights.min(1))
+    deep[wrong] = 0.0
     return deep
 
 
-def _caps(points: F64, triangles: I32, flat: float) -> tuple[I32, I32]:
-    """(c, 3) triangles that would close bodies which have no bottom, each a fan in a loop of open edges, flat and convex; the
-    number of each loop (c,)."""
+def _caps(points: F64, triangles: I32, double_sided: NDArray[np.bool_], flat: float) -> tuple[I32, I32]:
+    """(c, 3) triangles that would close bodies which lack a bottom and nothing else, each a fan in a loop of open edges, flat and
+    convex; the number of each loop (c,). What has two sides may be looked into."""
+    count = len(triangles)
+    (edge, uses), owner = _edges(triangles), np.repeat(np.arange(count), 3)
+    joins = coo_array((np.ones(3 * count, bool), (owner, count + edge)), shape=(count + len(uses),) * 2)
+    body = connected_components(joins, directed=False)[1][owner]  # of each edge of each triangle
+    alone = uses[edge] == 1
+    open_edges, two = np.bincount(body, alone), np.bincount(body, double_sided[owner]) > 0
+    alone &= (open_edges[body] <= MOST_CORNERS) & ~two[body]
     start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
-    used = np.sort(np.stack([start, end], 1), axis=1)
-    _, which, uses = np.unique(used, axis=0, return_inverse=True, return_counts=True)
-    alone = uses[which.reshape(-1)] == 1
-    follows = dict(zip(end[alone].tolist(), start[alone].tolist(), strict=True))  # a cap turns the other way round
-    if len(follows) < np.count_nonzero(alone):  # loops that meet in a corner are no loops
-        corner, times = np.unique(end[alone], return_counts=True)
-        for one in corner[times > 1].tolist():
-            del follows[one]
+    at, to = (zip(body[alone].tolist(), ends[alone].tolist(), strict=True) for ends in (end, start))
+    follows = dict(zip(at, to, strict=True))  # a cap turns the other way round
     caps = []
     while follows:
         first, after = follows.popitem()
@@ -183,11 +217,19 @@ def _caps(points: F64, triangles: I32, flat: float) -> tuple[I32, I32]:
         while after != first and after in follows:
             loop.append(after)
             after = follows.pop(after)
-        fan = np.array([(loop[0], loop[k], loop[k + 1]) for k in range(1, len(loop) - 1)], np.int32).reshape(-1, 3)
-        if after == first and len(fan) and _flat_and_convex(points[loop], flat):
-            caps.append(fan)
+        corners = [corner for _, corner in loop]
+        whole = after == first and len(loop) == open_edges[first[0]] > 2
+        if whole and _flat_and_convex(points[corners], flat):
+            caps.append(np.array([(corners[0], *corners[k : k + 2]) for k in range(1, len(loop) - 1)], np.int32))
     loops = np.repeat(np.arange(len(caps)), [len(fan) for fan in caps]).astype(np.int32)
     return np.concatenate([np.empty((0, 3), np.int32), *caps]), loops
+
+
+def _edges(triangles: I32) -> tuple[I64, I64]:
+    """The number of each edge of each triangle (3 m,), and how many triangles have it (edges,)."""
+    ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], 2).reshape(-1, 2), axis=1)
+    _, which, uses = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    return which.reshape(-1), uses
 
 
 def _flat_and_convex(loop: F64, flat: float) -> bool:
@@ -196,34 +238,3 @@ def _flat_and_convex(loop: F64, flat: float) -> bool:
     turns = np.cross(edge, np.roll(edge, -1, axis=0))
     normal = turns.sum(0) / max(float(np.linalg.norm(turns.sum(0))), np.finfo(float).tiny)
     return bool((np.abs((loop - loop[0]) @ normal) <= flat).all() and (turns @ normal >= -flat * flat).all())
-
-
-def _normals(corners: F64) -> F64:
-    """(n, 3) of triangles (n, 3, 3)."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny))
-
-
-def _on_face(corners: F64, others: F64, uv: F64) -> F64:
-    """Where triangles (n, 3, 3) lie in the atlas, by the map of a face, corners (3, 3) at uv (3, 2): (n, 3, 2)."""
-    local_from_world = np.linalg.pinv((corners[1:] - corners[0]).T)
-    return np.asarray(uv[0] + (others - corners[0]) @ local_from_world.T @ (uv[1:] - uv[0]))
-
-
-def _clip(polygon: F64, triangle: F64) -> list[F64]:
-    """A convex polygon (n, 2) inside a triangle (3, 2): its corners, none where they do not meet. [Sutherland74]"""
-    (ux, uy), (vx, vy) = triangle[1] - triangle[0], triangle[2] - triangle[0]
-    turn = np.sign(ux * vy - uy * vx)
-    inside = list(polygon)
-    for k in range(3):
-        a, edge = triangle[k], triangle[(k + 1) % 3] - triangle[k]
-        distance = [turn * (edge[0] * (p[1] - a[1]) - edge[1] * (p[0] - a[0])) for p in inside]
-        kept: list[F64] = []
-        for i, p in enumerate(inside):
-            q, dp, dq = inside[i - 1], distance[i], distance[i - 1]
-            if (dp < 0) != (dq < 0):
-                kept.append(q + (p - q) * (dq / (dq - dp)))
-            if dp >= 0:
-                kept.append(p)
-        inside = kept
-    return inside

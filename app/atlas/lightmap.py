@@ -29,6 +29,7 @@ from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.scene.model import F32, F64, Material, Scene
 
 STORAGE = {"rgba32f": "f4", "rgba16f": "f2", "fixed8": "f1"}  # name: moderngl dtype
+SHARES = np.float32(4.0)  # of what is still to come, that a texel may have, see common/ambient.glsl
 HALF_HEADROOM = 64.0  # of 65504, the largest half float: H may be many times the largest exitance
 LIGHT = ("t_irradiance", "t_residual")
 QUAD_FORMAT = {"in_rect": "4f", "in_from": "2f"}  # see common/rects.vert.glsl
@@ -246,10 +247,13 @@ class Lightmap:
         """H of every tile (tiles, t, t, 3) f32 [W/m²]; ``ambient``: H + a, with what is still to come, see common/ambient.glsl.
         Waits for the GPU."""
         H = self._read("t_irradiance")
-        if not ambient:
-            return H
-        a = np.frombuffer(self._textures["t_ambient"].read(), np.float32)[:3] * np.float32(self.unit)
-        return np.asarray(H + np.clip(a, -np.abs(H), np.abs(H)))
+        return self.with_ambient(H) if ambient else H
+
+    def with_ambient(self, H: F32) -> F32:
+        """H + a of irradiance (…, 3) [W/m²]. Waits for the GPU."""
+        *a, share = np.frombuffer(self._textures["t_ambient"].read(), np.float32)
+        most = np.minimum(1, SHARES * share) * np.abs(H)
+        return np.asarray(H + np.clip(np.array(a) * np.float32(self.unit), -most, most))
 
     def residual(self) -> F32:
         """r of every tile (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""

@@ -90,7 +90,12 @@ def parametrize(
     charts = _place(layout, lit, facet, density, tile)
     report("pack", 1.0)
     face_uv, face_chart, face_facet, rects, size = charts
-    hidden_uv, hidden_face = hidden_pieces(scene, points, corners, facet, lit.triangle, lit.back, face_uv, density)
+    hidden = hidden_pieces(scene, points, corners, facet, lit.triangle, lit.back, face_uv, density)
+    if hidden.left_out:
+        soup = (
+            f"{hidden.left_out} sides share a plane with thousands of loose pieces: what stands there leaves dark feet"
+        )
+        warnings = (*warnings, soup)
     return Charts(
         size=size,
         tile=tile,
@@ -104,8 +109,8 @@ def parametrize(
         dark_faces=lit.dark,
         method=method,
         warnings=warnings,
-        hidden_uv=hidden_uv,
-        hidden_face=hidden_face,
+        hidden_uv=hidden.uv,
+        hidden_face=hidden.face,
     )
 
 

@@ -11,7 +11,7 @@ Area and centroid go to the world by the triangle's affine map; the fragments of
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,20 +89,12 @@ def uniform_leaves(charts: Charts, level: int = 0) -> Leaves:
 
 def texel_count(charts: Charts) -> int:
     """Texels of level 0 that cover a surface which something may see."""
-    columns = charts.size[0]
-    count = len(uniform_leaves(charts, int(math.log2(charts.tile))))
-    near = np.isin(charts.face_facet, charts.face_facet[charts.hidden_face])
-
-    def shares(uv: F64) -> tuple[I64, F64]:
-        parts = list(_fragments(uv))
-        key = np.concatenate([np.empty(0, np.int64), *(part.y * columns + part.x for part in parts)])
-        texel, which = np.unique(key, return_inverse=True)
-        share = np.concatenate([np.empty(0), *(part.share for part in parts)])
-        return texel, np.bincount(which.reshape(-1), share, len(texel)).astype(np.float64)
-
-    (texel, covered), (hidden_texel, hidden) = shares(charts.face_uv[near]), shares(charts.hidden_uv)
-    whole = covered[np.searchsorted(texel, hidden_texel)]
-    return count - int(np.count_nonzero(whole - hidden < LEAST_SEEN * whole))
+    columns, used = charts.size[0], [np.empty(0, np.int64)]
+    hidden = _hidden(charts, charts.hidden_uv, lambda part: part.y * columns + part.x)
+    for part in _fragments(charts.face_uv):
+        texel = part.y * columns + part.x
+        used.append(np.unique(texel[hidden.take_from(part, part.pair, texel)[0]]))
+    return len(np.unique(np.concatenate(used)))
 
 
 def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurfaces:
@@ -123,10 +115,15 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
         size = 0.5**level  # of a texel, in texels of level 0
         uv = charts.face_uv / size
         windows = _windows(uv, leaves, int(level), charts.tile)
+        pieces = charts.hidden_uv / size
+        over = _windows(pieces, leaves, int(level), charts.tile)
+        hidden = _hidden(charts, pieces, over.slot, over)
+        cut[hidden.key % hidden.cells] = True
         for part in _fragments(uv, windows):
-            f, slot = windows.face[part.pair], windows.slot(part)
-            covered = part.share * per_texel[f] * size**2
-            du, dv = (part.u - uv[f, 0, 0]) * size, (part.v - uv[f, 0, 1]) * size
+            kept, share, u, v = hidden.take_from(part, windows.face[part.pair], windows.slot(part))
+            f, slot = windows.face[part.pair][kept], windows.slot(part)[kept]
+            covered = share * per_texel[f] * size**2
+            du, dv = (u - uv[f, 0, 0]) * size, (v - uv[f, 0, 1]) * size
             np.maximum.at(best, slot, covered)
             leading = covered >= best[slot]
             face[slot[leading]] = f[leading]
@@ -136,8 +133,6 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
                 np.add.at(normal[k], slot, covered * towards[f, k])
                 lead[k, slot[leading]] = centre[leading]
             np.add.at(area, slot, covered)
-        _take_away(charts, leaves, int(level), per_texel, origin, tangents, towards, (area, moment, normal), cut)
-    face[area <= 0] = -1
     with np.errstate(invalid="ignore", divide="ignore"):
         position = np.where(area > 0, moment / area, 0.0)
         length = np.linalg.norm(normal, axis=0)
@@ -154,34 +149,6 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
     )
 
 
-def _take_away(
-    charts: Charts,
-    leaves: Leaves,
-    level: int,
-    per_texel: F64,
-    origin: F64,
-    tangents: F64,
-    towards: F64,
-    sums: tuple[F64, F64, F64],
-    cut: NDArray[np.bool_],
-) -> None:
-    """Take the pieces that something lies on from area (n,), moment, normal (3, n) of texels of a level; cut (n,): of which."""
-    area, moment, normal = sums
-    before, size = area.copy(), 0.5**level
-    windows = _windows(charts.hidden_uv / size, leaves, level, charts.tile)
-    for part in _fragments(charts.hidden_uv / size, windows):
-        f, slot = charts.hidden_face[windows.face[part.pair]], windows.slot(part)
-        hidden = part.share * per_texel[f] * size**2
-        du, dv = part.u * size - charts.face_uv[f, 0, 0], part.v * size - charts.face_uv[f, 0, 1]
-        for k in range(3):
-            centre = origin[f, k] + du * tangents[0, f, k] + dv * tangents[1, f, k]
-            np.add.at(moment[k], slot, -hidden * centre)
-            np.add.at(normal[k], slot, -hidden * towards[f, k])
-        np.add.at(area, slot, -hidden)
-        cut[slot] = True
-    area[area < LEAST_SEEN * before] = 0.0
-
-
 @dataclass(frozen=True, eq=False)
 class _Fragments:
     """Pieces of triangles in cells: (n,) pair, cell x and y; share of the cell's area; centroid u, v in the atlas."""
@@ -192,6 +159,48 @@ class _Fragments:
     share: F64
     u: F64
     v: F64
+
+
+@dataclass(frozen=True, eq=False)
+class _Hidden:
+    """What of faces is hidden in cells: key (n,), of cell and face, in ascending order; share of the cell's area, and that times
+    its centroid u, v."""
+
+    key: I64
+    cells: int
+    share: F64
+    u: F64
+    v: F64
+
+    def take_from(self, part: _Fragments, face: I64, cell: I64) -> tuple[NDArray[np.bool_], F64, F64, F64]:
+        """Which fragments are left of those of faces in cells, and of these share and centroid u, v."""
+        share, u, v = part.share, part.share * part.u, part.share * part.v
+        if len(self.key):
+            key = face * self.cells + cell
+            place = np.minimum(np.searchsorted(self.key, key), len(self.key) - 1)
+            here = self.key[place] == key
+            share, u, v = (
+                whole - np.where(here, own[place], 0.0)
+                for whole, own in ((share, self.share), (u, self.u), (v, self.v))
+            )
+        kept = share > LEAST_SEEN * part.share
+        share = share[kept]
+        return kept, share, u[kept] / share, v[kept] / share
+
+
+def _hidden(charts: Charts, uv: F64, cell_of: Callable[[_Fragments], I64], windows: _Windows | None = None) -> _Hidden:
+    """Of pieces uv (k, 3, 2) of faces; cell_of: the number of each fragment's cell."""
+    cells = 1 << 40
+    keys, sums = [np.empty(0, np.int64)], [np.empty((0, 3))]
+    for part in _fragments(uv, windows):
+        piece = part.pair if windows is None else windows.face[part.pair]
+        keys.append(charts.hidden_face[piece] * cells + cell_of(part))
+        sums.append(part.share[:, None] * np.column_stack([np.ones(len(part.u)), part.u, part.v]))
+    key, which = np.unique(np.concatenate(keys), return_inverse=True)
+    share, u, v = (
+        np.bincount(which.reshape(-1), column, len(key)).astype(np.float64) for column in np.concatenate(sums).T
+    )
+    return _Hidden(key, cells, share, u, v)
 
 
 @dataclass(frozen=True, eq=False)

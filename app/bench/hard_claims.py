@@ -146,7 +146,12 @@ def near_ceiling(light: Light, twin: Light) -> list[Claim]:
     over = light.on("top") & (np.abs(light.position[:, [0, 2]] - 0.5).max(1) < 0.125)
     return [
         *as_twin(0.01, SAME, *[f for f in FACES if f != "top"])(light, twin),
-        dark("ceiling over the lamp / its mean", float(light.H[over].max(initial=0.0)) / light.mean(light.on("top")), 0.03, EDGE),
+        dark(
+            "ceiling over the lamp / its mean",
+            float(light.H[over].max(initial=0.0)) / light.mean(light.on("top")),
+            0.03,
+            EDGE,
+        ),
     ]
 
 

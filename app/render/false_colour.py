@@ -90,7 +90,7 @@ def _ends(kind: str, lightmap: Lightmap) -> tuple[float, float]:
     nodes, sample = lightmap.nodes, sampled_tiles(lightmap.nodes)
     materials, area = lightmap.scene.materials, nodes.surfaces.area[sample]
     emission = sampled_colours(nodes, [m.emission for m in materials], nodes.emission_tiles, sample)
-    light: F32 = sampled_irradiance(lightmap) * np.float32(value_per_radiance(kind) / np.pi)
+    light: F32 = lightmap.with_ambient(sampled_irradiance(lightmap)) * np.float32(value_per_radiance(kind) / np.pi)
     if kind == "luminance":
         light = light * sampled_colours(nodes, [m.albedo for m in materials], nodes.albedo_tiles, sample)
     values = light @ LUMINANCE

@@ -103,8 +103,8 @@ class Solver(Protocol[OptionsT]):
         """The residual as a share of the emitted power, now. Waits for the GPU."""
 
     def step(self, shots: int) -> int:
-        """Make up to ``shots`` shots, and no more than one batch of its own; how many were issued. Other work that must be done
-        first is done instead, and counts as so many."""
+        """Make up to ``shots`` shots, or a few more where some belong together, and no more than one batch of its own; how many
+        were issued. Other work that must be done first is done instead, and counts as so many."""
 
     def step_part(self, bands: int) -> bool:
         """A part of a step of one shot, its longest pass cut into so many bands; whether the step is whole now. Everything else

@@ -47,9 +47,9 @@ def put(lightmap: Lightmap, name: str, tiles: F64) -> None:
     lightmap.texture(name).write(np.ascontiguousarray(image, np.float32).tobytes())
 
 
-def put_ambient(lightmap: Lightmap, a: tuple[float, float, float]) -> None:
-    """Ambient light (RGB) [W/m²]."""
-    lightmap.texture("t_ambient").write((np.array([*a, 0.0], np.float32) / np.float32(lightmap.unit)).tobytes())
+def put_ambient(lightmap: Lightmap, a: tuple[float, float, float], share: float = 1.0) -> None:
+    """Ambient light (RGB) [W/m²], and its share of what has arrived."""
+    lightmap.texture("t_ambient").write(np.array([*np.array(a) / lightmap.unit, share], np.float32).tobytes())
 
 
 def even(lightmap: Lightmap, H: tuple[float, float, float]) -> F64:

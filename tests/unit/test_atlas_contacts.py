@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import shapely
 from numpy.typing import NDArray
 from solver_scenes import grey, quads_scene
 
 from app.atlas.parametrize import parametrize
 from app.atlas.points import random_points
-from app.atlas.texels import texel_surfaces, uniform_leaves
+from app.atlas.texels import texel_count, texel_surfaces, uniform_leaves
 from app.scene.model import F64, Scene
 
 CEILING = [(0, 3, 0), (2, 3, 0), (2, 3, 2), (0, 3, 2)]
@@ -109,3 +110,55 @@ def test_a_thin_slab_does_not_hide_itself() -> None:
     scene = scene_of(FLOOR, *turned_box(1.0, 1.0001))
     assert seen_area(scene, 1.0001)[0] == pytest.approx(0.25, rel=1e-6)
     assert seen_area(scene, 1.0, up=False)[0] == pytest.approx(0.25, rel=1e-6)
+
+
+def upright(low: tuple[float, float], high: tuple[float, float], top: float = 0.5) -> list[list[tuple[float, ...]]]:
+    """A box along the axes from corner to corner (x, z), without its bottom."""
+    (x0, z0), (x1, z1) = low, high
+    lower, upper = ([(x1, y, z0), (x1, y, z1), (x0, y, z1), (x0, y, z0)] for y in (0.0, top))
+    return [upper[::-1], *([lower[k], upper[k], upper[k - 3], lower[k - 3]] for k in range(4))]
+
+
+@pytest.mark.parametrize("nth", range(40))
+def test_boxes_along_texels_edges_corners_and_the_diagonal_hide_what_they_stand_on(nth: int) -> None:
+    """The first on a grid that the floor's own corners, edges and diagonal are on, too; others in part over it."""
+    random = np.random.default_rng(nth)
+    boxes, footprints = [], []
+    for k in range(1 + nth % 3):
+        (x0, x1), (z0, z1) = (np.sort(random.choice(9, 2, replace=False)) * (0.25 - 0.01 * k) for _ in "xz")
+        footprints.append(shapely.box(x0, z0, x1, z1))
+        boxes += upright((x0, z0), (x1, z1), 0.5 + 0.1 * k)
+    covered = shapely.union_all(footprints)
+    area, _, position = seen_area(scene_of(FLOOR, *boxes))
+    assert area == pytest.approx(4 - covered.area, rel=1e-6, abs=1e-9)
+    # but where a corner leaves a texel the shape of an L, or a gap divides it, whose middle is no part of it
+    assert shapely.contains_xy(covered.buffer(-1e-6), position[:, 0], position[:, 2]).mean() < 0.01
+
+
+@pytest.mark.parametrize("double_sided", [False, True])
+def test_what_is_open_hides_no_floor_in_it(double_sided: bool) -> None:
+    """Walls around a yard; a tray with a floor of its own, a little thicker than nothing; a house that is looked into."""
+    yard = turned_box(0.0, 0.5)[SIDES]
+    assert seen_area(scene_of(FLOOR, *yard, double_sided=double_sided))[0] == pytest.approx(4, rel=1e-6)
+    outer, inner = upright((0.5, 0.5), (1.5, 1.5), 0.3), upright((0.501, 0.501), (1.499, 1.499), 0.3)
+    rim = [[(a, 0.3, b), (c, 0.3, d), (e, 0.3, f), (g, 0.3, h)] for a, b, c, d, e, f, g, h in RIMS]
+    bottom, floor = [[(x, y, z) for x, z in corners] for y, corners in ((0.0, OUTER), (0.001, INNER[::-1]))]
+    inside = [[(x, max(y, 0.001), z) for x, y, z in quad[::-1]] for quad in inner[1:]]
+    scene = scene_of(bottom, floor, *outer[1:], *inside, *rim, double_sided=double_sided)
+    assert seen_area(scene, 0.001)[0] == pytest.approx(0.998**2, rel=1e-6)
+    if double_sided:
+        assert seen_area(scene_of(FLOOR, *turned_box(0.0, 0.5)[TOP:], double_sided=True))[0] == pytest.approx(
+            4, rel=1e-6
+        )
+
+
+OUTER = [(1.5, 0.5), (1.5, 1.5), (0.5, 1.5), (0.5, 0.5)]
+INNER = [(1.499, 0.501), (1.499, 1.499), (0.501, 1.499), (0.501, 0.501)]
+RIMS = [(*OUTER[k], *INNER[k], *INNER[k - 3], *OUTER[k - 3]) for k in range(4)]
+
+
+def test_as_many_texels_are_told_as_there_are() -> None:
+    for quads in ([FLOOR], [FLOOR, *turned_box(0.0, 0.5)], [FLOOR, *upright((1.25, 0.0), (2.0, 0.75))]):
+        charts = parametrize(scene_of(*quads), texels=3000)
+        surfaces = texel_surfaces(scene_of(*quads), charts, uniform_leaves(charts))
+        assert texel_count(charts) == np.count_nonzero(surfaces.face >= 0) == np.count_nonzero(surfaces.area > 0)

@@ -12,7 +12,7 @@ uniform int u_shots;  // of a batch that has shot since
 uniform vec3 u_albedo;
 uniform float u_area;  // solver frame
 
-layout(location = 0) out vec4 out_ambient;
+layout(location = 0) out vec4 out_ambient;  // a: over what was received until now, on average
 
 const float LEAST_LOST = 0.01;  // at a bounce: with less, errors of form factors would be shot ahead, a thousandfold
 const float CANCELS = 1e-6;  // under this share of Σ |Σ r A| over tiles, Σ r A is what rounding leaves
@@ -34,5 +34,7 @@ void main() {
     vec3 stays = clamp(1.0 - gone / max(shot, vec3(1e-30)), 0.0, 1.0);
     stays = mix(vec3(0.0), stays, greaterThan(shot, vec3(0.0)));
     unshot -= batch * (1.0 - u_albedo * stays);  // what it shot, and what surfaces keep of that to shoot
-    out_ambient = vec4(unshot * stays / max(u_area * max(1.0 - u_albedo * stays, LEAST_LOST), 1e-30), 0.0);
+    vec3 ambient = unshot * stays / max(u_area * max(1.0 - u_albedo * stays, LEAST_LOST), 1e-30);
+    vec3 arrived = shot * stays / u_area;
+    out_ambient = vec4(ambient, dot(abs(ambient), vec3(1.0)) / max(dot(abs(arrived), vec3(1.0)), 1e-30));
 }

@@ -23,7 +23,7 @@ def highest_level(tile: int) -> int:
 
 @dataclass(frozen=True)
 class ShootingOptions(Options):
-    """Only ``storage`` restarts the solution when it changes; the rest acts on the next shot."""
+    """Only ``storage`` restarts the solution when it changes; ``ambient`` acts on what is shown, the rest on the next shot."""
 
     level: int | None = option(
         None,

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 
 from app.atlas.lightmap import Lightmap
 from app.atlas.node_set import Moves
@@ -143,7 +144,8 @@ class ShotBuffers:
         self.finer.write(self.finer_levels.tobytes())
 
     def divide_at(self, places: NDArray[np.bool_], finer: int) -> None:
-        """Let patches be so much finer in blocks that hold any of these texels (slots, t, t), see patch_level.glsl."""
+        """Let patches be so much finer in blocks that hold or touch any of these texels (slots, t, t), see patch_level.glsl."""
+        places = maximum_filter(places, size=(1, 3, 3))
         blocks = self._tile >> BLOCK_LEVEL
         held = places.reshape(-1, blocks, 1 << BLOCK_LEVEL, blocks, 1 << BLOCK_LEVEL).any((2, 4))
         place = np.divmod(np.arange(len(places)), self._tiles.shape[1])

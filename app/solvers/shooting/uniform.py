@@ -44,7 +44,7 @@ from app.solvers.shooting.stages import (
 COARSE_LEAVE, FINE_LEAVE = 5e-3, 10
 MOST = 0.02  # of the emitted power: emitters of more are divided, one lamp into 50 patches at least: shadows add up to soft ones
 PAID = 1 / 16  # of that: families that owe no more may pay when others shoot as much
-FAMILY = 4  # patches, see family.glsl
+FAMILY = 4  # patches, two along each edge, see family.glsl
 FEET = 2  # 1 + by how many levels patches at the foot of what stands on them are finer than the finest: they light it from near
 WHOLE = object()  # no part is left
 REPORT_LAG = 2  # read-backs in flight before the oldest is looked at
@@ -84,12 +84,17 @@ class UniformShooting(ShotPasses):
         self.buffers.ambient_target.clear()
         self._weigh_scene()
         self._divide_emitters()
-        self.buffers.divide_at(self.lightmap.nodes.surfaces.cut, FEET)
+        if self.lightmap.storage != "fixed8":  # 8 bits do not hold what a small one gives
+            self.buffers.divide_at(self.lightmap.nodes.surfaces.cut, FEET)
         self.report = StepReport(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
 
     def set_options(self, options: ShootingOptions) -> None:
         """Use other knobs from the next shot on. Another storage format starts again."""
         self.finish()
+        if options.replace(ambient=self.options.ambient) == self.options:
+            self.options = options
+            self._expect_anew()
+            return
         restart = options.storage != self.options.storage
         self._remake_stages(options)
         if restart:
@@ -103,8 +108,13 @@ class UniformShooting(ShotPasses):
         self._phase, self._audits, self._even = min(self._phase, len(fresh.choices) - 1), True, False
         self.buffers.finest_is(self.level - finest)
         self._divide_emitters()
+        self._expect_anew()
+
+    def _expect_anew(self) -> None:
+        """What is still to come, of all that is unshot now."""
         self.lightmap.ambient_target.clear()
         if self.shots:
+            self.unshot_share()
             self._expect()
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
@@ -144,7 +154,7 @@ class UniformShooting(ShotPasses):
         sums, _, reflectance = self._tile_sums()
         self._area = float(sums[3]) / self._watt
         self._albedo = tuple((reflectance[:3] / max(sums[3], 1e-300)).tolist())
-        self._paid = max(PAID * MOST * float(self._emitted.sum()) / self._watt, at_least)
+        self._paid = float(np.float32(max(PAID * MOST * float(self._emitted.sum()) / self._watt, at_least)))
 
     def _divide_emitters(self) -> None:
         """Let no patch hold much of the light, but where 8 bits do not hold what a small one gives. What was divided stays so:
@@ -236,9 +246,10 @@ class UniformShooting(ShotPasses):
         self.finish()
         runs = np.zeros((self.buffers.runs.width, 4), np.float32)
         level = self.patch_edge(corner).bit_length() - 1
+        choice = self.stages.choices[0] if self._choice.pays else self._choice
         runs[0] = 1e38, corner[0], corner[1] * LEVELS + level, 0.0
         self.buffers.runs.write(runs.tobytes())
-        self._describe(self._choice, 1)
+        self._describe(choice, 1)
         row = self._shooter_rows(1)
         with AuditTargets(self.gpu, self.lightmap) as targets:
             shares = self._hand_out(targets, 0, float(powers_of(row)[0]))
@@ -361,7 +372,7 @@ class UniformShooting(ShotPasses):
         emitted = self._emitted.sum()
         residual = report[0, 0] * self._watt / emitted if emitted > 0 else 0.0
         if choice is self._choice and choice.pays:
-            if report[REPORT_HEAD + 5, 3] == 0:
+            if report[0, 2] <= self._paid:
                 self._next_phase()
         elif choice is self._choice and residual <= max(COARSE_LEAVE, self.options.residual):
             finest = choice is self.stages.choices[-1]
