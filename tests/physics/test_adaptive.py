@@ -20,7 +20,7 @@ DENSITY = 4.0  # of the roots [1/m]
 ROUGH = 0.1  # a threshold that splits about half of a room with shadows
 FEW_STEPS = 1500
 FORM_FACTORS = 0.005  # what they are off by, see test_energy.py
-PATCHES = 0.012  # of the light of patches that are as large as their distance
+PATCHES = 0.01  # of the light of patches that are as large as their distance
 
 
 def grown(gpu: Gpu, scene: Scene, **options: object) -> Solution:
