@@ -13,7 +13,7 @@ from app.scene.load import load_scene
 from app.scene.model import Scene
 from app.solvers.shooting.shot import Shot
 from app.solvers.shooting.stages import EMITTER
-from app.solvers.shooting.uniform import FEET, MOST
+from app.solvers.shooting.uniform import MOST
 
 EXACT = 1e-5  # sums of 32-bit floats
 
@@ -160,26 +160,4 @@ def test_where_texels_hold_much_of_the_light_none_shoots_for_others(gpu: Gpu, te
     power = box.lightmap.emission().sum(-1) * box.lightmap.nodes.surfaces.area
     assert (power.max() <= MOST * power.sum()) == shares
     assert marks.any() and (marks.max() >= EMITTER) == shares
-    box.release()
-
-
-@pytest.mark.parametrize("solver", ["shooting", "adaptive"])
-def test_patches_beside_a_body_are_finer_where_texels_are(gpu: Gpu, solver: str) -> None:
-    """Not in the large texels of a quadtree's roots: a block of those is mostly elsewhere."""
-    adaptive = solver == "adaptive"
-    options = {"residual": 0.05, "depth": 3, "gradient": 0.2, "solver": solver}
-    box = begin(gpu, load_scene("cornell-box"), texels=2000 if adaptive else 8000, **options)
-
-    def cut_leaves() -> tuple[np.ndarray, np.ndarray]:
-        """Whether their texels are as fine as uniform ones, and how much finer their patches."""
-        nodes, tiles = box.lightmap.nodes, box.solver.buffers._tiles
-        cut = np.flatnonzero(nodes.surfaces.cut.any((1, 2)) & nodes.used)
-        finer = (tiles[np.divmod(cut, tiles.shape[1])] % EMITTER).max((1, 2))
-        return box.solver._levels_above(cut) <= 0, finer
-
-    fine, finer = cut_leaves()
-    assert len(fine) and not (finer[~fine] > 0).any() and (fine.any() != adaptive)
-    box.settle()
-    fine, finer = cut_leaves()
-    assert fine.any() and (finer[fine] >= FEET).all()
     box.release()

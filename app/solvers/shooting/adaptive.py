@@ -242,7 +242,6 @@ class AdaptiveShooting(Reshooting):
         self._emitted = self.lightmap.emitted
         gone, came = (change.parents, change.children) if change.split else (change.children, change.parents)
         self.buffers.hand_down(change)
-        self._divide_feet()
         self._exchange(gone, came, inherit=change.split)
 
     def _drop_judged(self) -> None:

@@ -84,7 +84,8 @@ class UniformShooting(ShotPasses):
         self.buffers.ambient_target.clear()
         self._weigh_scene()
         self._divide_emitters()
-        self._divide_feet()
+        if self.lightmap.storage != "fixed8":  # 8 bits do not hold what a small one gives
+            self.buffers.divide_at(self.lightmap.nodes.surfaces.cut, FEET)
         self.report = StepReport(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
 
     def set_options(self, options: ShootingOptions) -> None:
@@ -164,14 +165,6 @@ class UniformShooting(ShotPasses):
         slots = np.arange(len(power))
         largest, finest = (self._levels_of(slots, choice) for choice in (self._choice, self.stages.choices[-1]))
         self.buffers.divide(power, MOST * self._emitted.sum(), largest, finest, self._levels_above(slots))
-
-    def _divide_feet(self) -> None:
-        """Let patches be fine beside what stands on a surface, but in blocks of larger texels than uniform ones, which are mostly
-        elsewhere, and where 8 bits do not hold what a small one gives."""
-        if self.lightmap.storage != "fixed8":
-            cut = self.lightmap.nodes.surfaces.cut
-            fine = self._levels_above(np.arange(len(cut))) <= 0
-            self.buffers.divide_at(cut & fine[:, None, None], FEET)
 
     @property
     def _choice(self) -> ChoiceStages:
