@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
 from app import __version__
-from app.atlas.lightmap import STORAGE
 from app.atlas.options import AtlasOptions
 from app.errors import UserError
+from app.lightmap.lightmap import STORAGE
 from app.options import add_flags
 from app.render.options import DisplayOptions
 from app.solvers import ShootingOptions
@@ -307,19 +307,19 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def _table_names(text: str) -> tuple[str, ...]:
-    from app.bench.tables import table_names
+    from app.bench.papers.tables import table_names
 
     return table_names(text)
 
 
 def _method_names(text: str) -> tuple[str, ...]:
-    from app.bench.methods import method_names
+    from app.bench.accuracy.methods import method_names
 
     return method_names(text)
 
 
 def _peer_names(text: str) -> tuple[str, ...]:
-    from app.bench.peers import peer_names
+    from app.bench.peers.peers import peer_names
 
     return peer_names(text)
 
@@ -328,60 +328,60 @@ def _peer_names(text: str) -> tuple[str, ...]:
 
 
 def _view(flags: argparse.Namespace) -> int:
-    from app.headless import view_or_shot
+    from app.commands.headless import view_or_shot
 
     return view_or_shot(flags)
 
 
 def _shot(flags: argparse.Namespace) -> int:
-    from app.headless import shot
+    from app.commands.headless import shot
 
     return shot(flags)
 
 
 def _bake(flags: argparse.Namespace) -> int:
-    from app.headless import bake
+    from app.commands.headless import bake
 
     return bake(flags)
 
 
 def _info(flags: argparse.Namespace) -> int:
-    from app.info import info
+    from app.commands.info import info
 
     return info(flags)
 
 
 def _bench_shots(flags: argparse.Namespace) -> int:
-    from app.bench.shots import bench_shots
+    from app.bench.speed.shots import bench_shots
 
     return bench_shots(flags)
 
 
 def _bench_frames(flags: argparse.Namespace) -> int:
-    from app.bench.frames import bench_frames
+    from app.bench.speed.frames import bench_frames
 
     return bench_frames(flags)
 
 
 def _bench_tables(flags: argparse.Namespace) -> int:
-    from app.bench.tables import bench_tables
+    from app.bench.papers.tables import bench_tables
 
     return bench_tables(flags)
 
 
 def _bench_error(flags: argparse.Namespace) -> int:
-    from app.bench.error import bench_error
+    from app.bench.accuracy.error import bench_error
 
     return bench_error(flags)
 
 
 def _bench_hard(flags: argparse.Namespace) -> int:
-    from app.bench.hard import bench_hard
+    from app.validation.run import bench_hard
 
     return bench_hard(flags)
 
 
 def _doctor(flags: argparse.Namespace) -> int:
-    from app.doctor import doctor
+    from app.commands.doctor import doctor
 
     return doctor(flags)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu
+from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
 from app.render.false_colour import LUMINANCE
 from app.render.frame import FrameRenderer

@@ -11,17 +11,17 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from app.atlas.charts import DEFAULT_TILE
-from app.atlas.lightmap import Lightmap
-from app.atlas.node_set import NodeSet
 from app.atlas.parametrize import parametrize
-from app.atlas.quadtree import quadtree_nodes
 from app.gpu import Gpu
-from app.projections import PROJECTIONS
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.quadtree import quadtree_pool
+from app.lightmap.tile_pool import TilePool
 from app.scene.model import F32, F64, Material, Scene
-from app.solvers import SOLVERS, EnergyBook, ShootingOptions, UniformShooting
+from app.solvers import SOLVERS, EnergyBalance, ShootingOptions, UniformShooting
 from app.solvers.shooting.options import MAX_LEVEL
 from app.solvers.shooting.shot import Audit
 from app.solvers.shooting.stages import BATCH, LEVEL, ROOT_LEVEL
+from app.visibility.projections import PROJECTIONS
 
 UNIT_SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])  # faces +z
 ENOUGH = 20_000  # shots: a solve that needs more does not converge
@@ -93,23 +93,23 @@ class Solution:
 
     @property
     def _covered(self) -> NDArray[np.bool_]:
-        return self.lightmap.nodes.surfaces.area > 0
+        return self.lightmap.pool.surfaces.area > 0
 
     @property
     def position(self) -> F64:
-        return self.lightmap.nodes.surfaces.position[self._covered]
+        return self.lightmap.pool.surfaces.position[self._covered]
 
     @property
     def normal(self) -> F32:
-        return self.lightmap.nodes.surfaces.normal[self._covered]
+        return self.lightmap.pool.surfaces.normal[self._covered]
 
     @property
     def area(self) -> F64:
-        return self.lightmap.nodes.surfaces.area[self._covered]
+        return self.lightmap.pool.surfaces.area[self._covered]
 
     @property
     def object(self) -> NDArray[np.int32]:
-        triangle = self.lightmap.charts.face_triangle[self.lightmap.nodes.surfaces.face[self._covered]]
+        triangle = self.lightmap.charts.face_triangle[self.lightmap.pool.surfaces.face[self._covered]]
         return self.lightmap.scene.object_ids[triangle]
 
     @property
@@ -129,7 +129,7 @@ class Solution:
         return self.lightmap.albedo()[self._covered].astype(np.float64)
 
     @property
-    def book(self) -> EnergyBook:
+    def book(self) -> EnergyBalance:
         return self.solver.books()
 
     def means(self, values: F64) -> F64:
@@ -164,13 +164,11 @@ class Solution:
 
     def patches(self) -> NDArray[np.int64]:
         """(p, 2) column and row of the lower texel of every patch of the shooting level that covers a surface."""
-        nodes, found = self.lightmap.nodes, []
-        for slot in range(nodes.tiles):
-            edge = self.solver.patch_edge(nodes.corner(slot))
-            inside = (
-                nodes.surfaces.area[slot].reshape(nodes.tile // edge, edge, nodes.tile // edge, edge).sum((1, 3)) > 0
-            )
-            found.append(np.argwhere(inside)[:, ::-1] * edge + nodes.corner(slot))
+        pool, found = self.lightmap.pool, []
+        for slot in range(pool.tiles):
+            edge = self.solver.patch_edge(pool.corner(slot))
+            inside = pool.surfaces.area[slot].reshape(pool.tile // edge, edge, pool.tile // edge, edge).sum((1, 3)) > 0
+            found.append(np.argwhere(inside)[:, ::-1] * edge + pool.corner(slot))
         return np.concatenate(found)
 
     def audits(self) -> list[Audit]:
@@ -197,12 +195,12 @@ def begin(
     roots, which uniform texels are as fine as, and shooting levels count from there."""
     charts = parametrize(scene, texels=texels, density=density, tile=tile)
     shooting = ShootingOptions(depth=1).replace(**options)
-    nodes = quadtree_nodes(scene, charts) if SOLVERS[solver].adaptive else NodeSet(scene, charts)
+    pool = quadtree_pool(scene, charts) if SOLVERS[solver].adaptive else TilePool(scene, charts)
     if SOLVERS[solver].adaptive:
         shooting = shooting.replace(
             level=min((LEVEL if shooting.level is None else shooting.level) + ROOT_LEVEL, MAX_LEVEL)
         )
-    lightmap = Lightmap(gpu, nodes, storage=shooting.storage)
+    lightmap = Lightmap(gpu, pool, storage=shooting.storage)
     return Solution(lightmap, SOLVERS[solver](gpu, lightmap, shooting))
 
 

@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from app import cache
 from app.atlas.sides import totals
 from app.scene.model import F64, I32
+from app.util import cache
 
 Progress = Callable[[str, float], None]
 

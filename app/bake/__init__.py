@@ -6,8 +6,6 @@ writing leaves the previous files as they were.
 
 from __future__ import annotations
 
-import json
-import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,9 +18,10 @@ from numpy.typing import NDArray
 from app.atlas.charts import Charts
 from app.bake.exr import write_irradiance
 from app.bake.gltf_writer import glb_bytes
-from app.bake.gutter import fill_gutter
 from app.errors import UserError
+from app.lightmap.gutter import fill_gutter
 from app.scene.model import F32, Scene
+from app.util.json_text import json_text
 
 __all__ = ["IRRADIANCE_NAME", "REPORT_NAME", "SCENE_NAME", "BakeFiles", "prepare_directory", "write_bake"]
 
@@ -84,21 +83,3 @@ def write_bake(
         for written in temporary.values():
             written.unlink(missing_ok=True)
     return files
-
-
-def json_text(report: Mapping[str, Any]) -> str:
-    """The report as JSON with sorted keys, so that equal reports are equal files."""
-    return json.dumps(_plain(report), indent=2, sort_keys=True, allow_nan=False, ensure_ascii=False) + "\n"
-
-
-def _plain(value: Any) -> Any:
-    """``value`` from JSON's own types: numpy numbers and arrays, paths and tuples are converted."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return str(value) if isinstance(value, Path) else value

@@ -14,16 +14,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.atlas.lightmap import Lightmap
-from app.atlas.node_set import NodeSet
 from app.atlas.points import Points
 from app.compare.light import ReferenceLight
-from app.compare.probe import Probe
 from app.compare.texels import ReferenceTexels
 from app.gpu import Gpu, ReadBack
-from app.history import ERRORS, Rows
-from app.metrics import DARK, bias, lit_points, median_local, quantile_local, relative_rms
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.probe import Probe
+from app.lightmap.tile_pool import TilePool
+from app.reference.metrics import DARK, bias, lit_points, median_local, quantile_local, relative_rms
 from app.scene.model import F32, F64
+from app.util.rows import Rows
 
 POINTS = 4096
 POINTS_SEED = 3
@@ -42,11 +42,11 @@ class ErrorNow(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A reference, random points to measure at, and what the texels of a node set, none of a quadtree, have of it."""
+    """A reference, random points to measure at, and what the texels of a tile pool, none of a quadtree, have of it."""
 
     light: ReferenceLight
     points: Points
-    nodes: NodeSet
+    pool: TilePool
     tiles: F32 | None
 
 
@@ -65,7 +65,7 @@ class Comparison:
         self.dark = DARK * float(values.mean())
         self._reference = values[lit]
         self._probe = Probe(gpu, lightmap, points.only(lit))
-        self.texels = ReferenceTexels(gpu, lightmap, light, found.tiles if found.nodes is lightmap.nodes else None)
+        self.texels = ReferenceTexels(gpu, lightmap, light, found.tiles if found.pool is lightmap.pool else None)
         self.error: ErrorNow | None = None
         self._asked: tuple[ReadBack, int, float, object] | None = None
         self._frames, self._due = 0, 0.0
@@ -83,7 +83,7 @@ class Comparison:
 
     def begin(self) -> None:
         """All light is unshot again: another curve begins."""
-        self.errors = Rows(ERRORS)
+        self.errors = Rows(("shots", "seconds", "rms", "median"))
         self._measured: object = None
 
     def measure(self, shots: int, seconds: float, state: object, *, wait: bool = False) -> bool:

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from app.atlas.node_set import NodeSet
 from app.atlas.points import Points, SideIndex, barycentric, bilinear
 from app.atlas.sides import lit_sides, scene_size
 from app.bake.read import Bake
 from app.errors import UserError
+from app.lightmap.tile_pool import TilePool
 from app.scene.model import F32, F64, I32, Material, Scene
 
 Ints = NDArray[np.int64]
@@ -54,15 +54,15 @@ class ReferenceLight:
         side = self._sides.of(points)
         return bilinear(self.image, np.einsum("nk,nkc->nc", points.weights, self.uv[side]))
 
-    def on_tiles(self, nodes: NodeSet, slots: Ints) -> F32:
+    def on_tiles(self, pool: TilePool, slots: Ints) -> F32:
         """At the middles of all texels of these slots (n, t, t, 3) [W/m²]; 0 where nothing is covered."""
-        face = nodes.surfaces.face[slots]
+        face = pool.surfaces.face[slots]
         covered = face >= 0
-        on, scene = face[covered], nodes.scene
-        triangle = nodes.charts.face_triangle[on]
-        weights = barycentric(nodes.surfaces.position[slots][covered], scene.corners[triangle])
+        on, scene = face[covered], pool.scene
+        triangle = pool.charts.face_triangle[on]
+        weights = barycentric(pool.surfaces.position[slots][covered], scene.corners[triangle])
         out = np.zeros((*face.shape, 3), np.float32)
-        out[covered] = self.at(Points(triangle, nodes.charts.face_back[on], weights))
+        out[covered] = self.at(Points(triangle, pool.charts.face_back[on], weights))
         return out
 
     def other_materials(self, materials: tuple[Material, ...]) -> list[str]:

@@ -1,6 +1,6 @@
 """A pass is one draw call and one sentence: which program, what it reads, which values, where it draws.
 
-    Pass(gpu, "shooting/receive").draw(target, textures={"t_normal": n}, uniforms={"u_shot": 3}, vertices=6, instances=tiles)
+    Pass(gpu, "render/surfaces").draw(target, textures={"t_normal": n}, uniforms={"u_time": 3}, vertices=6, instances=tiles)
 
 Everything binds by name, checked both ways: a name that the program lacks, or one that was not given, raises.
 """
@@ -27,7 +27,7 @@ BLEND: dict[str, Any] = {
 
 
 class Pass:
-    """A program with its defines and slots, ready to draw. The name is also its label in the timers."""
+    """A program with its defines and slots, ready to draw. The name is also its label in the timers, without ``solvers/``."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class Pass:
         label: str | None = None,
     ) -> None:
         """vertex: the vertex shader, where the program has none of its own."""
-        self.gpu, self.name, self.label, self._vertex = gpu, name, label or name, vertex
+        self.gpu, self.name, self.label, self._vertex = gpu, name, label or name.removeprefix("solvers/"), vertex
         self._defines, self._slots = dict(defines or {}), dict(slots or {})
         self._generation = -1
         self._bind()
@@ -111,7 +111,7 @@ class Pass:
                 if mesh.per_instance:
                     array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=mesh.count)
                 else:
-                    array.render(mode, vertices=mesh.drawn, instances=instances)
+                    array.render(mode, vertices=mesh.visible_mesh, instances=instances)
         if scissor:  # or later clears would keep it
             target.scissor = None  # type: ignore[assignment]  # None is no scissor; moderngl's stub is wrong
         for plane in range(clip_distances):
@@ -144,7 +144,7 @@ class Mesh:
         self.per_instance = per_instance
         self._indices = None if indices is None else gpu.ctx.buffer(indices)
         self.count = len(data) // sum(int(f[0]) * 4 for f in attributes.values())
-        self.drawn = -1  # indices, or all vertices
+        self.visible_mesh = -1  # indices, or all vertices
         self._arrays: list[tuple[moderngl.Program, moderngl.VertexArray]] = []
         self._generation = gpu.shaders.generation
 
@@ -171,7 +171,7 @@ class Mesh:
         assert self._indices is not None
         self._indices.orphan()  # what is being drawn keeps its own
         self._indices.write(indices)
-        self.drawn = indices.size
+        self.visible_mesh = indices.size
 
     def _release_arrays(self) -> None:
         for _, array in self._arrays:

@@ -34,9 +34,8 @@ class ShaderError(Exception):
 
 
 class ShaderLibrary:
-    """Compiles programs by name: ``shooting/receive`` is ``receive.vert.glsl`` (or a shared one, by default the full-screen
-    triangle) and ``receive.frag.glsl``. Keeps what it has compiled;
-    ``reload`` compiles all again and keeps the last good program."""
+    """Compiles programs by name: ``render/pick`` is ``pick.vert.glsl`` (or a shared one, by default the full-screen triangle) and
+    ``pick.frag.glsl``. Keeps what it has compiled; ``reload`` compiles all again and keeps the last good program."""
 
     def __init__(self, ctx: moderngl.Context, root: Path = SHADERS) -> None:
         self._ctx = ctx

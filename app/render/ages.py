@@ -7,19 +7,19 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.node_set import NodeSet
 from app.atlas.texels import Leaves
+from app.lightmap.tile_pool import TilePool
 from app.scene.model import F32
 
 NEVER, LATER = -1e6, 1e6  # s
 
 
 class LeafAges:
-    """Follows the leaves of one node set, by the places that they cover: slots are used again, places are not."""
+    """Follows the leaves of one tile pool, by the places that they cover: slots are used again, places are not."""
 
-    def __init__(self, nodes: NodeSet) -> None:
+    def __init__(self, pool: TilePool) -> None:
         self._start = time.perf_counter()
-        self._keys = nodes.leaves.keys
+        self._keys = pool.leaves.keys
         self._born = np.full(len(self._keys), NEVER, np.float32)
 
     @property
@@ -27,13 +27,13 @@ class LeafAges:
         """s, in the time of ``born``."""
         return time.perf_counter() - self._start
 
-    def born(self, nodes: NodeSet) -> F32:
+    def born(self, pool: TilePool) -> F32:
         """(slots,) f32: when each leaf was first seen in place of a coarser one [s], else NEVER."""
-        keys, order = nodes.leaves.keys, np.argsort(self._keys)
+        keys, order = pool.leaves.keys, np.argsort(self._keys)
         at = order[np.minimum(np.searchsorted(self._keys[order], keys), len(order) - 1)]
         born = np.where((keys >= 0) & (self._keys[at] == keys), self._born[at], np.float32(NEVER))
         fresh = np.flatnonzero((keys >= 0) & (self._keys[at] != keys))
-        born[fresh[self._was_coarser(nodes.leaves.only(fresh))]] = self.now
+        born[fresh[self._was_coarser(pool.leaves.only(fresh))]] = self.now
         self._keys, self._born = keys, born
         return born
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.node_set import Frame
+from app.lightmap.tile_pool import SolverSpace
 from app.scene.model import F64, Camera
 
 POLE = np.radians(89.5)  # orbiting stops short of straight up and down
 NEAREST = 0.02  # near plane, in scene radii or target distances: what is closer is clamped to it, not cut (frame.py)
-FAR_MARGIN = 1.01  # the scene has radius 1 in the solver frame
+FAR_MARGIN = 1.01  # the scene has radius 1 in the solver space
 UP = np.array([0.0, 1.0, 0.0])
 
 
@@ -82,11 +82,11 @@ class CameraView:
 
     # -- matrices ------------------------------------------------------------------------------------------------------
 
-    def clip_from_local(self, aspect: float, frame: Frame) -> F64:
-        """(4, 4) f64, column vectors: solver frame (radius 1) to clip space; aspect = width / height."""
-        eye = frame.local_from_world(self.eye)
+    def clip_from_local(self, aspect: float, space: SolverSpace) -> F64:
+        """(4, 4) f64, column vectors: solver space (radius 1) to clip space; aspect = width / height."""
+        eye = space.local_from_world(self.eye)
         away = float(np.linalg.norm(eye))
-        near = max(NEAREST * min(1.0, self.distance / frame.scale), away - FAR_MARGIN)
+        near = max(NEAREST * min(1.0, self.distance / space.scale), away - FAR_MARGIN)
         far = max(away + FAR_MARGIN, 2 * near)
         camera_from_local = np.eye(4)
         camera_from_local[:3, :3] = self.world_from_camera[:3, :3].T

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import QUAD_FORMAT, Lightmap
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
+from app.lightmap.lightmap import QUAD_FORMAT, Lightmap
 from app.render.edges import KINDS, Kind, unequal_edges
 from app.scene.model import F64
 
@@ -21,21 +21,21 @@ class EdgeTexels:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, border: int) -> None:
         self._gpu, self._lightmap, self._border = gpu, lightmap, border
-        self._found = unequal_edges(lightmap.nodes, border, np.flatnonzero(lightmap.nodes.used))
+        self._found = unequal_edges(lightmap.pool, border, np.flatnonzero(lightmap.pool.used))
         self._of_rows: dict[tuple[int, int], list[_Batch]] = {}
         self._place = Pass(gpu, "render/border", vertex="common/rects", label="edges")
 
     def follow(self, slots: NDArray[np.int64]) -> None:
         """The leaves in these slots are others, or have other neighbours."""
         self._forget()
-        for kind, some in unequal_edges(self._lightmap.nodes, self._border, slots).items():
+        for kind, some in unequal_edges(self._lightmap.pool, self._border, slots).items():
             known = self._found[kind]
             self._found[kind] = np.concatenate([known[~np.isin(known[:, 0], slots)], some])
 
     def draw(self, target: Framebuffer, first: int, end: int, make: Make) -> None:
         """Those in some rows of ``target``, the display texels: let ``make`` draw them, given what to bind besides light, and
         then bring them to their places. One target after the other, since a change of it makes a rasteriser wait."""
-        along = {kind: kind.along(self._lightmap.nodes.tile, self._border) for kind in KINDS}
+        along = {kind: kind.along(self._lightmap.pool.tile, self._border) for kind in KINDS}
         batches = self._batches(first, end)
         for batch in batches:
             values = {"u_along": along[batch.kind], "u_border": self._border}
@@ -60,7 +60,7 @@ class EdgeTexels:
 
     def _batches(self, first: int, end: int) -> list[_Batch]:
         """Those that reach into these rows. Kept until leaves change."""
-        key, tile, border = (first, end), self._lightmap.nodes.tile, self._border
+        key, tile, border = (first, end), self._lightmap.pool.tile, self._border
         if key not in self._of_rows:
             self._of_rows[key] = batches = []
             for kind, found in self._found.items():

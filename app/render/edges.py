@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.node_set import NodeSet
-from app.atlas.quadtree import SIDES
+from app.lightmap.quadtree import SIDES
+from app.lightmap.tile_pool import TilePool
 from app.scene.model import F64
 
 CORNERS = ((-1, -1), (1, -1), (-1, 1), (1, 1))
@@ -31,19 +31,19 @@ class Kind(NamedTuple):
 KINDS = Kind(False, False), Kind(False, True), Kind(True, False)
 
 
-def unequal_edges(nodes: NodeSet, border: int, slots: Ints) -> dict[Kind, F64]:
+def unequal_edges(pool: TilePool, border: int, slots: Ints) -> dict[Kind, F64]:
     """(n, 5) instances of each of KINDS in the leaves of these slots: the slot; their lower corner [display texels, of tiles that
     have a border of so many texels]; towards the neighbour, -1, 0 or 1 along u and v."""
-    slots = slots[nodes.used[slots]]
-    level = nodes.leaves.level[slots]
-    side = 1 << (nodes.depth - level.astype(np.int64))  # pages along an edge of each leaf
-    left, bottom = nodes.leaves.x[slots] * side, nodes.leaves.y[slots] * side
-    corner = np.stack([slots % nodes.columns, slots // nodes.columns], 1) * (nodes.tile + 2 * border)
+    slots = slots[pool.used[slots]]
+    level = pool.leaves.level[slots]
+    side = 1 << (pool.depth - level.astype(np.int64))  # pages along an edge of each leaf
+    left, bottom = pool.leaves.x[slots] * side, pool.leaves.y[slots] * side
+    corner = np.stack([slots % pool.columns, slots // pool.columns], 1) * (pool.tile + 2 * border)
     found: dict[Kind, list[F64]] = {kind: [np.empty((0, 5))] for kind in KINDS}
     for outward, half in _parts():
-        near = _slots_at(nodes, *(p + _page(d, h, side) for p, d, h in zip((left, bottom), outward, half, strict=True)))
-        finer = np.where(near >= 0, nodes.leaves.level[near] - level, 0)
-        place = [_first(d, h, nodes.tile, border) for d, h in zip(outward, half, strict=True)]
+        near = _slots_at(pool, *(p + _page(d, h, side) for p, d, h in zip((left, bottom), outward, half, strict=True)))
+        finer = np.where(near >= 0, pool.leaves.level[near] - level, 0)
+        place = [_first(d, h, pool.tile, border) for d, h in zip(outward, half, strict=True)]
         if all(outward):
             parts = {Kind(False, True): finer != 0}
         else:
@@ -55,13 +55,13 @@ def unequal_edges(nodes: NodeSet, border: int, slots: Ints) -> dict[Kind, F64]:
     return {kind: np.concatenate(parts) for kind, parts in found.items()}
 
 
-def reached_from(nodes: NodeSet, slots: Ints, texels: int) -> Ints:
+def reached_from(pool: TilePool, slots: Ints, texels: int) -> Ints:
     """These slots, and those of leaves that reach or touch the leaves in them within so many of their own texels."""
-    used = np.flatnonzero(nodes.used)
-    leaves, size = nodes.leaves.only(used), 0.5 ** nodes.leaves.level[used]
-    margin = size * texels / nodes.tile
+    used = np.flatnonzero(pool.used)
+    leaves, size = pool.leaves.only(used), 0.5 ** pool.leaves.level[used]
+    margin = size * texels / pool.tile
     low, high = (np.stack([leaves.x + k, leaves.y + k]) * size + (2 * k - 1) * margin for k in (0, 1))
-    parents = nodes.leaves.only(slots[nodes.used[slots]])  # of leaves that came together there is one
+    parents = pool.leaves.only(slots[pool.used[slots]])  # of leaves that came together there is one
     up = np.minimum(parents.level, 1)
     found = np.zeros(len(used), bool)
     for level, x, y in np.unique(np.stack([parents.level - up, parents.x >> up, parents.y >> up], 1), axis=0).tolist():
@@ -80,9 +80,9 @@ def _parts() -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
         yield outward, (0, 0)
 
 
-def _slots_at(nodes: NodeSet, x: Ints, y: Ints) -> Ints:
+def _slots_at(pool: TilePool, x: Ints, y: Ints) -> Ints:
     """The slots of these pages; -1 where no leaf is."""
-    pages = nodes.slot_tables["t_pages"][..., 0]
+    pages = pool.slot_tables["t_pages"][..., 0]
     height, width = pages.shape
     inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
     found = pages[np.where(inside, y, 0), np.where(inside, x, 0)].astype(np.int64) - 1

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import Lightmap
-from app.atlas.node_set import NodeSet
+from app.estimate.forecast import forecast
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.tile_pool import TilePool
 from app.options import specs
 from app.render.false_colour import LUMINANCE
-from app.render.forecast import forecast
 from app.render.options import DisplayOptions
 from app.render.sample import sampled_colours, sampled_irradiance, sampled_tiles
 from app.scene.model import F64
@@ -24,12 +24,12 @@ EXPOSURES = next((s.minimum, s.maximum) for s in specs(DisplayOptions) if s.name
 LEAST_ABSORBED = 0.01  # 1 − ρ̄: in a furnace of ρ̄ = 1 light never ends, but its exposure may
 
 
-def first_exposure(nodes: NodeSet) -> float:
+def first_exposure(pool: TilePool) -> float:
     """EV for the light to come, before the first shot; 0 where nothing emits. Needs no GPU."""
-    materials = nodes.scene.materials
-    albedo = sampled_colours(nodes, [m.albedo for m in materials], nodes.albedo_tiles, slice(None))
-    emission = sampled_colours(nodes, [m.emission for m in materials], nodes.emission_tiles, slice(None))
-    light = forecast(nodes.surfaces, albedo, np.float32(np.pi) * emission)
+    materials = pool.scene.materials
+    albedo = sampled_colours(pool, [m.albedo for m in materials], pool.albedo_tiles, slice(None))
+    emission = sampled_colours(pool, [m.emission for m in materials], pool.emission_tiles, slice(None))
+    light = forecast(pool.surfaces, albedo, np.float32(np.pi) * emission)
     return _exposure(light.albedo * light.irradiance, light.area)
 
 
@@ -38,10 +38,10 @@ def exposure_of(lightmap: Lightmap, mean_residual: F64) -> float:
 
     mean_residual: r̄ over all texels, RGB [W/m²], as the energy book has it.
     """
-    nodes = lightmap.nodes
-    sample = sampled_tiles(nodes)
-    area = nodes.surfaces.area[sample]
-    albedo = sampled_colours(nodes, [m.albedo for m in lightmap.scene.materials], nodes.albedo_tiles, sample)
+    pool = lightmap.pool
+    sample = sampled_tiles(pool)
+    area = pool.surfaces.area[sample]
+    albedo = sampled_colours(pool, [m.albedo for m in lightmap.scene.materials], pool.albedo_tiles, sample)
     mean_albedo = np.einsum("tijc,tij->c", albedo, area) / max(float(area.sum()), 1e-30)
     ambient = mean_residual / np.maximum(1 - mean_albedo, LEAST_ABSORBED)
     return _exposure(albedo * (sampled_irradiance(lightmap) + ambient), area)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.atlas.lightmap import Lightmap
+from app.lightmap.lightmap import Lightmap
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
 from app.render.sample import sampled_colours, sampled_irradiance, sampled_tiles
@@ -87,12 +87,12 @@ def colour_map(count: int) -> F64:
 def _ends(kind: str, lightmap: Lightmap) -> tuple[float, float]:
     """Between which the illuminance [lx] or luminance [cd/m²] of nearly all that does not emit lies, from an even sample of the
     tiles; unlit texels are left out."""
-    nodes, sample = lightmap.nodes, sampled_tiles(lightmap.nodes)
-    materials, area = lightmap.scene.materials, nodes.surfaces.area[sample]
-    emission = sampled_colours(nodes, [m.emission for m in materials], nodes.emission_tiles, sample)
+    pool, sample = lightmap.pool, sampled_tiles(lightmap.pool)
+    materials, area = lightmap.scene.materials, pool.surfaces.area[sample]
+    emission = sampled_colours(pool, [m.emission for m in materials], pool.emission_tiles, sample)
     light: F32 = lightmap.with_ambient(sampled_irradiance(lightmap)) * np.float32(value_per_radiance(kind) / np.pi)
     if kind == "luminance":
-        light = light * sampled_colours(nodes, [m.albedo for m in materials], nodes.albedo_tiles, sample)
+        light = light * sampled_colours(pool, [m.albedo for m in materials], pool.albedo_tiles, sample)
     values = light @ LUMINANCE
     shown = (area > 0) & (emission.max(-1) == 0) & np.isfinite(values) & (values > 0)
     if not shown.any():

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.atlas.lightmap import Lightmap
 from app.gpu import Framebuffer, Gpu, Pass, Texture
+from app.lightmap.lightmap import Lightmap
 from app.render.atlas_image import AtlasImage
 from app.render.camera import CameraView
 from app.render.false_colour import LAYER, Scale, false_colour_scale, measured
@@ -69,7 +69,7 @@ class FrameRenderer:
         kind = measured(display)
         layer = LAYER.get(kind, display.layer)
         scale = None if kind == "off" else scale or false_colour_scale(display, lightmap)
-        clip_from_local = view.clip_from_local(size[0] / size[1], lightmap.frame)
+        clip_from_local = view.clip_from_local(size[0] / size[1], lightmap.space)
         surfaces = self._surfaces_of(lightmap, display.interpolation)
         picture = self._picture_for(target, size, samples)
 
@@ -94,7 +94,7 @@ class FrameRenderer:
 
     def atlas(self, lightmap: Lightmap, size: tuple[int, int], *, turned: bool) -> Texture | None:
         """The virtual atlas with what the last frame showed, see AtlasImage; None before the first frame of that lightmap."""
-        if self._surfaces is None or self._surfaces.lightmap is not lightmap or not self._surfaces.drawn:
+        if self._surfaces is None or self._surfaces.lightmap is not lightmap or not self._surfaces.visible_mesh:
             return None
         return self._atlas.draw(self._surfaces, size, turned=turned)
 
@@ -107,7 +107,7 @@ class FrameRenderer:
         extent = 2.0 / np.array(size, np.float64)
         centre = ((np.floor([x_px, y_px]) + 0.5) * extent - 1.0) * [1.0, -1.0]
         self._gpu.ctx.enable_direct(GL_DEPTH_CLAMP)
-        hit = self._picker.pick(self._surfaces, view.clip_from_local(size[0] / size[1], lightmap.frame), centre, extent)
+        hit = self._picker.pick(self._surfaces, view.clip_from_local(size[0] / size[1], lightmap.space), centre, extent)
         self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
         return hit
 

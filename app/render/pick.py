@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, Pass
+from app.lightmap.lightmap import Lightmap
 from app.render.surfaces import Surfaces, uniform_matrix
 from app.scene.model import F64
 
@@ -17,7 +17,7 @@ class PickHit:
     """A point of a surface.
 
     triangle, material: of the scene. back: whether its back side is seen. position (x, y, z) [m]. None where that side
-    has no texels: facet, from 0; atlas_uv, in atlas texels; texel (column, row) in the node-set textures; tile of the
+    has no texels: facet, from 0; atlas_uv, in atlas texels; texel (column, row) in the tile-pool textures; tile of the
     lightmap and tile_texel (column, row) in it.
     """
 
@@ -62,7 +62,7 @@ class Picker:
         if ids[0] == 0:
             return None
         lightmap, triangle, back = surfaces.lightmap, surfaces.mesh.triangle(int(ids[0]) - 1), bool(ids[1])
-        x, y, z = lightmap.frame.world_from_local(local[:3].astype(np.float64)).tolist()
+        x, y, z = lightmap.space.world_from_local(local[:3].astype(np.float64)).tolist()
         hit = PickHit(triangle, back, int(lightmap.scene.material_ids[triangle]), (x, y, z))
         charts = lightmap.charts
         face = np.flatnonzero((charts.face_triangle == triangle) & (charts.face_back == back))
@@ -78,10 +78,10 @@ class Picker:
 def with_texel(hit: PickHit, lightmap: Lightmap) -> PickHit:
     """The same point with the texel that it has now: quadtrees change."""
     uv = hit.atlas_uv
-    tile = -1 if uv is None else lightmap.nodes.slot_at(uv)
+    tile = -1 if uv is None else lightmap.pool.slot_at(uv)
     if uv is None or tile < 0:
         return replace(hit, texel=None, tile=None, tile_texel=None)
-    leaves, edge = lightmap.nodes.leaves, lightmap.nodes.tile
+    leaves, edge = lightmap.pool.leaves, lightmap.pool.tile
     finer = 2 ** int(leaves.level[tile])
     inside = (int(uv[0] * finer) - int(leaves.x[tile]) * edge, int(uv[1] * finer) - int(leaves.y[tile]) * edge)
     texel = (tile % lightmap.columns * edge + inside[0], tile // lightmap.columns * edge + inside[1])

@@ -12,17 +12,17 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import QUAD_FORMAT, Lightmap, quads, upload, write_pages
-from app.atlas.node_set import TABLE_WIDTH
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.gpu.shader import FULLSCREEN
+from app.lightmap.lightmap import QUAD_FORMAT, Lightmap, quads, upload, write_pages
+from app.lightmap.tile_pool import TABLE_WIDTH
 from app.render.ages import LeafAges
-from app.render.develop import curve
 from app.render.edge_texels import EdgeTexels
 from app.render.edges import Kind, reached_from
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS, Layer
 from app.render.options import DisplayOptions
+from app.render.tone_mapping import curve
 
 # Texels around each tile: as many as interpolation at its edge reaches beyond it
 BORDER = {"nearest": 1, "bilinear": 1, "bicubic": 2}
@@ -56,7 +56,7 @@ class DisplayTexels:
         self._tables = {
             "t_sides": gpu.texture((len(sides), 1), 1, "u4", sides.tobytes()),
             "t_charts": self._chart_table(),
-            "t_shown_pages": upload(gpu, lightmap.nodes.slot_tables["t_pages"]),
+            "t_shown_pages": upload(gpu, lightmap.pool.slot_tables["t_pages"]),
             "t_places": gpu.texture((PLACES_WIDTH, len(self._keys) // PLACES_WIDTH + 1), 4, "f4"),
             "t_source": gpu.texture(self.size, 1, "u4"),
         }
@@ -97,7 +97,7 @@ class DisplayTexels:
         first, rows = self._band(whole)
         uniforms |= {
             "u_unit": lightmap.unit,
-            "u_target_texel": 1.0 / (lightmap.charts.density * lightmap.frame.scale),
+            "u_target_texel": 1.0 / (lightmap.charts.density * lightmap.space.scale),
         }
         textures = self._tables | lightmap.textures(*LAYER_TABLES)
         textures |= {"t_light": lightmap.texture(layer.light)} if layer.light else {}
@@ -136,13 +136,13 @@ class DisplayTexels:
 
     def _follow_leaves(self) -> None:
         """The leaves have changed: find anew what the display texels of the new ones copy, and of those around them."""
-        nodes, keys = self._lightmap.nodes, self._leaf_keys()
+        pool, keys = self._lightmap.pool, self._leaf_keys()
         changed = np.flatnonzero(keys != self._keys)
         self._version, self._keys = self._lightmap.version, keys
-        changed = changed[changed < nodes.tiles]
-        self._tables["t_shown_pages"] = write_pages(self._gpu, self._tables["t_shown_pages"], nodes, changed)
+        changed = changed[changed < pool.tiles]
+        self._tables["t_shown_pages"] = write_pages(self._gpu, self._tables["t_shown_pages"], pool, changed)
         self._write_places()
-        touched = reached_from(nodes, changed, 2 * self._border)
+        touched = reached_from(pool, changed, 2 * self._border)
         rects = self._quads(touched)
         self._find_some.draw(
             self._source_target,
@@ -156,14 +156,14 @@ class DisplayTexels:
 
     def _leaf_keys(self) -> NDArray[np.int64]:
         """The tile in each slot, and of those that the last row lacks."""
-        nodes = self._lightmap.nodes
-        keys = np.full(nodes.columns * nodes.rows, -1)
-        keys[: nodes.tiles] = nodes.leaves.keys
+        pool = self._lightmap.pool
+        keys = np.full(pool.columns * pool.rows, -1)
+        keys[: pool.tiles] = pool.leaves.keys
         return keys
 
     def _quads(self, slots: NDArray[np.int64]) -> Mesh:
         """The display texels of these slots."""
-        bordered = self._lightmap.nodes.tile + 2 * self._border
+        bordered = self._lightmap.pool.tile + 2 * self._border
         corner = np.stack([slots % self._lightmap.columns, slots // self._lightmap.columns], 1) * bordered
         return Mesh(self._gpu, quads(corner, bordered, corner).tobytes(), QUAD_FORMAT, per_instance=True)
 
@@ -173,7 +173,7 @@ class DisplayTexels:
 
     @property
     def _pages(self) -> tuple[float, float]:
-        return float(self._lightmap.columns), self._lightmap.nodes.pages_per_texel
+        return float(self._lightmap.columns), self._lightmap.pool.pages_per_texel
 
     def release(self) -> None:
         self._edges.release()
@@ -225,21 +225,21 @@ class DisplayTexels:
     def _write_places(self) -> None:
         """For each slot, from 1, the display texel of a place uv [texels of level 0]: z·uv + (x, y), z 0 where no leaf is; and
         when its leaf was split off, see LeafAges. RGBA32F, PLACES_WIDTH wide."""
-        nodes, table = self._lightmap.nodes, self._tables["t_places"]
-        leaves, slot = nodes.leaves, np.arange(nodes.tiles)
-        bordered = nodes.tile + 2 * self._border
+        pool, table = self._lightmap.pool, self._tables["t_places"]
+        leaves, slot = pool.leaves, np.arange(pool.tiles)
+        bordered = pool.tile + 2 * self._border
         places = np.zeros((table.width * table.height, 4), np.float32)
-        mine = places[1 : 1 + nodes.tiles]
-        mine[:, 0] = slot % nodes.columns * bordered + self._border - leaves.x * nodes.tile
-        mine[:, 1] = slot // nodes.columns * bordered + self._border - leaves.y * nodes.tile
-        mine[:, 2] = np.where(nodes.used, 2.0**leaves.level, 0.0)
-        mine[:, 3] = self._ages.born(nodes)
+        mine = places[1 : 1 + pool.tiles]
+        mine[:, 0] = slot % pool.columns * bordered + self._border - leaves.x * pool.tile
+        mine[:, 1] = slot // pool.columns * bordered + self._border - leaves.y * pool.tile
+        mine[:, 2] = np.where(pool.used, 2.0**leaves.level, 0.0)
+        mine[:, 3] = self._ages.born(pool)
         table.write(places.tobytes())
 
 
 def display_size(lightmap: Lightmap, border: int) -> tuple[int, int]:
-    """Display texels of the whole node set."""
-    bordered = lightmap.nodes.tile + 2 * border
+    """Display texels of the whole tile pool."""
+    bordered = lightmap.pool.tile + 2 * border
     return lightmap.columns * bordered, lightmap.rows * bordered
 
 

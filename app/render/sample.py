@@ -4,31 +4,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.atlas.lightmap import STORAGE, Lightmap
-from app.atlas.node_set import NodeSet
+from app.lightmap.lightmap import STORAGE, Lightmap
+from app.lightmap.tile_pool import TilePool
 from app.scene.model import F32, RGB
 
 SAMPLED = 1 << 18  # texels that means are taken over, evenly spread
 
 
-def sampled_tiles(nodes: NodeSet) -> slice:
+def sampled_tiles(pool: TilePool) -> slice:
     """Tiles that means are taken over, evenly spread. A small lamp lies in few of them: r̄ is that of all."""
-    return slice(None, None, max(1, nodes.tiles * nodes.tile**2 // SAMPLED))
+    return slice(None, None, max(1, pool.tiles * pool.tile**2 // SAMPLED))
 
 
-def sampled_colours(nodes: NodeSet, factors: list[RGB], colours: F32 | None, sample: slice) -> F32:
+def sampled_colours(pool: TilePool, factors: list[RGB], colours: F32 | None, sample: slice) -> F32:
     """A material's factor on each texel of the sampled tiles (tiles, t, t, 3), times its texture; 0 where nothing is."""
-    face = nodes.surfaces.face[sample]
-    material = nodes.scene.material_ids[nodes.charts.face_triangle[face]]
+    face = pool.surfaces.face[sample]
+    material = pool.scene.material_ids[pool.charts.face_triangle[face]]
     out = np.where((face >= 0)[..., None], np.array(factors, np.float32)[material], np.float32(0))
     return out if colours is None else out * colours[sample]
 
 
 def sampled_irradiance(lightmap: Lightmap) -> F32:
     """H of the sampled tiles (tiles, t, t, 3) [W/m²]."""
-    nodes, texture = lightmap.nodes, lightmap.texture("t_irradiance")
+    pool, texture = lightmap.pool, lightmap.texture("t_irradiance")
     dtype = {"f4": np.float32, "f2": np.float16, "f1": np.uint8}[STORAGE[lightmap.storage]]
-    cells = np.frombuffer(texture.read(), dtype).reshape(nodes.rows, nodes.tile, nodes.columns, nodes.tile, 4)
-    tile = np.arange(nodes.tiles)[sampled_tiles(nodes)]
-    stored = cells[tile // nodes.columns, :, tile % nodes.columns, :, :3].astype(np.float32)
+    cells = np.frombuffer(texture.read(), dtype).reshape(pool.rows, pool.tile, pool.columns, pool.tile, 4)
+    tile = np.arange(pool.tiles)[sampled_tiles(pool)]
+    stored = cells[tile // pool.columns, :, tile % pool.columns, :, :3].astype(np.float32)
     return stored * np.float32(lightmap.unit / (255 if dtype is np.uint8 else 1))

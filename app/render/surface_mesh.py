@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.atlas.drawn import VERTEX_FORMAT
-from app.atlas.node_set import NodeSet
+from app.atlas.visible_mesh import VERTEX_FORMAT
 from app.gpu import Gpu, Mesh
+from app.lightmap.tile_pool import TilePool
 from app.scene.model import F64
 
 
 class SurfaceMesh:
     """Whoever makes it releases it."""
 
-    def __init__(self, gpu: Gpu, nodes: NodeSet) -> None:
-        self._drawn = drawn = nodes.drawn
+    def __init__(self, gpu: Gpu, pool: TilePool) -> None:
+        self._drawn = drawn = pool.visible_mesh
         self._mesh = Mesh(gpu, drawn.vertices.tobytes(), VERTEX_FORMAT, indices=drawn.corners.tobytes())
         self._order = np.arange(0 if drawn.clusters is None else len(drawn.clusters.lower))
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.atlas.lightmap import Lightmap
 from app.gpu import Framebuffer, Gpu, Pass, Texture
+from app.lightmap.lightmap import Lightmap
 from app.render.ages import LATER, LeafAges
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS
@@ -24,8 +24,8 @@ class Surfaces:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, interpolation: str) -> None:
         self._gpu, self.lightmap = gpu, lightmap
-        self._ages = LeafAges(lightmap.nodes)
-        self.mesh = SurfaceMesh(gpu, lightmap.nodes)
+        self._ages = LeafAges(lightmap.pool)
+        self.mesh = SurfaceMesh(gpu, lightmap.pool)
         self._texels = DisplayTexels(gpu, lightmap, self._ages, BORDER[interpolation])
         self._others: DisplayTexels | None = None  # of a reference's light
         self._sides = True, False  # whether the solution and the reference were shown last
@@ -93,10 +93,10 @@ class Surfaces:
 
     def draw_atlas(self, program: Pass, target: Framebuffer, *, turned: bool) -> None:
         """The virtual atlas with what was drawn last, all over ``target``; ``program`` is render/atlas. turned: u for v."""
-        nodes, size = self.lightmap.nodes, target.size[::-1] if turned else target.size
+        pool, size = self.lightmap.pool, target.size[::-1] if turned else target.size
         uniforms: dict[str, object] = {
             "u_texel": self._texel,
-            "u_atlas_per_px": tuple(a / b for a, b in zip(nodes.charts.size, size, strict=True)),
+            "u_atlas_per_px": tuple(a / b for a, b in zip(pool.charts.size, size, strict=True)),
             "u_turned": float(turned),
         }
         program.draw(
@@ -106,15 +106,15 @@ class Surfaces:
         )
 
     @property
-    def drawn(self) -> bool:
+    def visible_mesh(self) -> bool:
         """Whether there is something to be seen in an atlas."""
         return bool(self._shown)
 
     @property
     def _of_leaves(self) -> dict[str, object]:
         """What overlays show leaves by. In a picture that stands for itself none is new, whenever the last one was drawn."""
-        nodes, now = self.lightmap.nodes, self._ages.now if self._live else LATER
-        return {"u_leaves": float(nodes.adaptive), "u_tile": float(nodes.tile), "u_now": now}
+        pool, now = self.lightmap.pool, self._ages.now if self._live else LATER
+        return {"u_leaves": float(pool.adaptive), "u_tile": float(pool.tile), "u_now": now}
 
     @property
     def _texel(self) -> tuple[float, float, float]:

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu
-from app.solvers.base import EnergyBook, Solver, StepReport
+from app.lightmap.lightmap import Lightmap
+from app.solvers.base import EnergyBalance, Solver, StepReport
 from app.solvers.shooting.adaptive import AdaptiveShooting
 from app.solvers.shooting.options import TREE, ShootingOptions
 from app.solvers.shooting.uniform import UniformShooting
@@ -19,7 +19,7 @@ __all__ = [
     "DEFAULT_SOLVER",
     "SOLVERS",
     "TREE",
-    "EnergyBook",
+    "EnergyBalance",
     "ShootingOptions",
     "Solver",
     "StepReport",

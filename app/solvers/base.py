@@ -27,7 +27,7 @@ class StepReport:
 
 
 @dataclass(frozen=True)
-class EnergyBook:
+class EnergyBalance:
     """emitted = absorbed + escaped + unshot + imbalance, RGB [W]; the imbalance is the error of form factors and visibility.
 
     reflectance: area-weighted mean albedo, RGB; area: of all texels [m²].
@@ -113,7 +113,7 @@ class Solver(Protocol[OptionsT]):
     def poll(self, *, wait: bool = False) -> StepReport:
         """The newest report that has arrived; with ``wait`` that of the last step."""
 
-    def books(self) -> EnergyBook:
+    def books(self) -> EnergyBalance:
         """Where all emitted energy is now. Reads every texel and waits for the GPU."""
 
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
@@ -123,7 +123,7 @@ class Solver(Protocol[OptionsT]):
         """Do once, in parts, all that a solve will do, so that no step waits for a driver that compiles. Spoils the light."""
 
     def patch_edge(self, texel: tuple[int, int]) -> int:
-        """Texels along the edge of the largest patch that a texel (column, row) of the node set may shoot from now."""
+        """Texels along the edge of the largest patch that a texel (column, row) of the tile pool may shoot from now."""
 
     @property
     def level(self) -> int:
@@ -143,4 +143,4 @@ class Solver(Protocol[OptionsT]):
         """Give back what is on the GPU, but for the lightmap."""
 
 
-__all__ = ["EnergyBook", "PatchShot", "Solver", "StepReport"]
+__all__ = ["EnergyBalance", "PatchShot", "Solver", "StepReport"]

@@ -13,7 +13,7 @@ from app.ui.file_dialog import FileDialog
 from app.ui.state import Legend, Request, State
 
 if TYPE_CHECKING:
-    from app.session import Session
+    from app.session.session import Session
 
 SMALLEST_STEP = 1e-4  # s: Dear ImGui wants time to pass between frames
 IRRADIANCE = ".exr"

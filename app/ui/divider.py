@@ -10,7 +10,7 @@ from app.ui import theme
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.session import Session
+    from app.session.session import Session
 
 NEAR_EM = 0.35  # from the line, that takes hold of it
 NAME_EM = 0.6  # between the line and its names

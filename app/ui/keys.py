@@ -14,7 +14,7 @@ from app.ui.panels.solver import toggle
 from app.ui.state import Request, State
 
 if TYPE_CHECKING:
-    from app.session import Session
+    from app.session.session import Session
 
 Key = imgui.Key
 ANY_POPUP = int(imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level)

@@ -13,7 +13,7 @@ from app.ui.panels import compare, convergence, display, inspect, scene, solver
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.session import Session
+    from app.session.session import Session
 
 SIDE_EM = 20.5  # width of the side docks, in font heights: the widest fact fits
 BOTTOM_SHARE = 0.27  # height of the lower dock, of the window

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from imgui_bundle import imgui
 
-from app.picking import read_again
+from app.session.picking import read_again
 from app.ui import theme
 from app.ui.divider import divider
 from app.ui.state import State
@@ -17,7 +17,7 @@ from app.ui.state import State
 if TYPE_CHECKING:
     from app.render.camera import CameraView
     from app.scene.model import Camera
-    from app.session import Session
+    from app.session.session import Session
 
 CLICK_PX = 4.0  # a press that moved less is a click
 TURN_PER_VIEW = math.pi  # orbit angle for a drag over the view's height [rad]
@@ -81,14 +81,14 @@ def _fly(session: Session, state: State, io: Any, seconds: float) -> bool:
     step = [float(imgui.is_key_down(plus)) - float(imgui.is_key_down(minus)) for plus, minus in FLY]
     if any(step):
         state.flight = None
-        pace = FLY_SPEED * session.lightmap.frame.scale * (FAST if io.key_shift else SLOW if io.key_ctrl else 1.0)
+        pace = FLY_SPEED * session.lightmap.space.scale * (FAST if io.key_shift else SLOW if io.key_ctrl else 1.0)
         session.view.fly(*(s * pace * seconds for s in step))
     return any(step)
 
 
 def focus(session: Session, state: State) -> None:
     """Travel to what was picked, or to where the whole scene fits."""
-    frame = session.lightmap.frame
+    frame = session.lightmap.space
     goal = session.view.copy()
     if state.picked is not None:
         goal.focus(np.asarray(state.picked.position), FOCUS_SHARE * frame.scale)
@@ -149,7 +149,7 @@ def _marker(session: Session, state: State) -> None:
     if state.picked is None:
         return
     left, top, width, height = state.view_px
-    frame = session.lightmap.frame
+    frame = session.lightmap.space
     local = np.append(frame.local_from_world(np.asarray(state.picked.position, np.float64)), 1.0)
     x, y, _, w = session.view.clip_from_local(width / height, frame) @ local
     if w <= 0 or abs(x) > w or abs(y) > w:

@@ -16,7 +16,7 @@ from app.ui.navigation import look_through
 from app.ui.state import TOAST_SECONDS, Legend, Request, State
 
 if TYPE_CHECKING:
-    from app.session import Session
+    from app.session.session import Session
 
 ICONS = theme.ICONS
 FLOATING = int(

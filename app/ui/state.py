@@ -13,8 +13,8 @@ from app.options import Options, option
 
 if TYPE_CHECKING:
     from app.atlas.options import AtlasOptions
-    from app.picking import Picked
-    from app.session import Stats
+    from app.session.picking import Picked
+    from app.session.session import Stats
     from app.ui.navigation import Flight
 
 RGB = tuple[float, float, float]

@@ -21,9 +21,9 @@ import pyglet
 from imgui_bundle import imgui
 
 from app.gpu import Gpu
-from app.session import Session
+from app.session.session import Session
 from app.ui import widgets
-from app.window import run_window
+from app.viewer.window import run_window
 
 EVERY = 3  # frames between two reports
 

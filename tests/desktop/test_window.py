@@ -207,7 +207,7 @@ def test_without_a_screen_there_is_one_clear_line(tmp_path: Path) -> None:
     program = """
 import sys
 from app.errors import UserError
-from app.window import run_window
+from app.viewer.window import run_window
 try:
     run_window(lambda gpu: None)
 except UserError as error:

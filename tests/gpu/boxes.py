@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from pictures import ray, render_image
 
-from app.atlas.lightmap import Lightmap
 from app.atlas.parametrize import parametrize
 from app.gpu import Gpu
+from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
 from app.render.options import DisplayOptions
 from app.scene.load import load_scene
@@ -37,13 +37,13 @@ def box(gpu: Gpu, cornell: Scene) -> Iterator[Lightmap]:
 
 def view_of(lightmap: Lightmap) -> CameraView:
     camera = lightmap.scene.cameras[0]
-    distance = float(np.linalg.norm(camera.world_from_camera[:3, 3] - lightmap.frame.centre))
+    distance = float(np.linalg.norm(camera.world_from_camera[:3, 3] - lightmap.space.centre))
     return CameraView.from_camera(camera, distance)
 
 
 def put(lightmap: Lightmap, name: str, tiles: F64) -> None:
     """Light (tiles, 16, 16, 3) [W/m²] into ``t_irradiance`` or ``t_residual``."""
-    image = lightmap.nodes.image_from_tiles(np.concatenate([tiles / lightmap.unit, tiles[..., :1] * 0], -1))
+    image = lightmap.pool.image_from_tiles(np.concatenate([tiles / lightmap.unit, tiles[..., :1] * 0], -1))
     lightmap.texture(name).write(np.ascontiguousarray(image, np.float32).tobytes())
 
 
@@ -54,7 +54,7 @@ def put_ambient(lightmap: Lightmap, a: tuple[float, float, float], share: float 
 
 def even(lightmap: Lightmap, H: tuple[float, float, float]) -> F64:
     """The same light on every texel that covers a surface, none on the others."""
-    return (lightmap.nodes.surfaces.area > 0)[..., None] * np.array(H)
+    return (lightmap.pool.surfaces.area > 0)[..., None] * np.array(H)
 
 
 def picture(gpu: Gpu, lightmap: Lightmap, display: DisplayOptions = PLAIN, **more: object) -> NDArray[np.uint8]:

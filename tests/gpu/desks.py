@@ -12,10 +12,10 @@ from fake_session import FakeSession
 from imgui_bundle import imgui
 
 from app.gpu import Gpu
-from app.headless_ui import UiFrame, pixels
 from app.ui import widgets
 from app.ui.app import Ui
 from app.ui.state import Request
+from app.viewer.ui_frame import UiFrame, pixels
 
 SIZE = (1280, 720)
 VIEW = (640, 260)  # in the middle of the 3-D view

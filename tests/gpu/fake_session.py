@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from app.atlas.options import AtlasOptions
-from app.gathering.expected import ExpectedError
+from app.estimate.error import ExpectedError
 from app.render.camera import CameraView
 from app.render.options import DisplayOptions
 from app.scene.model import Material
@@ -24,8 +24,8 @@ MATERIALS = (
 )
 
 
-class FakeFrame:
-    """World and solver frame are the same."""
+class FakeSpace:
+    """World and solver space are the same."""
 
     centre, scale = np.zeros(3), 1.0
 
@@ -73,11 +73,16 @@ class FakeSession:
         self.scene = SimpleNamespace(materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras)
         self.unedited = self.scene
         self.charts = SimpleNamespace(density=40.0, tile=16, warnings=(), size=(160, 96))
-        self.lightmap = SimpleNamespace(frame=FakeFrame())
+        self.lightmap = SimpleNamespace(space=FakeSpace())
         self.shooting, self.atlas, self.display = ShootingOptions(), AtlasOptions(), DisplayOptions()
         self.view = CameraView(np.eye(4), 0.7, 2.0)
         self.history = FakeHistory()
-        self.timings = {"shooting/visibility": 1.1, "shooting/receive": 0.7, "render/surface": 3.2, "imgui": 1.4}
+        self.timings = {
+            "shooting/visibility": 1.1,
+            "shooting/receive": 0.7,
+            "render/surface": 3.2,
+            "imgui": 1.4,
+        }
         self.image = None
         self.picked = None
         self.calls: list[tuple[object, ...]] = []

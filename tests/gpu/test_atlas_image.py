@@ -14,13 +14,13 @@ from solver_scenes import grey, quads_scene, room, table_room
 
 from app.atlas.charts import DEFAULT_TILE as TILE
 from app.gpu import Gpu
-from app.picking import leaf_at
 from app.render import ages
 from app.render.ages import NEVER, LeafAges
-from app.render.develop import encode_srgb
 from app.render.frame import FrameRenderer
 from app.render.options import DisplayOptions
+from app.render.tone_mapping import encode_srgb
 from app.scene.model import F64
+from app.session.picking import leaf_at
 
 __all__ = ["forest"]
 
@@ -43,7 +43,7 @@ class Viewer:
 
     def atlas(self, trees: Forest, scale: int, *, turned: bool = False) -> NDArray[np.float64]:
         """(height, width, 3) of 0 to 1, ``scale`` pixels per texel of level 0."""
-        width, height = (side * scale for side in trees.nodes.charts.size)
+        width, height = (side * scale for side in trees.pool.charts.size)
         size = (height, width) if turned else (width, height)
         image = self.renderer.atlas(trees.lightmap, size, turned=turned)
         assert image is not None and image.size == size
@@ -79,26 +79,26 @@ def test_light_is_where_it_is_in_the_atlas(
 ) -> None:
     trees = forest(table_room(), texels=1500)
     trees.grow(0.4, rng)
-    light = rng.uniform(0.1, 1.0, (trees.nodes.tiles, TILE, TILE, 3))
+    light = rng.uniform(0.1, 1.0, (trees.pool.tiles, TILE, TILE, 3))
     trees.write({"t_irradiance": light * np.pi / trees.lightmap.unit})
     assert viewer.renderer.atlas(trees.lightmap, (8, 8), turned=False) is None, "nothing has been shown yet"
     viewer.frame(trees)
     scale = 8  # pixels per texel of level 0, one per finest
-    assert trees.nodes.leaves.level.max() == 3
+    assert trees.pool.leaves.level.max() == 3
     image, turned = viewer.atlas(trees, scale), viewer.atlas(trees, scale, turned=True)
     assert (turned == image.swapaxes(0, 1)).all()
-    nodes, tested = trees.nodes, 0
+    pool, tested = trees.pool, 0
     inner = np.arange(2, TILE - 2)  # without frames
-    for slot in np.flatnonzero(nodes.used):
-        covered = nodes.surfaces.area[slot] > 0
+    for slot in np.flatnonzero(pool.used):
+        covered = pool.surfaces.area[slot] > 0
         for row, column in np.argwhere(covered)[::7]:
             if row in inner and column in inner:
                 u, v = places(trees)[slot, row, column] * scale
                 assert image[int(v), int(u)] == pytest.approx(encode_srgb(light[slot, row, column]), abs=STEP)
                 tested += 1
     assert tested > 100
-    nowhere = (nodes.slot_tables["t_pages"][..., 0] == 0).repeat(scale * TILE >> nodes.depth, 0)
-    nowhere = nowhere.repeat(scale * TILE >> nodes.depth, 1)
+    nowhere = (pool.slot_tables["t_pages"][..., 0] == 0).repeat(scale * TILE >> pool.depth, 0)
+    nowhere = nowhere.repeat(scale * TILE >> pool.depth, 1)
     assert nowhere.any()
     assert np.abs(image[nowhere] - NOTHING).max() < STEP
 
@@ -110,8 +110,8 @@ def test_leaves_are_framed_in_the_colour_of_their_level(
     trees.grow(0.4, rng)
     viewer.frame(trees)
     scale = 8
-    image, leaves, levels = viewer.atlas(trees, scale), trees.nodes.leaves, set()
-    for slot in np.flatnonzero(trees.nodes.used):
+    image, leaves, levels = viewer.atlas(trees, scale), trees.pool.leaves, set()
+    for slot in np.flatnonzero(trees.pool.used):
         level = int(leaves.level[slot])
         edge = scale * TILE >> level
         x, y = leaves.x[slot] * edge, leaves.y[slot] * edge
@@ -154,19 +154,19 @@ def test_only_what_was_split_is_new(
     forest: Callable[..., Forest], clock: list[float], rng: np.random.Generator
 ) -> None:
     trees = forest(table_room())
-    known = LeafAges(trees.nodes)
-    assert (known.born(trees.nodes) == NEVER).all()
+    known = LeafAges(trees.pool)
+    assert (known.born(trees.pool) == NEVER).all()
     clock[0] += 7.0
     before = dict(trees.tree.slots)
     trees.grow(0.3, rng)
-    born = known.born(trees.nodes).copy()
+    born = known.born(trees.pool).copy()
     for tile, slot in trees.tree.slots.items():
         assert born[slot] == (NEVER if tile in before else np.float32(7.0))
     clock[0] += 1.0
-    assert (known.born(trees.nodes) == born).all(), "nothing has changed"
-    while trees.tree.merges(np.flatnonzero(trees.nodes.used)):
+    assert (known.born(trees.pool) == born).all(), "nothing has changed"
+    while trees.tree.merges(np.flatnonzero(trees.pool.used)):
         trees.shrink()
-    assert (known.born(trees.nodes) == NEVER).all(), "a merge is no split"
+    assert (known.born(trees.pool) == NEVER).all(), "a merge is no split"
 
 
 def test_the_leaf_under_the_pointer(forest: Callable[..., Forest], rng: np.random.Generator) -> None:
@@ -178,6 +178,6 @@ def test_the_leaf_under_the_pointer(forest: Callable[..., Forest], rng: np.rando
         assert leaf is not None
         assert leaf.level == level
         assert leaf.rect == (x * edge, y * edge, (x + 1) * edge, (y + 1) * edge)
-        assert leaf.texels == (trees.nodes.surfaces.face[slot] >= 0).sum()
-        assert leaf.texel * trees.nodes.charts.density * 2**level == pytest.approx(1.0)
+        assert leaf.texels == (trees.pool.surfaces.face[slot] >= 0).sum()
+        assert leaf.texel * trees.pool.charts.density * 2**level == pytest.approx(1.0)
     assert leaf_at(trees.lightmap, (-1.0, 5.0)) is None

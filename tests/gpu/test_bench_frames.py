@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from app.bench import drag as drags
-from app.bench import frames
-from app.bench.drag import DECADES, DEPTHS, DRAGGED, SWEEP, SWEEPS, drag
+from app.bench.speed import drag as drags
+from app.bench.speed import frames
+from app.bench.speed.drag import DECADES, DEPTHS, DRAGGED, SWEEP, SWEEPS, drag
 from app.cli import run
 from app.solvers import ShootingOptions
 

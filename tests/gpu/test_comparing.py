@@ -22,28 +22,28 @@ from gl_objects import forgotten, held
 from numpy.typing import NDArray
 from solver_scenes import table_room
 
-from app.atlas.collapse import collapse
-from app.atlas.lightmap import Lightmap
-from app.atlas.node_set import NodeSet
 from app.atlas.options import AtlasOptions
 from app.atlas.points import random_points
 from app.bake import write_bake
-from app.bake.gutter import fill_gutter
-from app.bench.points import irradiance_of
+from app.commands.headless import picture as shot
 from app.compare.comparison import POINTS, POINTS_SEED, error_of
 from app.compare.light import ReferenceLight
 from app.compare.options import ReferenceOptions
-from app.compare.probe import Probe
 from app.compare.texels import ReferenceTexels
 from app.errors import UserError
 from app.gpu import Gpu
-from app.headless import picture as shot
-from app.metrics import lit_points
-from app.reference_worker import INTERRUPTED
+from app.lightmap.at_points import irradiance_of
+from app.lightmap.collapse import collapse
+from app.lightmap.gutter import fill_gutter
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.probe import Probe
+from app.lightmap.tile_pool import TilePool
+from app.reference.metrics import lit_points
 from app.render.false_colour import ERRORS, colour_map
 from app.render.resolve import Reference
 from app.scene.model import F32, F64, Scene
-from app.session import Session, Stop
+from app.session.comparison_worker import INTERRUPTED
+from app.session.session import Session, Stop
 from app.solvers import ShootingOptions
 
 __all__ = ["box", "cornell", "forest", "forgotten"]
@@ -54,15 +54,15 @@ SHOOTING = ShootingOptions(resolution=64, residual=0.05)
 def light_of(lightmap: Lightmap, tiles: F32) -> ReferenceLight:
     """Irradiance (tiles, t, t, 3) of a uniform lightmap as a reference."""
     charts = lightmap.charts
-    image = fill_gutter(*collapse(lightmap.nodes, tiles))
+    image = fill_gutter(*collapse(lightmap.pool, tiles))
     uv = charts.face_uv * (image.shape[0] // charts.size[1])
     return ReferenceLight("made", image, charts.face_triangle, charts.face_back, uv, lightmap.scene.materials)
 
 
 def smooth(lightmap: Lightmap) -> F64:
     """Light that is linear in space [W/m²], on every texel that covers a surface."""
-    surfaces = lightmap.nodes.surfaces
-    local = lightmap.frame.local_from_world(surfaces.position)
+    surfaces = lightmap.pool.surfaces
+    local = lightmap.space.local_from_world(surfaces.position)
     return (surfaces.area > 0)[..., None] * (2.0 + local @ np.array([[0.5, 0, 0.2], [0.1, 0.4, 0], [0, 0.2, 0.3]]))
 
 
@@ -92,15 +92,15 @@ def test_the_probe_reads_quadtrees(gpu: Gpu) -> None:
     session.open_now("cornell-box")
     session.solve(Stop(shots=60))
     lightmap = session.lightmap
-    assert np.ptp(lightmap.nodes.leaves.level[lightmap.nodes.used]) > 0
+    assert np.ptp(lightmap.pool.leaves.level[lightmap.pool.used]) > 0
     tiles = smooth(lightmap)
     put(lightmap, "t_irradiance", tiles)
     put_ambient(lightmap, (0.0, 0.0, 0.0))
     points = random_points(session.scene, 500, 2)
     probe = Probe(gpu, lightmap, points)
-    local = lightmap.frame.local_from_world(points.positions_normals(session.scene)[0])
+    local = lightmap.space.local_from_world(points.positions_normals(session.scene)[0])
     expected = 2.0 + local @ np.array([[0.5, 0, 0.2], [0.1, 0.4, 0], [0, 0.2, 0.3]])
-    size = 1.0 / (lightmap.charts.density * lightmap.frame.scale)  # of a texel of level 0, solver frame
+    size = 1.0 / (lightmap.charts.density * lightmap.space.scale)  # of a texel of level 0, solver space
     # half a texel's diagonal where only one is near; light changes by 0.6 at most per unit in any channel
     assert np.abs(probe.irradiance(probe.look()) - expected).max() <= 0.6 * size
     probe.release()
@@ -117,7 +117,7 @@ def session(gpu: Gpu) -> Iterator[Session]:
 
 def baked(session: Session, folder: Path, factor: float = 1.0) -> Path:
     """The light of a session, times a factor."""
-    irradiance, covered = collapse(session.lightmap.nodes, session.lightmap.irradiance(ambient=True))
+    irradiance, covered = collapse(session.lightmap.pool, session.lightmap.irradiance(ambient=True))
     report = {"texels": session.lightmap.texel_count, "residual": session.stats.residual}
     write_bake(folder, session.scene, session.charts, np.float32(factor) * irradiance, covered, report)
     return folder
@@ -166,16 +166,16 @@ def test_a_texel_has_its_reference(session: Session, tmp_path: Path) -> None:
     assert session.reference_at((0, 0)) is None
     session.open_reference_now(baked(session, tmp_path, 3.0))
     lightmap = session.lightmap
-    tile, row, column = (int(n[7]) for n in np.nonzero(lightmap.nodes.surfaces.area > 0))
-    corner = lightmap.nodes.corner(tile)
+    tile, row, column = (int(n[7]) for n in np.nonzero(lightmap.pool.surfaces.area > 0))
+    corner = lightmap.pool.corner(tile)
     texel = corner[0] + column, corner[1] + row
     there = lightmap.irradiance(ambient=True)[tile, row, column]
     assert session.reference_at(texel) == pytest.approx(3 * there, rel=1e-5)
-    comparison, nodes = session.comparison, lightmap.nodes
+    comparison, pool = session.comparison, lightmap.pool
     assert comparison is not None
-    image = np.frombuffer(comparison.texels.texture.read(), np.float32).reshape(*nodes.size[::-1], 4)
-    all_of_them = comparison.light.on_tiles(nodes, np.arange(nodes.tiles))
-    np.testing.assert_array_equal(nodes.tiles_from_image(image)[..., :3], all_of_them, err_msg="before any frame asks")
+    image = np.frombuffer(comparison.texels.texture.read(), np.float32).reshape(*pool.size[::-1], 4)
+    all_of_them = comparison.light.on_tiles(pool, np.arange(pool.tiles))
+    np.testing.assert_array_equal(pool.tiles_from_image(image)[..., :3], all_of_them, err_msg="before any frame asks")
 
 
 def test_an_edit_is_measured_and_said(session: Session, tmp_path: Path) -> None:
@@ -275,10 +275,10 @@ def test_the_reference_follows_the_leaves(gpu: Gpu, tmp_path: Path) -> None:
         session.solve(Stop(shots=shots))
         version = lightmap.version
         texels.follow(whole=shots != 60)
-        nodes = lightmap.nodes
-        image = np.frombuffer(texels.texture.read(), np.float32).reshape(*nodes.size[::-1], 4)
-        held_ = nodes.tiles_from_image(image)[nodes.used][..., :3]
-        np.testing.assert_array_equal(held_, light.on_tiles(nodes, np.flatnonzero(nodes.used)), err_msg=str(shots))
+        pool = lightmap.pool
+        image = np.frombuffer(texels.texture.read(), np.float32).reshape(*pool.size[::-1], 4)
+        held_ = pool.tiles_from_image(image)[pool.used][..., :3]
+        np.testing.assert_array_equal(held_, light.on_tiles(pool, np.flatnonzero(pool.used)), err_msg=str(shots))
     assert version > 0
     texels.release()
     session.release()
@@ -291,23 +291,23 @@ def test_a_node_set_that_is_resized_is_not_looked_up_at_once(
     trees = forest(table_room())
     for _ in range(2):
         trees.grow()
-    families = trees.tree.merges(np.flatnonzero(trees.nodes.used))
+    families = trees.tree.merges(np.flatnonzero(trees.pool.used))
     trees.regrowth.apply(trees.tree.merge([family for family in families if rng.random() < 0.7]))
     trees.write_noise(rng)
-    lightmap, nodes = trees.lightmap, trees.nodes
+    lightmap, pool = trees.lightmap, trees.pool
     light = light_of(lightmap, lightmap.irradiance())
     texels = ReferenceTexels(gpu, lightmap, light)
     texels.follow(whole=True)
     look_up, looked_up = ReferenceLight.on_tiles, []
 
-    def on_tiles(self: ReferenceLight, nodes: NodeSet, slots: NDArray[np.int64]) -> F32:
+    def on_tiles(self: ReferenceLight, pool: TilePool, slots: NDArray[np.int64]) -> F32:
         looked_up.append(len(slots))
-        return look_up(self, nodes, slots)
+        return look_up(self, pool, slots)
 
     def complete() -> bool:
-        image = np.frombuffer(texels.texture.read(), np.float32).reshape(*nodes.size[::-1], 4)
-        found = nodes.tiles_from_image(image)[nodes.used][..., :3]
-        return bool((found == look_up(light, nodes, np.flatnonzero(nodes.used))).all())
+        image = np.frombuffer(texels.texture.read(), np.float32).reshape(*pool.size[::-1], 4)
+        found = pool.tiles_from_image(image)[pool.used][..., :3]
+        return bool((found == look_up(light, pool, np.flatnonzero(pool.used))).all())
 
     monkeypatch.setattr(ReferenceLight, "on_tiles", on_tiles)
     assert complete()
@@ -315,12 +315,12 @@ def test_a_node_set_that_is_resized_is_not_looked_up_at_once(
     lightmap.resize(moves)
     texels.follow(whole=False)
     assert len(moves.old) > 20 and sum(looked_up) == 0 and complete()
-    monkeypatch.setattr("app.compare.texels.TEXELS_PER_FRAME", 20 * nodes.tile**2)
-    rows = nodes.rows
+    monkeypatch.setattr("app.compare.texels.TEXELS_PER_FRAME", 20 * pool.tile**2)
+    rows = pool.rows
     trees.grow(0.3, rng)
     texels.follow(whole=False)
-    assert nodes.rows > rows and sum(looked_up) == 20 and not complete()
-    for _ in range(-(-nodes.tiles // 20)):
+    assert pool.rows > rows and sum(looked_up) == 20 and not complete()
+    for _ in range(-(-pool.tiles // 20)):
         texels.follow(whole=False)
     assert complete() and max(looked_up) == 20 and sum(looked_up) < len(trees.tree)
     texels.release()
@@ -403,7 +403,7 @@ def workers() -> list[psutil.Process]:
     found = []
     for process in psutil.Process().children():
         with contextlib.suppress(psutil.NoSuchProcess):  # it may end meanwhile
-            if "app.reference_worker" in process.cmdline():
+            if "app.session.comparison_worker" in process.cmdline():
                 found.append(process)
     return found
 
@@ -445,7 +445,7 @@ def test_an_interrupted_solve_is_no_answer(cornell: Scene, tmp_path: Path) -> No
     source, target = tmp_path / "in.pickle", tmp_path / "out.npz"
     shooting = SHOOTING.replace(residual=1e-9)
     source.write_bytes(pickle.dumps({"scene": cornell, "atlas": AtlasOptions(texels=900), "shooting": shooting}))
-    command = [sys.executable, "-m", "app.reference_worker", str(source), str(target)]
+    command = [sys.executable, "-m", "app.session.comparison_worker", str(source), str(target)]
     env = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     with subprocess.Popen(command, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as worker:
         assert worker.stdout is not None

@@ -27,19 +27,19 @@ def test_display_texels_follow_the_leaves(
     trees = forest(SCENES[name](), texels=12000)
     trees.lightmap.resize(trees.tree.resize(3000))
     options = DisplayOptions(layer="irradiance", tone_map="clamp", interpolation=interpolation)
-    known = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.nodes), BORDER[interpolation])
+    known = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.pool), BORDER[interpolation])
     depths = set()
     for change in ("none", "grow", "grow", "both", "shrink", "grow", "shrink", "shrink", "shrink", "shrink"):
         if change in ("grow", "both"):
             trees.grow(0.3, rng)
-        if change in ("shrink", "both") and trees.tree.merges(np.flatnonzero(trees.nodes.used)):
+        if change in ("shrink", "both") and trees.tree.merges(np.flatnonzero(trees.pool.used)):
             trees.shrink()
-        depths.add(trees.nodes.depth)
+        depths.add(trees.pool.depth)
         trees.write_noise(np.random.default_rng(len(depths)))
         known.resolve("irradiance", options, scale=None, whole=change == "none")
         for _ in range(-(-known.size[1] * known.size[0] // resolve.TEXELS_PER_FRAME)):
             known.resolve("irradiance", options, scale=None, whole=False)
-        fresh = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.nodes), BORDER[interpolation])
+        fresh = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.pool), BORDER[interpolation])
         fresh.resolve("irradiance", options, scale=None, whole=True)
         for what, expected in tables(fresh).items():
             np.testing.assert_array_equal(tables(known)[what], expected, err_msg=f"{what} after {change}")
@@ -52,20 +52,20 @@ def test_display_texels_follow_the_leaves(
 def test_pages_follow_the_finest_leaf(forest: Callable[..., Forest]) -> None:
     """The table of a tree that has grown and shrunk is that of one made at once, and no finer than it must be."""
     trees = forest(table_room(), texels=12000)
-    first = trees.nodes.depth
+    first = trees.pool.depth
     for _ in range(DEPTH):
         trees.grow()
-    assert trees.nodes.depth == DEPTH == trees.nodes.leaves.level.max() > first
-    height, width = trees.nodes.slot_tables["t_pages"].shape[:2]
-    assert (width, height) == tuple(side << DEPTH for side in np.array(trees.nodes.charts.size) // trees.nodes.tile)
-    while trees.tree.merges(np.flatnonzero(trees.nodes.used)):
+    assert trees.pool.depth == DEPTH == trees.pool.leaves.level.max() > first
+    height, width = trees.pool.slot_tables["t_pages"].shape[:2]
+    assert (width, height) == tuple(side << DEPTH for side in np.array(trees.pool.charts.size) // trees.pool.tile)
+    while trees.tree.merges(np.flatnonzero(trees.pool.used)):
         trees.shrink()
-    assert trees.nodes.depth <= trees.nodes.leaves.level.max() + 1 < DEPTH
+    assert trees.pool.depth <= trees.pool.leaves.level.max() + 1 < DEPTH
     pages = trees.lightmap.texture("t_pages")
     held = np.frombuffer(pages.read(), np.uint32).reshape(pages.height, pages.width, 1)
-    np.testing.assert_array_equal(held, trees.nodes.slot_tables["t_pages"])
-    for slot in np.flatnonzero(trees.nodes.used):
-        k = 1 << (trees.nodes.depth - trees.nodes.leaves.level[slot])
-        x, y = trees.nodes.leaves.x[slot] * k, trees.nodes.leaves.y[slot] * k
+    np.testing.assert_array_equal(held, trees.pool.slot_tables["t_pages"])
+    for slot in np.flatnonzero(trees.pool.used):
+        k = 1 << (trees.pool.depth - trees.pool.leaves.level[slot])
+        x, y = trees.pool.leaves.x[slot] * k, trees.pool.leaves.y[slot] * k
         assert (held[y : y + k, x : x + k] == slot + 1).all()
-    assert len(np.unique(held)) == trees.nodes.used.sum() + (held == 0).any()
+    assert len(np.unique(held)) == trees.pool.used.sum() + (held == 0).any()

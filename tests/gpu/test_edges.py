@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from solver_scenes import grey, quads_scene, room
 
 from app.atlas.charts import TILES
-from app.atlas.quadtree import MAX_DEPTH
 from app.gpu import Gpu
+from app.lightmap.quadtree import MAX_DEPTH
 from app.render import edge_texels, resolve
 from app.render.ages import LeafAges
 from app.render.edges import unequal_edges
@@ -32,9 +32,9 @@ def weights(interpolation: str, t: F64) -> F64:
     return np.array([s**3, 3 * t**3 - 6 * t**2 + 4, 3 * s**3 - 6 * s**2 + 4, t**3]) / 6
 
 
-def sampled(display: NDArray[np.float64], nodes: object, interpolation: str, slot: int, uv: F64) -> float:
+def sampled(display: NDArray[np.float64], pool: object, interpolation: str, slot: int, uv: F64) -> float:
     """What is interpolated at a place of the atlas [texels of level 0] in one leaf's display texels."""
-    leaves, columns, tile = nodes.leaves, nodes.columns, nodes.tile  # type: ignore[attr-defined]
+    leaves, columns, tile = pool.leaves, pool.columns, pool.tile  # type: ignore[attr-defined]
     border = BORDER[interpolation]
     inside = uv * 2.0 ** leaves.level[slot] - np.array([leaves.x[slot], leaves.y[slot]]) * tile
     at = np.array([slot % columns, slot // columns]) * (tile + 2 * border) + border + inside - 0.5
@@ -44,11 +44,11 @@ def sampled(display: NDArray[np.float64], nodes: object, interpolation: str, slo
     return float(w[:, 1] @ display[np.ix_(rows, columns)] @ w[:, 0])
 
 
-def edge_points(nodes: object) -> list[tuple[int, int, F64]]:
+def edge_points(pool: object) -> list[tuple[int, int, F64]]:
     """Places where two leaves of different level meet, four along the edge of a leaf of MAX_DEPTH."""
-    pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64) - 1  # type: ignore[attr-defined]
-    level, cell = nodes.leaves.level, 1 / nodes.pages_per_texel  # type: ignore[attr-defined]
-    found, count = [], 4 << (MAX_DEPTH - nodes.depth)  # type: ignore[attr-defined]
+    pages = pool.slot_tables["t_pages"][..., 0].astype(np.int64) - 1  # type: ignore[attr-defined]
+    level, cell = pool.leaves.level, 1 / pool.pages_per_texel  # type: ignore[attr-defined]
+    found, count = [], 4 << (MAX_DEPTH - pool.depth)  # type: ignore[attr-defined]
     for step, along in (((0, 1), (0, 1)), ((1, 0), (1, 0))):
         a, b = pages[: len(pages) - step[0], : pages.shape[1] - step[1]], pages[step[0] :, step[1] :]
         met = (a >= 0) & (b >= 0) & (level[a] != level[b])
@@ -63,7 +63,7 @@ def shown(gpu: Gpu, trees: Forest, interpolation: str, light: F64) -> NDArray[np
     """The display texels, 0 to 1, of light that they show as it is: sRGB undone."""
     linear = np.where(light <= 0.04045, light / 12.92, ((np.maximum(light, 0.04045) + 0.055) / 1.055) ** 2.4)
     trees.write({"t_irradiance": np.repeat(linear[..., None], 3, -1) * np.pi / trees.lightmap.unit})
-    display = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.nodes), BORDER[interpolation])
+    display = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.pool), BORDER[interpolation])
     options = DisplayOptions(layer="irradiance", tone_map="clamp", interpolation=interpolation)
     textures = display.resolve("irradiance", options, scale=None, whole=True)
     texture = textures["t_display"]
@@ -87,14 +87,14 @@ def uneven(forest: Callable[..., Forest], rng: np.random.Generator, request: pyt
 @pytest.mark.parametrize("interpolation", SMOOTH)
 def test_linear_light_stays_linear_where_levels_meet(gpu: Gpu, uneven: Forest, interpolation: str) -> None:
     """On both sides of every edge, and there is no step."""
-    nodes = uneven.nodes
-    slope, middle = np.array([0.006, 0.005]), nodes.charts.chart_rects[0][:2] + 32
+    pool = uneven.pool
+    slope, middle = np.array([0.006, 0.005]), pool.charts.chart_rects[0][:2] + 32
     raw = shown(gpu, uneven, interpolation, 0.5 + (places(uneven) - middle) @ slope)
     tested = 0
-    for a, b, uv in edge_points(nodes):
+    for a, b, uv in edge_points(pool):
         if (np.abs(uv - middle) < 30).all():
             exact = 0.5 + (uv - middle) @ slope
-            both = np.array([sampled(raw, nodes, interpolation, slot, uv) for slot in (a, b)])
+            both = np.array([sampled(raw, pool, interpolation, slot, uv) for slot in (a, b)])
             assert np.abs(both - exact).max() < ROUNDING, (uv, both, exact)
             assert np.ptp(both) < ROUNDING
             tested += 1
@@ -106,20 +106,20 @@ def test_curved_light_has_no_step_where_levels_meet(gpu: Gpu, uneven: Forest, in
     """Waves of 8 texels of level 0. What is left is how a row of fine texels follows a coarser one along the edge: where that
     bends, it is off by 1/8 of the second difference, by 5/32 at the end of a leaf, and by a quarter more since sRGB bends too.
     Across the edge nothing is left."""
-    nodes = uneven.nodes
-    middle = nodes.charts.chart_rects[0][:2] + 32
+    pool = uneven.pool
+    middle = pool.charts.chart_rects[0][:2] + 32
     second_difference = 0.25 * (2 * np.sin(np.pi / 8)) ** 2
     for direction in ((1.0, 0.0), (0.6, 0.8)):
         wave = np.sin(places(uneven) @ np.array(direction) * 2 * np.pi / 8)
         raw = shown(gpu, uneven, interpolation, 0.5 + 0.25 * wave)
         steps = [
-            abs(sampled(raw, nodes, interpolation, a, uv) - sampled(raw, nodes, interpolation, b, uv))
-            for a, b, uv in edge_points(nodes)
+            abs(sampled(raw, pool, interpolation, a, uv) - sampled(raw, pool, interpolation, b, uv))
+            for a, b, uv in edge_points(pool)
             if (np.abs(uv - middle) < 30).all()
         ]
         assert max(steps) < 1.25 * 5 / 32 * second_difference + 2 * ROUNDING, (direction, np.array(steps).max() * 255)
         # the ends are half of the edge of a small leaf
-        assert np.mean(steps) < (1.0 if nodes.tile == 8 else 0.6) * ROUNDING
+        assert np.mean(steps) < (1.0 if pool.tile == 8 else 0.6) * ROUNDING
 
 
 def test_edges_that_one_texture_cannot_hold(
@@ -134,6 +134,6 @@ def test_edges_that_one_texture_cannot_hold(
     monkeypatch.setattr(resolve, "TABLE_WIDTH", longest)
     monkeypatch.setattr(edge_texels, "IN_A_ROW", 1)
     monkeypatch.setattr(gpu, "limits", dataclasses.replace(gpu.limits, max_texture=longest))
-    found = unequal_edges(trees.nodes, BORDER["bicubic"], np.flatnonzero(trees.nodes.used))
+    found = unequal_edges(trees.pool, BORDER["bicubic"], np.flatnonzero(trees.pool.used))
     assert max(len(some) for some in found.values()) > longest
     np.testing.assert_array_equal(shown(gpu, trees, "bicubic", light), whole)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from boxes import SIZE, STEP, box, cornell, even, picture, put
 
-from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu
+from app.lightmap.lightmap import Lightmap
 from app.render.exposure import exposure_of
 from app.render.false_colour import LUMINANCE, colour_map, false_colour_scale
 from app.render.options import DisplayOptions
@@ -37,16 +37,16 @@ def test_false_colour_is_the_colour_of_the_value(gpu: Gpu, box: Lightmap, logari
 
 def mean_residual(lightmap: Lightmap) -> np.ndarray:
     """r̄ over all texels, RGB [W/m²]."""
-    area = lightmap.nodes.surfaces.area
+    area = lightmap.pool.surfaces.area
     return np.einsum("tijc,tij->c", lightmap.residual().astype(np.float64), area) / area.sum()
 
 
 def test_a_logarithmic_scale_spans_what_is_lit(box: Lightmap) -> None:
     """From what is nearly the darkest to nearly the brightest of what does not emit, however bright a lamp is."""
     rng = np.random.default_rng(7)
-    lux = 10 ** rng.uniform(1, 3, box.nodes.surfaces.area.shape)
+    lux = 10 ** rng.uniform(1, 3, box.pool.surfaces.area.shape)
     emits = np.array([m.emits for m in box.scene.materials])
-    face = box.nodes.surfaces.face
+    face = box.pool.surfaces.face
     lamp = emits[box.scene.material_ids[box.charts.face_triangle[face]]] & (face >= 0)
     assert lamp.any()
     lux[lamp] = 1e6
@@ -68,7 +68,7 @@ def test_scale_and_exposure_come_from_the_light(box: Lightmap) -> None:
     assert luminance.unit == "cd/m²"
 
     exposure = exposure_of(box, mean_residual(box))
-    area = box.nodes.surfaces.area
+    area = box.pool.surfaces.area
     mean = np.average(np.log((box.albedo() * H @ LUMINANCE)[area > 0] / np.pi), weights=area[area > 0])
     assert 2.0**exposure * np.exp(mean) == pytest.approx(0.18, rel=1e-5)
     put(box, "t_irradiance", even(box, H) * 8)

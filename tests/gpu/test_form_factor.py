@@ -17,8 +17,8 @@ from app.scene.model import F64
 
 PROBE = """
 #include "common/atlas.glsl"
-#include "shooting/shooter.glsl"
-#include "shooting/form_factor.glsl"
+#include "solvers/shooting/shooter.glsl"
+#include "solvers/shooting/form_factor.glsl"
 uniform sampler2D t_position;
 uniform sampler2D t_normal;
 uniform vec3 u_edge_u;

@@ -11,20 +11,20 @@ from forests import Forest, forest
 from gl_objects import forgotten, held
 from solver_scenes import begin, grey, quads_scene, room, table_room
 
-from app.atlas.lightmap import Lightmap
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
 from app.atlas.points import random_points
-from app.bench.points import irradiance_of
-from app.gathering.expected import FEWEST, POINTS, TURNS, Expectation, choose, expected_error
-from app.gathering.gather import Gather, tangents
+from app.estimate.error import FEWEST, POINTS, TURNS, Expectation, choose, expected_error
+from app.estimate.gather import Gather, tangents
 from app.gpu import Gpu
-from app.metrics import bias, lit_points, relative_rms
-from app.parts import whole
+from app.lightmap.at_points import irradiance_of
+from app.lightmap.lightmap import Lightmap
 from app.reference.form_factors import point_to_polygon
+from app.reference.metrics import bias, lit_points, relative_rms
 from app.scene.model import F64
-from app.session import Session, Stop
+from app.session.session import Session, Stop
 from app.solvers import ShootingOptions
+from app.util.parts import whole
 
 __all__ = ["box", "cornell", "forest", "forgotten"]
 
@@ -61,7 +61,7 @@ def test_radiosity_is_what_is_emitted_and_what_is_reflected(gpu: Gpu) -> None:
     walls, albedos = room((1.0, 1.0, 1.0)), (0.1, 0.9, 0.3, 0.7, 0.5, 0.2)
     scene = quads_scene(walls, [grey(a, float(k == 4)) for k, a in enumerate(albedos)], list(range(6)))
     lightmap = Lightmap.of(gpu, scene, parametrize(scene, texels=1000))
-    put(lightmap, "t_irradiance", (lightmap.nodes.surfaces.area > 0)[..., None] * np.array([1.0, 2.0, 3.0]))
+    put(lightmap, "t_irradiance", (lightmap.pool.surfaces.area > 0)[..., None] * np.array([1.0, 2.0, 3.0]))
     position, normal = random_points(scene, 20, 1).positions_normals(scene)
     factors = np.array([point_to_polygon(position, normal, wall) for wall in walls])
     expected = factors.T @ (np.array(albedos)[:, None] * [1.0, 2.0, 3.0] + np.eye(6)[4][:, None])
@@ -76,12 +76,12 @@ def test_textures_are_looked_up(gpu: Gpu, forest: Callable[..., Forest]) -> None
     trees = forest(load_scene("textured-room"), texels=3000)
     lightmap, rng = trees.lightmap, np.random.default_rng(5)
     position, normal = random_points(lightmap.scene, 16, 3).positions_normals(lightmap.scene)
-    light = np.ones((trees.nodes.tiles, 16, 16, 3))
+    light = np.ones((trees.pool.tiles, 16, 16, 3))
     trees.write({"t_irradiance": light, "t_residual": light})
     before = gathered(gpu, lightmap, position, normal)
     trees.grow(0.4, rng)
     trees.grow(0.4, rng)
-    light = np.ones((trees.nodes.tiles, 16, 16, 3))
+    light = np.ones((trees.pool.tiles, 16, 16, 3))
     trees.write({"t_irradiance": light, "t_residual": light})
     after = gathered(gpu, lightmap, position, normal)
     assert before.min() > 0 and np.ptp(before) > 0.2 * before.mean(), "colours are there"

@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 
 from app.gpu import Gpu
 from app.gpu.imgui import ImguiRenderer
-from app.headless_ui import pixels
+from app.viewer.ui_frame import pixels
 
 SIZE = (320, 200)
 BACKGROUND = np.array([26, 51, 77])

@@ -10,31 +10,31 @@ from forests import SCENES, Forest, forest, tables
 from numpy.typing import NDArray
 from solver_scenes import Solution, begin, table_room
 
-from app.atlas.collapse import collapse
-from app.atlas.lightmap import LIGHT, STORAGE, Lightmap
 from app.atlas.options import AtlasOptions
-from app.atlas.quadtree import Quadtree, Tile, quadtree_nodes
+from app.commands.headless import picture
 from app.gpu import Gpu, Texture
-from app.headless import picture
+from app.lightmap.collapse import collapse
+from app.lightmap.lightmap import LIGHT, STORAGE, Lightmap
+from app.lightmap.quadtree import Quadtree, Tile, quadtree_pool
 from app.render import resolve
 from app.render.ages import LeafAges
 from app.render.options import DisplayOptions
 from app.render.resolve import BORDER, DisplayTexels
-from app.session import Session
-from app.solvers import SOLVERS, EnergyBook, ShootingOptions
+from app.session.session import Session
+from app.solvers import SOLVERS, EnergyBalance, ShootingOptions
 from app.solvers.shooting.adaptive import AdaptiveShooting
 from app.solvers.shooting.stages import EMITTER, ShotBuffers
 
 __all__ = ["forest"]
 
-SMALL_ROOM = 4096  # texels that a node set has room for at least: a small scene outgrows it
+SMALL_ROOM = 4096  # texels that a tile pool has room for at least: a small scene outgrows it
 MANY: dict[str, object] = {"depth": 4, "gradient": 0.06}
 FEW: dict[str, object] = {"depth": 1, "gradient": 0.5}
 
 
 @pytest.fixture(autouse=True)
 def small_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("app.atlas.quadtree", "app.solvers.shooting.adaptive"):
+    for module in ("app.lightmap.quadtree", "app.solvers.shooting.adaptive"):
         monkeypatch.setattr(f"{module}.FIRST_ROOM", SMALL_ROOM)
 
 
@@ -42,21 +42,21 @@ def small_room(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def by_leaf(tree: Quadtree, texture: Texture) -> dict[Tile, bytes]:
-    """What a texture that is as large as the node set holds of each leaf."""
-    nodes, raw = tree.nodes, np.frombuffer(texture.read(alignment=1), np.uint8)
-    tiles = nodes.tiles_from_image(raw.reshape(*nodes.size[::-1], -1))
+    """What a texture that is as large as the tile pool holds of each leaf."""
+    pool, raw = tree.pool, np.frombuffer(texture.read(alignment=1), np.uint8)
+    tiles = pool.tiles_from_image(raw.reshape(*pool.size[::-1], -1))
     return {tile: tiles[slot].tobytes() for tile, slot in tree.slots.items()}
 
 
 def leaf_textures(lightmap: Lightmap) -> list[str]:
-    return [*lightmap.nodes.tile_arrays(np.empty(0, np.int64)), *LIGHT]
+    return [*lightmap.pool.tile_arrays(np.empty(0, np.int64)), *LIGHT]
 
 
 def scattered(trees: Forest, rng: np.random.Generator) -> None:
-    """Leaves and holes all over the node set."""
+    """Leaves and holes all over the tile pool."""
     for _ in range(2):
         trees.grow()
-    families = trees.tree.merges(np.flatnonzero(trees.nodes.used))
+    families = trees.tree.merges(np.flatnonzero(trees.pool.used))
     trees.regrowth.apply(trees.tree.merge([family for family in families if rng.random() < 0.7]))
 
 
@@ -67,7 +67,7 @@ def test_leaves_take_along_all_that_is_theirs(
     """To the bit: surfaces, light with its alpha, a solver's own texels, and how finely they shoot."""
     trees = forest(SCENES[name](), storage=storage)
     scattered(trees, rng)
-    nodes, tree, lightmap = trees.nodes, trees.tree, trees.lightmap
+    pool, tree, lightmap = trees.pool, trees.tree, trees.lightmap
     for light in LIGHT:
         texture = lightmap.texture(light)
         noise = rng.uniform(0, 1, (*texture.size[::-1], 4)) ** 8  # also very little
@@ -79,7 +79,7 @@ def test_leaves_take_along_all_that_is_theirs(
 
     def held() -> list[dict[Tile, bytes]]:
         assert buffers.finer.read() == buffers.finer_levels.tobytes()
-        finer = {tile: buffers._tiles[divmod(slot, nodes.columns)].tobytes() for tile, slot in tree.slots.items()}
+        finer = {tile: buffers._tiles[divmod(slot, pool.columns)].tobytes() for tile, slot in tree.slots.items()}
         return [*(by_leaf(tree, lightmap.texture(n)) for n in leaf_textures(lightmap)), by_leaf(tree, own), finer]
 
     buffers.finer.write(buffers.finer_levels.tobytes())
@@ -95,76 +95,76 @@ def test_leaves_take_along_all_that_is_theirs(
     assert len(tree) == leaves and tree.room == 5 < room
     assert sum(lightmap.memory.values()) < memory
     for texture in (own, *(lightmap.texture(light) for light in LIGHT)):  # books are added up over all slots
-        assert texture.size == lightmap.size == nodes.size
+        assert texture.size == lightmap.size == pool.size
     covered = by_area(lightmap)
-    assert covered[~nodes.used].sum() == 0 and covered[nodes.used].all()
+    assert covered[~pool.used].sum() == 0 and covered[pool.used].all()
     buffers.release()
     own.release()
 
 
 def by_area(lightmap: Lightmap) -> NDArray[np.bool_]:
     """Whether the GPU holds texels that cover a surface in each slot, also those beyond the last."""
-    nodes = lightmap.nodes
-    raw = np.frombuffer(lightmap.texture("t_position_area").read(), np.float32).reshape(*nodes.size[::-1], 4)[..., 3]
-    cells = raw.reshape(nodes.rows, nodes.tile, nodes.columns, nodes.tile).swapaxes(1, 2)
+    pool = lightmap.pool
+    raw = np.frombuffer(lightmap.texture("t_position_area").read(), np.float32).reshape(*pool.size[::-1], 4)[..., 3]
+    cells = raw.reshape(pool.rows, pool.tile, pool.columns, pool.tile).swapaxes(1, 2)
     found = (cells > 0).any((2, 3)).ravel()
-    assert not found[nodes.tiles :].any()
-    return np.asarray(found[: nodes.tiles])
+    assert not found[pool.tiles :].any()
+    return np.asarray(found[: pool.tiles])
 
 
 def test_the_node_set_is_one_that_was_never_larger(forest: Callable[..., Forest], rng: np.random.Generator) -> None:
     """Tables, receivers and textures are what they would be for leaves that had always been there; and it grows again."""
     trees = forest(SCENES["textured"]())
     scattered(trees, rng)
-    nodes, tree = trees.nodes, trees.tree
+    pool, tree = trees.pool, trees.tree
     whole = trees.energy
     trees.lightmap.resize(tree.resize(len(tree) + 1))
-    assert sorted(tree.slots.values()) == np.flatnonzero(nodes.used).tolist()
+    assert sorted(tree.slots.values()) == np.flatnonzero(pool.used).tolist()
     assert all(tree.tile(slot) == tile for tile, slot in tree.slots.items())
-    pages = nodes.slot_tables["t_pages"][..., 0]
-    for slot in np.flatnonzero(nodes.used):
-        side = 1 << (nodes.depth - nodes.leaves.level[slot])
-        x, y = nodes.leaves.x[slot] * side, nodes.leaves.y[slot] * side
+    pages = pool.slot_tables["t_pages"][..., 0]
+    for slot in np.flatnonzero(pool.used):
+        side = 1 << (pool.depth - pool.leaves.level[slot])
+        x, y = pool.leaves.x[slot] * side, pool.leaves.y[slot] * side
         assert (pages[y : y + side, x : x + side] == slot + 1).all()
     assert len(np.unique(pages)) == len(tree) + (pages == 0).any()
-    for name, array in nodes.arrays.items():
+    for name, array in pool.arrays.items():
         texture = trees.lightmap.texture(name)
         read = np.frombuffer(texture.read(), array.dtype).reshape(array.shape)
         if name in leaf_textures(trees.lightmap):
-            mine = nodes.surfaces.area > 0
-            read, array = nodes.tiles_from_image(read)[mine], nodes.tiles_from_image(array)[mine]
+            mine = pool.surfaces.area > 0
+            read, array = pool.tiles_from_image(read)[mine], pool.tiles_from_image(array)[mine]
         np.testing.assert_array_equal(read, array, err_msg=name)
-    quads = np.concatenate([nodes.flat_spans, nodes.shaped_tiles])
-    assert (quads[:, 2] * quads[:, 3]).sum() >= nodes.texel_count, "some leaves receive nothing"
-    assert (quads[:, 1] + quads[:, 3]).max() <= nodes.size[1]
+    quads = np.concatenate([pool.flat_spans, pool.shaped_tiles])
+    assert (quads[:, 2] * quads[:, 3]).sum() >= pool.texel_count, "some leaves receive nothing"
+    assert (quads[:, 1] + quads[:, 3]).max() <= pool.size[1]
     np.testing.assert_allclose(trees.energy, whole, rtol=1e-12)  # sums in another order
     trees.grow(0.3, rng)
     np.testing.assert_allclose(trees.energy, whole, rtol=1e-4)  # as any split
-    assert tree.room + len(tree) == nodes.tiles
+    assert tree.room + len(tree) == pool.tiles
 
 
 @pytest.mark.parametrize("interpolation", BORDER)
 def test_display_texels_are_the_same(
     gpu: Gpu, forest: Callable[..., Forest], rng: np.random.Generator, interpolation: str
 ) -> None:
-    """Of new ones, and of those that stay and follow leaf by leaf, where the node set shrinks and grows between two frames."""
+    """Of new ones, and of those that stay and follow leaf by leaf, where the tile pool shrinks and grows between two frames."""
     trees, border = forest(table_room()), BORDER[interpolation]
     scattered(trees, rng)
-    noise = rng.uniform(0, np.pi / trees.lightmap.unit, (*trees.nodes.surfaces.area.shape, 3))
+    noise = rng.uniform(0, np.pi / trees.lightmap.unit, (*trees.pool.surfaces.area.shape, 3))
     trees.write({"t_irradiance": noise})
     options = DisplayOptions(layer="irradiance", tone_map="clamp", interpolation=interpolation)
 
     def shown(display: DisplayTexels, *, whole: bool) -> dict[Tile, bytes]:
         display.resolve("irradiance", options, scale=None, whole=whole)
-        slots = np.flatnonzero(trees.nodes.used).tolist()
+        slots = np.flatnonzero(trees.pool.used).tolist()
         return {trees.tree.tile(slot): tables(display)["colours"][nth].tobytes() for nth, slot in enumerate(slots)}
 
-    known = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.nodes), border)
-    before, slots = shown(known, whole=True), trees.nodes.tiles
+    known = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.pool), border)
+    before, slots = shown(known, whole=True), trees.pool.tiles
     assert len(set(before.values())) == len(before), "it shows nothing"
     trees.lightmap.resize(trees.tree.resize(len(trees.tree)))
     assert not known.fits(border), "nor is there anything left that it could follow"
-    fresh = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.nodes), border)
+    fresh = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.pool), border)
     assert shown(fresh, whole=True) == before
     trees.lightmap.resize(trees.tree.resize(slots))
     assert known.fits(border)
@@ -210,27 +210,27 @@ def tree_solver(solution: Solution) -> AdaptiveShooting:
 def test_memory_follows_the_light(planted: Callable[..., Solution]) -> None:
     """A tree that merges gives its room back, once: what is left serves as it comes and goes a little."""
     box = planted(**MANY)
-    solver, nodes = tree_solver(box), box.lightmap.nodes
-    first, sizes = sum(box.lightmap.memory.values()), [nodes.tiles]
+    solver, pool = tree_solver(box), box.lightmap.pool
+    first, sizes = sum(box.lightmap.memory.values()), [pool.tiles]
     resize = solver._resize
 
     def watched(slots: int) -> None:
         before, books = leaves_of(box), solver.books()
         resize(slots)
-        sizes.append(nodes.tiles)
+        sizes.append(pool.tiles)
         assert leaves_of(box) == before
         assert_same_books(solver.books(), books)
 
     solver._resize = watched  # type: ignore[method-assign]
     box.settle()
     peak, most, imbalance = sum(box.lightmap.memory.values()), len(solver.tree), box.book.imbalance_share
-    assert peak > 2 * first and len(sizes) > 2 and sizes == sorted(sizes), "the node set did not grow"
+    assert peak > 2 * first and len(sizes) > 2 and sizes == sorted(sizes), "the tile pool did not grow"
     grown = len(sizes)
     follow(box, **FEW)
     assert len(solver.tree) < most / 3
-    assert sizes[grown:] == [max(SMALL_ROOM // nodes.tile**2, len(solver.tree) * 3 // 2)]
+    assert sizes[grown:] == [max(SMALL_ROOM // pool.tile**2, len(solver.tree) * 3 // 2)]
     assert sum(box.lightmap.memory.values()) < peak / 2
-    assert nodes.tiles >= len(solver.tree) and sorted(solver.tree.slots.values()) == np.flatnonzero(nodes.used).tolist()
+    assert pool.tiles >= len(solver.tree) and sorted(solver.tree.slots.values()) == np.flatnonzero(pool.used).tolist()
     for depth in (2, 1, 2, 1):
         leaves = len(solver.tree)
         follow(box, depth=depth)
@@ -240,7 +240,7 @@ def test_memory_follows_the_light(planted: Callable[..., Solution]) -> None:
     assert box.book.imbalance_share == pytest.approx(imbalance, abs=2e-3)
 
 
-def assert_same_books(a: EnergyBook, b: EnergyBook) -> None:
+def assert_same_books(a: EnergyBalance, b: EnergyBalance) -> None:
     for name in ("absorbed", "escaped", "unshot"):  # the same sums of tiles, added up in another order
         np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=1e-12)
 
@@ -265,7 +265,7 @@ def test_a_solver_takes_along_what_it_knows_of_its_leaves(planted: Callable[...,
     solver._make_room(4 * len(fresh) + 400)
     solver._apply(solver.tree.split(fresh))
     solver.buffers._tiles[:] = np.arange(solver.buffers._tiles.size).reshape(solver.buffers._tiles.shape) % 3
-    families = solver.tree.merges(np.flatnonzero(box.lightmap.nodes.used))[::2]
+    families = solver.tree.merges(np.flatnonzero(box.lightmap.pool.used))[::2]
     solver._apply(solver.tree.merge(families))
     before = leaves_of(box)
     for held in before:
@@ -279,13 +279,13 @@ def test_a_solver_takes_along_what_it_knows_of_its_leaves(planted: Callable[...,
 
 def twin(gpu: Gpu, solution: Solution) -> Solution:
     """Before the first shot, on the same leaves."""
-    wanted, nodes = tree_solver(solution).tree.slots, quadtree_nodes(solution.lightmap.scene, solution.lightmap.charts)
-    tree = Quadtree(nodes)
+    wanted, pool = tree_solver(solution).tree.slots, quadtree_pool(solution.lightmap.scene, solution.lightmap.charts)
+    tree = Quadtree(pool)
     while splits := [slot for tile, slot in tree.slots.items() if tile not in wanted]:
         if tree.room < 4 * len(splits):
-            tree.resize(nodes.tiles + 4 * len(splits))
+            tree.resize(pool.tiles + 4 * len(splits))
         tree.split(splits)
-    lightmap = Lightmap(gpu, nodes)
+    lightmap = Lightmap(gpu, pool)
     return Solution(lightmap, SOLVERS["adaptive"](gpu, lightmap, solution.solver.options))
 
 
@@ -298,18 +298,18 @@ def test_further_shots_come_to_the_same_answer(gpu: Gpu, planted: Callable[..., 
     tree_solver(roomy)._give_room_back = lambda: None  # type: ignore[method-assign]
     for one in (box, roomy):
         one.settle()
-        room = one.lightmap.nodes.tiles
+        room = one.lightmap.pool.tiles
         follow(one, **FEW)
-    assert box.lightmap.nodes.tiles < room / 2 == roomy.lightmap.nodes.tiles / 2
+    assert box.lightmap.pool.tiles < room / 2 == roomy.lightmap.pool.tiles / 2
     others = roomy, twin(gpu, box)
     for one in (box, *others):
         tree_solver(one)._grow = lambda *_: False  # type: ignore[method-assign]  # they keep these leaves
         one.solver.set_options(one.solver.options.replace(residual=0.01))
         one.settle()
-    mine, here = collapse(box.lightmap.nodes, box.lightmap.irradiance())
+    mine, here = collapse(box.lightmap.pool, box.lightmap.irradiance())
     for other, tolerance in zip(others, (0.005, 0.015), strict=True):
         assert tree_solver(other).tree.slots.keys() == tree_solver(box).tree.slots.keys()
-        light, there = collapse(other.lightmap.nodes, other.lightmap.irradiance())
+        light, there = collapse(other.lightmap.pool, other.lightmap.irradiance())
         assert (here == there).all()
         assert np.sqrt(((mine - light)[here] ** 2).mean() / (light[here] ** 2).mean()) < tolerance
     others[1].release()

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from solver_scenes import table_room
 
-from app.atlas.lightmap import Lightmap
 from app.atlas.parametrize import parametrize
-from app.atlas.quadtree import Quadtree, quadtree_nodes
 from app.gpu import Gpu
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.quadtree import Quadtree, quadtree_pool
 from app.solvers.shooting.stages import EMITTER, ShotBuffers
 
 
@@ -21,10 +21,10 @@ def marked(gpu: Gpu) -> Iterator[Callable[[], tuple[Quadtree, ShotBuffers]]]:
 
     def make() -> tuple[Quadtree, ShotBuffers]:
         scene = table_room()
-        nodes = quadtree_nodes(scene, parametrize(scene, density=4.0))
-        lightmap = Lightmap(gpu, nodes)
+        pool = quadtree_pool(scene, parametrize(scene, density=4.0))
+        lightmap = Lightmap(gpu, pool)
         made.extend((buffers := ShotBuffers(gpu, lightmap), lightmap))
-        return Quadtree(nodes), buffers
+        return Quadtree(pool), buffers
 
     yield make
     for one in made:

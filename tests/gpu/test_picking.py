@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from boxes import PLAIN, SIZE, box, cornell, even, hits, picture, put, some_pixels, view_of
 
-from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu
+from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
-from app.render.develop import encode_srgb
 from app.render.frame import FrameRenderer
 from app.render.options import DisplayOptions
+from app.render.tone_mapping import encode_srgb
 from app.scene.model import F64
 
 __all__ = ["box", "cornell"]
@@ -74,12 +74,12 @@ def test_pick_agrees_with_a_ray(gpu: Gpu, box: Lightmap, rng: np.random.Generato
         if hit is None or hit.texel is None:
             continue
         # single precision on a scene of radius 1
-        assert np.array(hit.position) == pytest.approx(position, abs=1e-5 * box.frame.scale)
+        assert np.array(hit.position) == pytest.approx(position, abs=1e-5 * box.space.scale)
         assert hit.material == box.scene.material_ids[expected]
         assert hit.tile is not None
         assert hit.tile_texel is not None
         column, row = hit.tile_texel
-        texel = box.nodes.surfaces.position[hit.tile, row, column]
+        texel = box.pool.surfaces.position[hit.tile, row, column]
         # a texel's centroid and a point of it: within its diagonal, twice as long where it is cut or stretched
         assert np.linalg.norm(texel - position) < 2 * np.sqrt(2) / box.charts.density
     assert (triangle >= 0).any()

@@ -1,5 +1,5 @@
-"""Every projection keeps its contract (app/projections/base.py): weights that sum to 1, maps that invert each other, and pictures
-that show what a ray meets."""
+"""Every projection keeps its contract (visibility/projections/base.py): weights that sum to 1, maps that invert each other, and
+pictures that show what a ray meets."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from solver_scenes import Solution, begin, table_room
 
 from app.gpu import Gpu, Pass
 from app.gpu.shader import SHADERS, ShaderLibrary
-from app.projections import PROJECTIONS
-from app.projections.occluders import halved
 from app.scene.load import load_scene
 from app.scene.model import F64
 from app.solvers.shooting.shot import Shot
 from app.solvers.shooting.stages import BATCH
+from app.visibility.occluders import halved
+from app.visibility.projections import PROJECTIONS
 
 # One fragment per texel of the map: its weight and direction; how far each pair of functions is from inverting the other
 PROBE = """
@@ -116,10 +116,10 @@ def test_the_four_samples_around_a_place(probe: Gpu, name: str) -> None:
 # -- pictures ----------------------------------------------------------------------------------------------------------
 
 # Share of the hemisphere, weighted by its cosine, that may show another item than a ray meets: samples that lie on an edge. The
-# stereographic map draws edges straight, see app/projections/occluders.py.
+# stereographic map draws edges straight, see app/visibility/occluders.py.
 WRONG = {"hemicube": 5e-4, "stereographic": 1e-3, "nonlinear": 5e-4}
 CLOSE = (
-    0.03  # solver frame. A patch's middle inside of a block, or next to it: for this no straight edge is short enough
+    0.03  # solver space. A patch's middle inside of a block, or next to it: for this no straight edge is short enough
 )
 # The same at 64 px: a sample is twice as large as at the 128 px of WRONG
 EDGES_OF_64 = 2 * WRONG["hemicube"]
@@ -145,7 +145,7 @@ def met(corners: F64, sides: F64, origin: F64, rays: F64, own: int) -> tuple[F64
 
 def met_from(solution: Solution, shot: Shot, weight: F64) -> tuple[F64, F64]:
     """What rays from a shooter through every texel of its map meet: item and distance; weight: see ``probed``."""
-    vertices, triangles = solution.lightmap.nodes.occluders
+    vertices, triangles = solution.lightmap.pool.occluders
     corners = vertices["in_position"][triangles].astype(np.float64)
     sides = vertices["in_sides"][triangles[:, 2]]
     normal, u = shot.rows[1, :3], shot.rows[3, :3]
@@ -180,7 +180,7 @@ def test_map_shows_what_a_ray_meets(probe: Gpu, name: str, scene: str) -> None:
         off.append(np.abs(2 * depth / (distance * scale) - 1)[right])
     assert len(wrong) > 5
     assert np.mean(wrong) < WRONG[name]
-    # DEPTH_SLACK of shooting/visible.glsl, but for a few samples that graze a surface
+    # DEPTH_SLACK of solvers/shooting/visible.glsl, but for a few samples that graze a surface
     assert np.quantile(np.concatenate(off), 0.999) < 1 / 16384
     solution.release()
 

@@ -11,8 +11,8 @@ from gl_objects import forgotten, held
 from solver_scenes import grey, quads_scene, room, table_room
 
 from app.atlas.charts import DEFAULT_TILE, TILES
-from app.atlas.lightmap import STORAGE
 from app.gpu import Gpu
+from app.lightmap.lightmap import STORAGE
 from app.scene.load import load_scene
 
 __all__ = ["forest", "forgotten"]
@@ -35,8 +35,8 @@ def test_splits_and_merges_keep_all_energy(
 ) -> None:
     trees = forest(SCENES[name](), storage=storage, tile=tile)
     trees.write_noise(rng, negative=storage != "fixed8")
-    area = trees.nodes.surfaces.area.sum()
-    weight = trees.nodes.surfaces.area[..., None]
+    area = trees.pool.surfaces.area.sum()
+    weight = trees.pool.surfaces.area[..., None]
     lights = np.array([(np.abs(tiles) * weight).sum((0, 1, 2)) for tiles in (*trees.light.values(), trees.shot)])
     lights = lights.sum(0)  # R is the difference of the others
     before = trees.energy
@@ -73,8 +73,8 @@ def test_push_interpolates(forest: Callable[..., Forest], tile: int) -> None:
     trees.write({"t_irradiance": 0.3 + places(trees) @ slope.T})
     trees.grow()
     expected = 0.3 + places(trees) @ slope.T
-    covered = trees.nodes.surfaces.area > 0
-    rect = trees.nodes.charts.chart_rects[0]
+    covered = trees.pool.surfaces.area > 0
+    rect = trees.pool.charts.chart_rects[0]
     uv = places(trees)
     inner = covered & ((uv > rect[:2] + 1.01) & (uv < rect[:2] + rect[2:] - 1.01)).all(-1)
     assert inner.sum() > tile**2
@@ -95,7 +95,7 @@ def test_who_has_shot_is_not_forgotten(forest: Callable[..., Forest], rng: np.ra
         above = before.get((level - 1, x // 2, y // 2))
         if above is not None:
             half = above[y % 2 * 8 : y % 2 * 8 + 8, x % 2 * 8 : x % 2 * 8 + 8]
-            covered = trees.nodes.surfaces.area[slot] > 0
+            covered = trees.pool.surfaces.area[slot] > 0
             np.testing.assert_allclose(shot[slot][covered], half.repeat(2, 0).repeat(2, 1)[covered], atol=2**-11)
             split += 1
     assert split > 10
@@ -109,8 +109,8 @@ def test_what_was_sent_to_a_texel_is_known_to_its_children(forest: Callable[...,
     for change in (trees.grow, trees.shrink):
         change()
         raw = np.frombuffer(residual.read(), np.float32).reshape(*residual.size[::-1], 4)
-        sent = trees.nodes.tiles_from_image(raw)[..., 3]
-        np.testing.assert_allclose(sent[trees.nodes.surfaces.area > 0], 0.7, rtol=1e-5)
+        sent = trees.pool.tiles_from_image(raw)[..., 3]
+        np.testing.assert_allclose(sent[trees.pool.surfaces.area > 0], 0.7, rtol=1e-5)
 
 
 @pytest.mark.parametrize("storage", STORAGE)
@@ -120,10 +120,10 @@ def test_what_has_shot_all_makes_no_light(
     """r = 0 everywhere: as much below zero as above it in children that receive more and less than their parent did, or, where
     nothing can be negative, zero."""
     trees = forest(table_room(), storage=storage)
-    noise = rng.uniform(0.2, 1.0, (*trees.nodes.surfaces.face.shape, 3))
+    noise = rng.uniform(0.2, 1.0, (*trees.pool.surfaces.face.shape, 3))
     trees.write({"t_irradiance": noise, "t_residual": 0 * noise})
     trees.grow()
-    area = trees.nodes.surfaces.area[..., None]
+    area = trees.pool.surfaces.area[..., None]
     unshot, light = ((tiles * area).sum() for tiles in reversed(trees.light.values()))
     assert abs(unshot) <= RELATIVE[storage] * light
 
@@ -131,7 +131,7 @@ def test_what_has_shot_all_makes_no_light(
 def test_light_is_never_made_negative(forest: Callable[..., Forest], rng: np.random.Generator) -> None:
     """Single bright texels among black ones: what is interpolated must not go below zero."""
     trees = forest(table_room())
-    spots = (rng.random((*trees.nodes.surfaces.area.shape, 1)) < 0.05) * np.ones(3)
+    spots = (rng.random((*trees.pool.surfaces.area.shape, 1)) < 0.05) * np.ones(3)
     trees.write({"t_irradiance": spots, "t_residual": spots})
     trees.grow()
     assert trees.light["t_irradiance"].min() >= 0
@@ -155,12 +155,12 @@ def test_enlarging_keeps_the_light(forest: Callable[..., Forest], rng: np.random
     trees = forest(table_room(), storage=storage)
     trees.write_noise(rng)
     before, rows = trees.by_tile(), trees.lightmap.rows
-    trees.lightmap.resize(trees.tree.resize(2 * trees.nodes.tiles))
+    trees.lightmap.resize(trees.tree.resize(2 * trees.pool.tiles))
     assert trees.lightmap.rows > rows
     after = trees.by_tile()
     for tile, values in before.items():
         np.testing.assert_array_equal(after[tile], values)
-    assert np.count_nonzero(trees.light["t_irradiance"][~trees.nodes.used]) == 0
+    assert np.count_nonzero(trees.light["t_irradiance"][~trees.pool.used]) == 0
 
 
 def test_the_textures_follow_the_node_set(forest: Callable[..., Forest], rng: np.random.Generator) -> None:
@@ -168,14 +168,14 @@ def test_the_textures_follow_the_node_set(forest: Callable[..., Forest], rng: np
     trees = forest(load_scene("textured-room"))
     trees.grow(0.4, rng)
     trees.shrink()
-    area = trees.nodes.surfaces.area
+    area = trees.pool.surfaces.area
     held_ones = {"t_position_area", "t_albedo", "t_normal_ids"}
-    for name, array in trees.nodes.arrays.items():
+    for name, array in trees.pool.arrays.items():
         texture = trees.lightmap.texture(name)
         read = np.frombuffer(texture.read(), array.dtype).reshape(array.shape)
         if name in held_ones:
             mine = area > 0
-            read, array = trees.nodes.tiles_from_image(read)[mine], trees.nodes.tiles_from_image(array)[mine]
+            read, array = trees.pool.tiles_from_image(read)[mine], trees.pool.tiles_from_image(array)[mine]
         np.testing.assert_array_equal(read, array, err_msg=name)
 
 

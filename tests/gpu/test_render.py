@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from pictures import framing, tone_map
 
 import app.render.resolve
-from app.atlas.lightmap import Lightmap
 from app.atlas.parametrize import parametrize
 from app.gpu import Gpu
-from app.render.develop import encode_srgb
+from app.lightmap.lightmap import Lightmap
 from app.render.frame import FrameRenderer
 from app.render.options import INTERPOLATIONS, LAYERS, TONE_MAPS, DisplayOptions
+from app.render.tone_mapping import encode_srgb
 from app.scene.model import F64, Material, Scene
 
 __all__ = ["box", "cornell"]
@@ -76,14 +76,14 @@ def test_even_light_has_no_fringes(gpu: Gpu, box: Lightmap, interpolation: str) 
 
 def test_smooth_texels_follow_a_ramp_across_tiles(gpu: Gpu, box: Lightmap, rng: np.random.Generator) -> None:
     """Bilinear and bicubic texels reproduce light that is linear along the wall; nearest ones cannot."""
-    position = box.frame.local_from_world(box.nodes.surfaces.position)
+    position = box.space.local_from_world(box.pool.surfaces.position)
     put(box, "t_irradiance", even(box, (1, 1, 1)) * (1.5 + position[..., :1]))
     pixels = some_pixels(rng, 400)
     triangle, world = hits(box.scene, view_of(box), pixels)
     names = np.array([box.scene.objects[i] for i in box.scene.object_ids])
-    inside = (names[triangle] == "back wall") & (np.abs(box.frame.local_from_world(world)[:, :2]) < 0.5).all(1)
+    inside = (names[triangle] == "back wall") & (np.abs(box.space.local_from_world(world)[:, :2]) < 0.5).all(1)
     assert inside.sum() > 30
-    expected = encode_srgb((1.5 + box.frame.local_from_world(world)[inside, 0]) / np.pi) * 255
+    expected = encode_srgb((1.5 + box.space.local_from_world(world)[inside, 0]) / np.pi) * 255
     errors = {}
     for interpolation in INTERPOLATIONS:
         image = picture(gpu, box, PLAIN.replace(layer="irradiance", interpolation=interpolation))
@@ -103,7 +103,7 @@ def test_bicubic_is_the_cubic_b_spline(gpu: Gpu, box: Lightmap, rng: np.random.G
     renderer.render(target, SIZE, box, view_of(box), display)
     image = np.frombuffer(target.read(components=3), np.uint8).reshape(SIZE[1], SIZE[0], 3)[::-1, :, 0]
     texels = encode_srgb(box.irradiance()[..., 0] / np.pi)
-    nodes, compared, crossing = box.nodes, 0, 0
+    pool, compared, crossing = box.pool, 0, 0
     for x, y in some_pixels(rng, 300):
         hit = renderer.pick(x, y)
         if hit is None or hit.atlas_uv is None or box.scene.objects[box.scene.object_ids[hit.triangle]] != "back wall":
@@ -115,8 +115,8 @@ def test_bicubic_is_the_cubic_b_spline(gpu: Gpu, box: Lightmap, rng: np.random.G
         value, slots = 0.0, set()
         for j, i in np.ndindex(4, 4):
             u, v = int(base[0]) + i - 1, int(base[1]) + j - 1
-            slots.add(slot := nodes.slot_at((float(u), float(v))))
-            covered = slot >= 0 and nodes.surfaces.area[slot, v % 16, u % 16] > 0
+            slots.add(slot := pool.slot_at((float(u), float(v))))
+            covered = slot >= 0 and pool.surfaces.area[slot, v % 16, u % 16] > 0
             value += weights[i, 0] * weights[j, 1] * (texels[slot, v % 16, u % 16] if covered else np.nan)
         if np.isfinite(value):
             # the sampler's weights have 8 bits, for texels of the whole range, and its answers too
@@ -151,7 +151,7 @@ def test_what_is_still_to_come_is_shown_with_what_has_arrived(gpu: Gpu, box: Lig
     assert (picture(gpu, box, display) != lit).any()
     put_ambient(box, (3.0, 0.5, -0.5))
     assert (picture(gpu, box, display) == lit).all()
-    H, covered = box.irradiance(ambient=True), box.nodes.surfaces.area > 0
+    H, covered = box.irradiance(ambient=True), box.pool.surfaces.area > 0
     np.testing.assert_allclose(H[covered], np.broadcast_to((4.0, 2.0, 1.5), H[covered].shape), rtol=1e-6)
     np.testing.assert_allclose(box.irradiance()[covered][:, 0], 2.0, rtol=1e-6)
     put_ambient(box, (3.0, 3.0, 3.0), share=0.125)  # four times that of what has arrived

@@ -6,9 +6,9 @@ import pytest
 
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
-from app.projections import PROJECTIONS
-from app.session import Session
+from app.session.session import Session
 from app.solvers import ShootingOptions
+from app.visibility.projections import PROJECTIONS
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def opened(session: Session, **atlas: object) -> int:
 
 def test_it_follows_the_texels_between_two_bounds(box: Session) -> None:
     coarse, fine, finest = (opened(box, texels=texels) for texels in (2_000, 250_000, 1_000_000))
-    texel = 1 / (box.charts.density * box.lightmap.frame.scale)  # in units of half the diagonal
+    texel = 1 / (box.charts.density * box.lightmap.space.scale)  # in units of half the diagonal
     assert coarse == 256 and finest == 512 < 2 / texel
     assert coarse < fine < finest and fine % 64 == 0
 

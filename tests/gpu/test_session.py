@@ -14,16 +14,16 @@ import psutil
 import pytest
 from gl_objects import forgotten, held
 
-from app.atlas.lightmap import STORAGE
 from app.atlas.options import AtlasOptions
+from app.commands.headless import picture
 from app.errors import SceneError, UserError
 from app.gpu import Gpu
-from app.headless import picture
-from app.picking import read_again
+from app.lightmap.lightmap import STORAGE
 from app.render.false_colour import colour_map
-from app.session import Session, Stop
+from app.session.picking import read_again
+from app.session.session import Session, Stop
+from app.session.solve import share_done
 from app.solvers import ShootingOptions
-from app.solving import share_done
 
 __all__ = ["forgotten"]
 
@@ -206,7 +206,7 @@ def test_cutting_anew_keeps_edits_exposure_and_camera(session: Session) -> None:
     assert session.lightmap is not before and session.atlas.texels == 4000
     assert session.scene.materials[0] is dimmed
     np.testing.assert_array_equal(session.lightmap.irradiance(), 0)
-    residual = session.lightmap.residual()[session.lightmap.nodes.surfaces.face >= 0]
+    residual = session.lightmap.residual()[session.lightmap.pool.surfaces.face >= 0]
     np.testing.assert_allclose(residual, np.broadcast_to(np.pi * np.array(dimmed.emission), residual.shape), rtol=1e-6)
     assert session.stats.emitted == pytest.approx(session.stats.unshot, rel=1e-5)  # a sum in single precision
     assert session.display.exposure == -3.5

@@ -12,14 +12,14 @@ import pytest
 
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
-from app.headless_ui import UiFrame
-from app.loading import load
-from app.pacing import FAST_FRAME, SLOW_FRAME, Turns
 from app.render.exposure import first_exposure
 from app.render.options import DisplayOptions
-from app.session import Session
+from app.session.loading import load
+from app.session.pacing import FAST_FRAME, SLOW_FRAME, Turns
+from app.session.session import Session
 from app.solvers import ShootingOptions
 from app.ui.app import Ui
+from app.viewer.ui_frame import UiFrame
 
 SMALL = AtlasOptions(texels=4000)
 PATIENCE = 60.0  # s
@@ -55,7 +55,7 @@ def test_a_scene_opens_in_parts_and_is_exposed(session: Session) -> None:
     assert frames(session, lambda: session.opened) > 3, "upload and programs are spread over frames"
     assert session.solver.shots == 0 and session.stats.residual == 1.0, "warming up leaves no light behind"
     assert session.stats.unshot == pytest.approx(session.stats.emitted)
-    assert session.display.exposure == pytest.approx(first_exposure(session.lightmap.nodes))
+    assert session.display.exposure == pytest.approx(first_exposure(session.lightmap.pool))
 
 
 def test_an_exposure_that_was_given_stays(gpu: Gpu) -> None:
@@ -201,11 +201,11 @@ def test_books_that_take_long_are_made_rarely(session: Session, monkeypatch: pyt
 
 
 def test_exposure_follows_the_lamp(session: Session) -> None:
-    nodes = load("cornell-box", SMALL).nodes
-    brighter = [dataclasses.replace(m, emission=tuple(8 * e for e in m.emission)) for m in nodes.scene.materials]
-    before = first_exposure(nodes)
-    nodes.scene = nodes.scene.with_materials(tuple(brighter))
-    assert first_exposure(nodes) == pytest.approx(before - 3)  # 2³ times the light
+    pool = load("cornell-box", SMALL).pool
+    brighter = [dataclasses.replace(m, emission=tuple(8 * e for e in m.emission)) for m in pool.scene.materials]
+    before = first_exposure(pool)
+    pool.scene = pool.scene.with_materials(tuple(brighter))
+    assert first_exposure(pool) == pytest.approx(before - 3)  # 2³ times the light
 
 
 def test_a_frame_that_does_not_look_shows_the_view_as_it_was(gpu: Gpu, session: Session) -> None:

@@ -17,12 +17,12 @@ from app.atlas.charts import TILES
 from app.gpu import Gpu, Mesh, Pass, ShaderError, ShaderLibrary
 from app.gpu.shader import SHADERS, Source
 from app.options import specs
-from app.projections import PROJECTIONS
 from app.render.layers import LAYER_SHADERS
 from app.render.options import TONE_MAPS
 from app.render.resolve import BORDER, PLACES_WIDTH
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 from app.solvers.shooting.stages import BLOCK_LEVEL, EMITTER, LEVELS, OPEN_BLOCK, SQUARE_LEVEL
+from app.visibility.projections import PROJECTIONS
 
 OPTION = {spec.name: spec for spec in specs(ShootingOptions)}
 FLAG = (False, True)

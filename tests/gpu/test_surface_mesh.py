@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from pictures import framing
 
-import app.atlas.drawn
-from app.atlas.drawn import Clusters
-from app.atlas.lightmap import Lightmap
+import app.atlas.visible_mesh
 from app.atlas.parametrize import parametrize
+from app.atlas.visible_mesh import Clusters
 from app.gpu import Gpu
+from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
 from app.render.frame import FrameRenderer
 from app.render.options import DisplayOptions
@@ -46,11 +46,11 @@ def lightmaps(gpu: Gpu, scene: Scene, monkeypatch: pytest.MonkeyPatch) -> Iterat
     """The scene in clusters, and in its own order without."""
     charts = parametrize(scene, texels=4000)
     whole = Lightmap.of(gpu, scene, charts)
-    assert whole.nodes.drawn.clusters is None
-    monkeypatch.setattr(app.atlas.drawn, "CLUSTERED", 0)
-    monkeypatch.setattr(app.atlas.drawn, "CLUSTER", 16)
+    assert whole.pool.visible_mesh.clusters is None
+    monkeypatch.setattr(app.atlas.visible_mesh, "CLUSTERED", 0)
+    monkeypatch.setattr(app.atlas.visible_mesh, "CLUSTER", 16)
     cut = Lightmap.of(gpu, scene, charts)
-    assert cut.nodes.drawn.clusters is not None
+    assert cut.pool.visible_mesh.clusters is not None
     yield cut, whole
     gpu.release_all()
     cut.release()
@@ -142,7 +142,7 @@ def test_as_many_clusters_but_others(
 ) -> None:
     """A half turn shows as much of the scene, from its middle."""
     lower, upper = scene.bounds
-    clusters = lightmaps[0].nodes.drawn.clusters
+    clusters = lightmaps[0].pool.visible_mesh.clusters
     assert clusters is not None
     compared = 0
     for k in range(60):
@@ -153,7 +153,7 @@ def test_as_many_clusters_but_others(
         back = there.copy()
         back.world_from_camera[:3, :3] = back.world_from_camera[:3, :3] @ np.diag([-1.0, 1.0, -1.0])
         if (
-            len({len(clusters.seen(v.clip_from_local(SIZE[0] / SIZE[1], lightmaps[0].frame))) for v in (there, back)})
+            len({len(clusters.seen(v.clip_from_local(SIZE[0] / SIZE[1], lightmaps[0].space))) for v in (there, back)})
             == 1
         ):
             for view in (there, back):

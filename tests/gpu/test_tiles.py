@@ -11,16 +11,16 @@ from pictures import render_image
 from solver_scenes import begin, solve, table_room
 
 from app.atlas.charts import TILES
-from app.atlas.lightmap import Lightmap
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
 from app.gpu import Gpu, ShaderLibrary
 from app.gpu.shader import SHADERS, Source
+from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
 from app.render.options import LAYERS, DisplayOptions
 from app.render.resolve import PLACES_WIDTH
 from app.scene.load import load_scene
-from app.session import Session, Stop
+from app.session.session import Session, Stop
 from app.solvers import SOLVERS, ShootingOptions
 from app.solvers.shooting.options import MAX_LEVEL, highest_level
 
@@ -50,7 +50,12 @@ def test_every_program_that_asks_for_the_tile_is_told(gpu: Gpu, monkeypatch: pyt
                 asked.append(name)
                 assert defines.get("TILE") == 8, name
     assert {"render/source", "render/resolve", "render/edges", "lightmap/push"} <= set(asked)
-    assert {"shooting/choose", "shooting/patches", "shooting/books", "shooting/judge"} <= set(asked)
+    assert {
+        "solvers/shooting/choose",
+        "solvers/shooting/patches",
+        "solvers/shooting/books",
+        "solvers/shooting/judge",
+    } <= set(asked)
     session.release()
     gpu.release_all(target, texture)
     library.release()
@@ -62,12 +67,12 @@ def pictures(gpu: Gpu, display: DisplayOptions, light: float) -> list[NDArray[np
     for tile in TILES:
         lightmap = Lightmap.of(gpu, scene, parametrize(scene, texels=20_000, tile=tile))
         assert tile > 8 or lightmap.tiles > PLACES_WIDTH, "pixels look in more than one row of the table of places"
-        surfaces = lightmap.nodes.surfaces
+        surfaces = lightmap.pool.surfaces
         H = np.where((surfaces.area > 0)[..., None], light * (1.0 + surfaces.position - scene.bounds[0]), 0.0)
-        image = lightmap.nodes.image_from_tiles(np.concatenate([H, H[..., :1]], -1) / lightmap.unit)
+        image = lightmap.pool.image_from_tiles(np.concatenate([H, H[..., :1]], -1) / lightmap.unit)
         lightmap.texture("t_irradiance").write(np.ascontiguousarray(image, np.float32).tobytes())
         camera = scene.cameras[0]
-        distance = float(np.linalg.norm(camera.world_from_camera[:3, 3] - lightmap.frame.centre))
+        distance = float(np.linalg.norm(camera.world_from_camera[:3, 3] - lightmap.space.centre))
         made.append(render_image(gpu, lightmap, CameraView.from_camera(camera, distance), display, SIZE))
         lightmap.release()
     return made
@@ -115,8 +120,8 @@ def test_no_patch_is_larger_than_its_leaf(gpu: Gpu, solver: str, density: float)
         room.solver.step(1)
         room.solver.poll(wait=True)
         assert room.solver.last_shot is not None and room.solver.last_shot.size == min(tile, 16)
-        nodes = room.lightmap.nodes
-        assert max(room.solver.patch_edge(nodes.corner(slot)) for slot in range(nodes.tiles)) == min(tile, 16)
+        pool = room.lightmap.pool
+        assert max(room.solver.patch_edge(pool.corner(slot)) for slot in range(pool.tiles)) == min(tile, 16)
         room.release()
 
 

@@ -16,7 +16,6 @@ from imgui_bundle import imgui
 from app.atlas.options import AtlasOptions
 from app.errors import UserError
 from app.gpu import Gpu, ShaderError
-from app.headless_ui import save_screenshot
 from app.options import Options, specs
 from app.render.options import DisplayOptions
 from app.solvers import ShootingOptions
@@ -25,6 +24,7 @@ from app.ui.app import Ui
 from app.ui.file_dialog import readable
 from app.ui.keys import SHORTCUTS
 from app.ui.state import Legend, Pace, Request
+from app.viewer.ui_frame import save_screenshot
 
 __all__ = ["desk", "session", "where"]
 

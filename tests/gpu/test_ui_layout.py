@@ -12,9 +12,9 @@ from imgui_bundle import imgui
 
 from app.errors import UserError
 from app.gpu import Gpu
-from app.headless_ui import ui_image
 from app.ui import layout
 from app.ui.app import Ui
+from app.viewer.ui_frame import ui_image
 
 __all__ = ["desk", "session"]
 

@@ -29,12 +29,12 @@ def test_another_scene_of_the_same_name_is_another_scene(desk: Desk) -> None:
 
     select()
     assert state.picked is PICKED and state.material == 2, "nothing is forgotten by itself"
-    session.lightmap = SimpleNamespace(frame=session.lightmap.frame)  # the same scene, cut anew
+    session.lightmap = SimpleNamespace(space=session.lightmap.space)  # the same scene, cut anew
     desk.frames()
     assert state.picked is None and state.atlas in (None, session.atlas)
     assert state.material == 2 and state.emission_colours
     select()
-    session.unedited, session.lightmap = object(), SimpleNamespace(frame=session.lightmap.frame)
+    session.unedited, session.lightmap = object(), SimpleNamespace(space=session.lightmap.space)
     desk.frames()
     assert state.picked is None and state.material == 0
     assert 3 not in state.emission_colours

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from solver_scenes import Solution, begin, grey, quads_scene, room, table_room
 
-from app.atlas.collapse import collapse
 from app.gpu import Gpu
+from app.lightmap.collapse import collapse
 from app.scene.load import load_scene
 from app.scene.model import Scene
 from app.solvers.shooting.adaptive import MERGE
@@ -86,14 +86,14 @@ CONTACTS = 0.01
 
 def finest_light(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     """H on the finest level of the atlas, whatever the leaves, and where there is a surface."""
-    return collapse(solution.lightmap.nodes, solution.lightmap.irradiance())
+    return collapse(solution.lightmap.pool, solution.lightmap.irradiance())
 
 
 def levels(solution: Solution) -> np.ndarray:
     """Of the leaves, on the finest level of the atlas; beside a finer leaf between both."""
-    nodes = solution.lightmap.nodes
-    level = np.broadcast_to(nodes.leaves.level[:, None, None, None], (*nodes.surfaces.area.shape, 1))
-    return collapse(nodes, level.astype(np.float32))[0][..., 0]
+    pool = solution.lightmap.pool
+    level = np.broadcast_to(pool.leaves.level[:, None, None, None], (*pool.surfaces.area.shape, 1))
+    return collapse(pool, level.astype(np.float32))[0][..., 0]
 
 
 def test_it_does_not_matter_when_the_tree_grows(planted: Callable[..., Solution]) -> None:

@@ -7,9 +7,9 @@ import pytest
 from solver_scenes import EVERY_WAY, UNIT_SQUARE, grey, quads_scene, room, solve, table_room
 
 from app.gpu import Gpu
-from app.metrics import relative_rms
 from app.reference.dense import DenseSolution, irradiance_at, solve_dense
 from app.reference.form_factors import point_to_polygon
+from app.reference.metrics import relative_rms
 from app.scene.model import F64, Material, Scene
 from app.solvers import SOLVERS
 

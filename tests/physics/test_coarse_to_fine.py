@@ -25,13 +25,13 @@ def lamp_room(albedo: float) -> Scene:
 
 def patch_of(solution: Solution, shot: Shot) -> tuple[int, slice, slice]:
     """Its texels in an array (tiles, t, t)."""
-    (column, x), (row, y) = (divmod(c, solution.lightmap.nodes.tile) for c in shot.corner)
+    (column, x), (row, y) = (divmod(c, solution.lightmap.pool.tile) for c in shot.corner)
     return row * solution.lightmap.columns + column, slice(y, y + shot.size), slice(x, x + shot.size)
 
 
 def flux_of(solution: Solution) -> np.ndarray:
     """(tiles, t, t) Σ_rgb r A of every texel [W]."""
-    return (solution.lightmap.residual().sum(-1) * solution.lightmap.nodes.surfaces.area).astype(np.float64)
+    return (solution.lightmap.residual().sum(-1) * solution.lightmap.pool.surfaces.area).astype(np.float64)
 
 
 @pytest.mark.usefixtures("undivided")
@@ -48,7 +48,7 @@ def test_a_patch_shoots_its_mean_and_keeps_what_is_uneven(gpu: Gpu) -> None:
     shot = box.solver.last_shot
     after = flux_of(box)
     patch = patch_of(box, shot)
-    area = box.lightmap.nodes.surfaces.area[patch]
+    area = box.lightmap.pool.surfaces.area[patch]
     assert shot.size > 1 and np.ptp(before[patch] / area) > 0.01 * before[patch].mean() / area.mean()
     assert abs(after[patch].sum()) < EXACT * before[patch].sum()
     np.testing.assert_allclose(after[patch], before[patch] - before[patch].sum() * area / area.sum(), atol=1e-6)
@@ -82,7 +82,7 @@ def test_light_that_will_come_back_is_shot_ahead(gpu: Gpu) -> None:
 def test_a_lamp_is_divided_and_fills_a_batch(gpu: Gpu) -> None:
     """Until a patch holds 2 % of the light, and several of one tile shoot at once."""
     box = begin(gpu, lamp_room(0.3), texels=2000, level=3, coarsen=False)
-    emission = box.lightmap.emission().sum(-1) * box.lightmap.nodes.surfaces.area
+    emission = box.lightmap.emission().sum(-1) * box.lightmap.pool.surfaces.area
     box.solver.step(8)
     assert box.solver.poll(wait=True).shots == 8 > np.count_nonzero(emission.sum((1, 2)))
     for _ in range(20):
@@ -110,7 +110,7 @@ def test_what_is_partly_covered_shoots_from_its_finest_patches(gpu: Gpu, monkeyp
         shot = box.solver.last_shot
         largest = max(largest, shot.size)
         patch = patch_of(box, shot)
-        H = lit[patch][box.lightmap.nodes.surfaces.area[patch] > 0]
+        H = lit[patch][box.lightmap.pool.surfaces.area[patch] > 0]
         if H.min() < 0.04 * H.max():
             straddles += 1
             assert shot.size <= 2
@@ -157,7 +157,7 @@ def test_where_texels_hold_much_of_the_light_none_shoots_for_others(gpu: Gpu, te
     """It would be most of the lamp."""
     box = begin(gpu, load_scene("cornell-box"), texels=texels, level=2)
     marks = box.solver.buffers.finer_levels
-    power = box.lightmap.emission().sum(-1) * box.lightmap.nodes.surfaces.area
+    power = box.lightmap.emission().sum(-1) * box.lightmap.pool.surfaces.area
     assert (power.max() <= MOST * power.sum()) == shares
     assert marks.any() and (marks.max() >= EMITTER) == shares
     box.release()

@@ -19,7 +19,7 @@ from app.solvers.shooting.options import FORM_FACTORS, VISIBILITIES
 from app.solvers.shooting.stages import BATCH
 
 EVERY_SOLVER = pytest.mark.parametrize("solver", SOLVERS)
-# The stereographic map draws edges straight, see app/projections/occluders.py. Where the foot of a wall lies on the horizon, each
+# The stereographic map draws edges straight, see app/visibility/occluders.py. Where the foot of a wall lies on the horizon, each
 # piece l of it at a distance d leaves a sliver of the rim open, h = (l/d)²/8 high: a parabola, in which the cosine is the height
 # above the rim, so 4/15 h² / π of the hemisphere per radian. Towards φ, l/d falls with cos²φ and h with cos⁴φ: 4/15 · 35/128 h²
 # for a whole wall. Samples count whole: h + 1/R. Pieces of a metre are 1/32 m at R = 256; a corner's patch is 0.1 m from two

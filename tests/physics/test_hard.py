@@ -8,13 +8,13 @@ import json
 
 import pytest
 
-from app.bench import hard
-from app.bench.hard import allowed
-from app.bench.hard_case import HardCase, Twins, Way, near
-from app.bench.hard_cases import CASES
 from app.cli import run
 from app.gpu import Gpu
 from app.solvers import DEFAULT_SOLVER
+from app.validation import run as hard
+from app.validation.case import HardCase, Twins, Way, near
+from app.validation.cases import CASES
+from app.validation.run import allowed
 
 
 @pytest.fixture(scope="module")

@@ -110,6 +110,6 @@ def test_the_factor_is_the_best_one(gpu: Gpu) -> None:
     brighter = edited(scene, 0, {"emission": tuple(3 * e for e in scene.materials[0].emission)})
     np.testing.assert_allclose(room.lightmap.common_factor(brighter)[1:], 3)  # nothing else is green or blue
     small = edited(scene, 1, {"emission": (9.0, 0.0, 0.0)})
-    area = room.lightmap.nodes.emission_weights[:2, 0] * [m.emission[0] for m in scene.materials[:2]]
+    area = room.lightmap.pool.emission_weights[:2, 0] * [m.emission[0] for m in scene.materials[:2]]
     assert room.lightmap.common_factor(small)[0] == pytest.approx(1 if area[0] > area[1] else 9)
     room.release()

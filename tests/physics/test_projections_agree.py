@@ -7,9 +7,9 @@ import pytest
 from solver_scenes import UNIT_SQUARE, begin, grey, quads_scene, room, solve, table_room
 
 from app.gpu import Gpu
-from app.metrics import relative_rms
-from app.projections import PROJECTIONS
+from app.reference.metrics import relative_rms
 from app.scene.load import load_scene
+from app.visibility.projections import PROJECTIONS
 
 EVERY_PROJECTION = pytest.mark.parametrize("projection", PROJECTIONS)
 

@@ -7,9 +7,9 @@ import pytest
 from solver_scenes import UNIT_SQUARE, grey, quads_scene, room, solve
 
 from app.gpu import Gpu
-from app.projections import PROJECTIONS
 from app.solvers import SOLVERS
 from app.solvers.shooting.options import VISIBILITIES
+from app.visibility.projections import PROJECTIONS
 
 HEMISPHERES = [name for name in PROJECTIONS if name != "hemicube"]
 LAMP = np.array(

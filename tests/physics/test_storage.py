@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from solver_scenes import Solution, begin, grey, quads_scene, room, solve
 
-from app.atlas.lightmap import STORAGE
 from app.gpu import Gpu
+from app.lightmap.lightmap import STORAGE
 from app.scene.model import Material, Scene
 
 
@@ -93,7 +93,7 @@ def test_unshot_light_falls_shot_by_shot(gpu: Gpu, coarsen: bool) -> None:
         box.solver.poll(wait=True)
         unshot.append(box.book.unshot.sum())
     assert all(later < earlier for earlier, later in itertools.pairwise(unshot))
-    area = box.lightmap.nodes.surfaces.area[..., None]
+    area = box.lightmap.pool.surfaces.area[..., None]
     flux = (box.lightmap.residual().astype(np.float64) * area).sum((1, 2))
     said = box.solver.unshot_share() * box.book.emitted.sum()
     assert said == pytest.approx(np.abs(flux).sum(), rel=1e-4)  # f32 sums

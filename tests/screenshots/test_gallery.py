@@ -16,10 +16,10 @@ import pytest
 from PIL import Image
 
 from app.atlas.options import AtlasOptions
+from app.commands.headless import picture
 from app.gpu import Gpu
-from app.headless import picture
 from app.render.options import DisplayOptions
-from app.session import Session, Stop
+from app.session.session import Session, Stop
 from app.solvers import ShootingOptions
 
 ROOT = Path(__file__).parent.parent.parent

@@ -14,9 +14,9 @@ from PIL import Image
 
 from app.atlas.options import AtlasOptions
 from app.gpu import gpu_context
-from app.headless_ui import ui_image
 from app.render.options import DisplayOptions
-from app.session import Session, Stop
+from app.session.session import Session, Stop
+from app.viewer.ui_frame import ui_image
 
 ROOT = Path(__file__).parent.parent.parent
 FAILED = Path(__file__).parent / "failed"

@@ -8,7 +8,7 @@ from solver_scenes import grey, quads_scene, room, table_room
 
 from app.atlas.charts import DEFAULT_TILE, TILES
 from app.atlas.parametrize import parametrize
-from app.atlas.quadtree import Change, Quadtree, quadtree_nodes
+from app.lightmap.quadtree import Change, Quadtree, quadtree_pool
 from app.scene import shapes
 from app.scene.model import Material, Scene
 
@@ -47,14 +47,14 @@ WITH_TILES = [*((name, DEFAULT_TILE) for name in SCENES), *(("small lamp", tile)
 
 def tree_of(name: str, density: float = 10.0, tile: int = DEFAULT_TILE) -> Quadtree:
     scene = SCENES[name]()
-    return Quadtree(quadtree_nodes(scene, parametrize(scene, density=density, tile=tile)))
+    return Quadtree(quadtree_pool(scene, parametrize(scene, density=density, tile=tile)))
 
 
 def grow(tree: Quadtree, slots: list[int], depth: int = DEPTH) -> Change | None:
     """Split these leaves and what must split with them, whatever room that takes."""
     more = 4 * len(tree)
     if tree.room < more:
-        tree.resize(tree.nodes.tiles + more)
+        tree.resize(tree.pool.tiles + more)
     splits = tree.splits(slots, depth)
     return tree.split(splits) if splits else None
 
@@ -62,7 +62,7 @@ def grow(tree: Quadtree, slots: list[int], depth: int = DEPTH) -> Change | None:
 def shuffle(tree: Quadtree, rng: np.random.Generator, rounds: int = 6) -> None:
     """Random splits and merges, two rounds of splits for each of merges."""
     for k in range(rounds):
-        used = np.flatnonzero(tree.nodes.used)
+        used = np.flatnonzero(tree.pool.used)
         if k % 3 < 2:
             grow(tree, used[rng.random(len(used)) < rng.uniform(0.1, 0.3)].tolist())
         elif families := [family for family in tree.merges(used) if rng.random() < 0.5]:

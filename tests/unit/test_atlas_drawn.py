@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from atlas_scenes import TURN, moved, own_cache, scene_of, split_grid  # noqa: F401  # a fixture
 
-import app.atlas.drawn
-from app.atlas.drawn import CLUSTER, DrawnTriangles, drawn_triangles
-from app.atlas.node_set import Frame
+import app.atlas.visible_mesh
 from app.atlas.parametrize import parametrize
+from app.atlas.visible_mesh import CLUSTER, VisibleMesh, visible_mesh
+from app.lightmap.tile_pool import SolverSpace
 from app.render.camera import CameraView
 from app.scene import shapes
 from app.scene.load import load_scene
@@ -27,22 +27,22 @@ def boxes(count: int, seed: int = 5) -> Scene:
     return scene_of(meshes, [Material(f"{k}", double_sided=k % 2 == 0) for k in range(7)])
 
 
-def drawn_of(scene: Scene, monkeypatch: pytest.MonkeyPatch, cluster: int = 16) -> tuple[DrawnTriangles, F64, Frame]:
-    """In small clusters, and the corners of its triangles (n, 3, 3), in the scene's order and solver frame."""
-    monkeypatch.setattr(app.atlas.drawn, "CLUSTERED", 0)
-    monkeypatch.setattr(app.atlas.drawn, "CLUSTER", cluster)
-    frame = Frame.of(scene)
-    local = frame.local_from_world(scene.positions)
-    return drawn_triangles(scene, parametrize(scene, texels=4000), local), local[scene.triangles], frame
+def drawn_of(scene: Scene, monkeypatch: pytest.MonkeyPatch, cluster: int = 16) -> tuple[VisibleMesh, F64, SolverSpace]:
+    """In small clusters, and the corners of its triangles (n, 3, 3), in the scene's order and solver space."""
+    monkeypatch.setattr(app.atlas.visible_mesh, "CLUSTERED", 0)
+    monkeypatch.setattr(app.atlas.visible_mesh, "CLUSTER", cluster)
+    space = SolverSpace.of(scene)
+    local = space.local_from_world(scene.positions)
+    return visible_mesh(scene, parametrize(scene, texels=4000), local), local[scene.triangles], space
 
 
-def random_view(frame: Frame, seed: int) -> F64:
+def random_view(space: SolverSpace, seed: int) -> F64:
     """clip_from_local of an eye inside the scene or outside, that looks at some place in it."""
     rng = np.random.default_rng(seed)
     view = CameraView(np.eye(4), float(rng.uniform(0.3, 0.9)), 1.0)
-    view.focus(frame.world_from_local(rng.uniform(-0.4, 0.4, 3)), frame.scale * (0.05 if seed % 2 else 0.4))
+    view.focus(space.world_from_local(rng.uniform(-0.4, 0.4, 3)), space.scale * (0.05 if seed % 2 else 0.4))
     view.orbit(*rng.uniform(-3, 3, 2))
-    return view.clip_from_local(ASPECT, frame)
+    return view.clip_from_local(ASPECT, space)
 
 
 def test_every_triangle_is_there_once_with_its_corners(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,15 +64,15 @@ def test_every_triangle_is_there_once_with_its_corners(monkeypatch: pytest.Monke
 def test_corners_are_shared() -> None:
     """A sphere in one chart has half as many corners as triangles, and some more at its seams."""
     scene = scene_of([shapes.icosphere(1.0, 4)])
-    drawn = drawn_triangles(scene, parametrize(scene, texels=4000), scene.positions)
+    drawn = visible_mesh(scene, parametrize(scene, texels=4000), scene.positions)
     assert len(drawn.vertices) < 0.75 * len(scene.triangles)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_what_is_on_screen_is_seen(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     """A point on screen is one between the four sides and before the eye, however near or far."""
-    drawn, points, frame = drawn_of(boxes(150), monkeypatch)
-    clip_from_local = random_view(frame, seed)
+    drawn, points, space = drawn_of(boxes(150), monkeypatch)
+    clip_from_local = random_view(space, seed)
     assert drawn.clusters is not None
     seen = drawn.clusters.triangles(drawn.clusters.seen(clip_from_local))
     shares = np.random.default_rng(seed).dirichlet(np.ones(3), 30)
@@ -87,12 +87,12 @@ def test_what_is_on_screen_is_seen(monkeypatch: pytest.MonkeyPatch, seed: int) -
 def test_what_is_nearer_than_the_near_plane_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is drawn at the near plane: a floor right under the eye."""
     floor = split_grid(shapes.quad((-8, 0, -8), (0, 0, 16), (16, 0, 0)), 16, 16)
-    drawn, points, frame = drawn_of(scene_of([floor]), monkeypatch)
-    view = CameraView(np.eye(4), 1.0, frame.scale)
+    drawn, points, space = drawn_of(scene_of([floor]), monkeypatch)
+    view = CameraView(np.eye(4), 1.0, space.scale)
     view.orbit(0.0, np.pi / 2)
-    view.world_from_camera[:3, 3] = (0.3, 0.005 * frame.scale, 0.3)
-    clip_from_local = view.clip_from_local(ASPECT, frame)
-    under = int(np.linalg.norm(points.mean(1) - frame.local_from_world(view.eye), axis=1).argmin())
+    view.world_from_camera[:3, 3] = (0.3, 0.005 * space.scale, 0.3)
+    clip_from_local = view.clip_from_local(ASPECT, space)
+    under = int(np.linalg.norm(points.mean(1) - space.local_from_world(view.eye), axis=1).argmin())
     z, w = clip_from_local[2:, :3] @ points[under].mean(0) + clip_from_local[2:, 3]
     assert 0 < w < -z, "before the eye, nearer than the near plane"
     assert drawn.clusters is not None
@@ -101,8 +101,8 @@ def test_what_is_nearer_than_the_near_plane_is_seen(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_from_near_to_far(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
-    drawn, points, frame = drawn_of(boxes(150), monkeypatch)
-    clip_from_local = random_view(frame, seed)
+    drawn, points, space = drawn_of(boxes(150), monkeypatch)
+    clip_from_local = random_view(space, seed)
     clusters = drawn.clusters
     assert clusters is not None
     order = clusters.seen(clip_from_local)
@@ -154,7 +154,7 @@ def test_what_only_touches_is_free(monkeypatch: pytest.MonkeyPatch, turned: bool
 
 def test_very_many_faces_in_one_plane_are_all_fixed(monkeypatch: pytest.MonkeyPatch) -> None:
     """More than can be compared with each other."""
-    monkeypatch.setattr(app.atlas.drawn, "COMPARED", 4)
+    monkeypatch.setattr(app.atlas.visible_mesh, "COMPARED", 4)
     quads = [shapes.quad((0.01 * k, 0, 0), (0, 0, 1), (1, 0, 0)) for k in range(100)]
     drawn, _, _ = drawn_of(scene_of(quads), monkeypatch)
     clusters = drawn.clusters
@@ -166,7 +166,7 @@ def test_very_many_faces_in_one_plane_are_all_fixed(monkeypatch: pytest.MonkeyPa
 def test_small_scenes_have_no_clusters() -> None:
     for name in ("cornell-box", "two-rooms"):
         scene = load_scene(name)
-        drawn = drawn_triangles(scene, parametrize(scene, texels=4000), scene.positions)
+        drawn = visible_mesh(scene, parametrize(scene, texels=4000), scene.positions)
         assert drawn.clusters is None
         assert (drawn.triangle == np.arange(len(scene.triangles))).all()
 

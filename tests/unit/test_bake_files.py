@@ -15,8 +15,8 @@ import app.bake
 from app.atlas.charts import GAP
 from app.bake import prepare_directory, write_bake
 from app.bake.exr import write_irradiance
-from app.bake.gutter import GUTTER, fill_gutter
 from app.errors import UserError
+from app.lightmap.gutter import GUTTER, fill_gutter
 
 NAMES = ["irradiance.exr", "report.json", "scene.glb"]
 

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from solver_scenes import grey, quads_scene, room
 
-from app.atlas.node_set import NodeSet
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
 from app.atlas.points import random_points
-from app.bench import blender, peers
-from app.bench.blender import Baked
-from app.bench.points import light_at
-from app.bench.truth import truth_of
+from app.bench.peers import blender, peers
+from app.bench.peers.blender import Baked
 from app.errors import UserError
-from app.loading import read_and_unfold
+from app.lightmap.at_points import light_at
+from app.lightmap.tile_pool import TilePool
+from app.reference.truth import truth_of
 from app.scene.load import load_scene
 from app.scene.model import Scene
+from app.session.loading import read_and_unfold
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="a script is no program there")
 
@@ -134,7 +134,7 @@ def test_samples_double_until_the_time_is_over(monkeypatch: pytest.MonkeyPatch, 
     assert [row["rms"] for row in rows] == pytest.approx([1, 0.5, 0.25, 0.125])
     assert [row["cpu_seconds"] for row in rows] == [2.0, 4.0, 8.0, 16.0]
     _, charts, _ = read_and_unfold(scene, AtlasOptions(texels=600), False, silent)
-    assert rows[0]["texels"] == NodeSet(scene, charts).texel_count
+    assert rows[0]["texels"] == TilePool(scene, charts).texel_count
 
 
 @pytest.mark.skipif(not os.environ.get(blender.PYTHON), reason=f"{blender.PYTHON} names no Python")

@@ -21,20 +21,21 @@ from solver_scenes import grey, quads_scene, room
 
 from app.atlas.options import AtlasOptions
 from app.atlas.points import random_points
-from app.bench import curve, error, truth
-from app.bench.error import TITLE
-from app.bench.measure import opened, warm_up
-from app.bench.methods import DEFAULT_METHODS, METHODS, method_names
-from app.bench.peers import PEERS
-from app.bench.report import FLIP, missing
-from app.bench.truth import Truth
+from app.bench.accuracy import curve, error
+from app.bench.accuracy.error import TITLE
+from app.bench.accuracy.methods import DEFAULT_METHODS, METHODS, method_names
+from app.bench.papers.measure import opened, warm_up
+from app.bench.peers.peers import PEERS
 from app.cli import ERROR_SCENES, build_parser, run
-from app.console import Console
 from app.gpu import Gpu
 from app.options import specs
+from app.reference import truth
+from app.reference.truth import Truth
 from app.scene.load import load_scene
 from app.scene.model import Scene
 from app.solvers import ShootingOptions
+from app.util.console import Console
+from app.util.tables import FLIP, missing
 
 ROOT = Path(__file__).parents[2]
 
@@ -142,9 +143,9 @@ def test_warming_up_leaves_no_trace(gpu: Gpu, adaptive: bool) -> None:
         lightmap,
         solver,
     ):
-        tiles = set(lightmap.nodes.leaves.only(lightmap.nodes.used).keys.tolist())
+        tiles = set(lightmap.pool.leaves.only(lightmap.pool.used).keys.tolist())
         warm_up(gpu, solver)
-        assert set(lightmap.nodes.leaves.only(lightmap.nodes.used).keys.tolist()) == tiles
+        assert set(lightmap.pool.leaves.only(lightmap.pool.used).keys.tolist()) == tiles
         assert solver.poll(wait=True).shots == 0 and solver.unshot_share() == pytest.approx(1.0, rel=1e-5)
         assert not lightmap.irradiance().any()
 
@@ -281,7 +282,7 @@ def test_a_furnace_from_the_command_line(
 
 
 def test_a_plot_has_a_line_for_each_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    plots = pytest.importorskip("app.bench.plots", reason="of the extra bench", exc_type=ImportError)
+    plots = pytest.importorskip("app.bench.papers.plots", reason="of the extra bench", exc_type=ImportError)
     figures = []
     monkeypatch.setattr(plots, "_save", lambda figure, path: figures.append(figure))
     rows = [
@@ -310,7 +311,7 @@ def test_looks_that_were_foretold_are_counted() -> None:
 
 
 def test_a_peer_with_texels_of_its_own_is_drawn_as_a_peer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    plots = pytest.importorskip("app.bench.plots", reason="of the extra bench", exc_type=ImportError)
+    plots = pytest.importorskip("app.bench.papers.plots", reason="of the extra bench", exc_type=ImportError)
     drawn: list[Any] = []
     monkeypatch.setattr(plots, "draw_curves", lambda *values: drawn.append(values))
     one: Any = error.SceneCurves("a", "a", quads_scene(room(), (grey(0.5, 1.0),)), "closed-form")
@@ -354,7 +355,7 @@ def test_ctrl_c_keeps_finished_curves(
 def test_a_real_ctrl_c_in_the_second_curve_keeps_the_first(tmp_path: Path) -> None:
     """The second solve runs until it is stopped, and says when it begins."""
     code = """
-        from app.bench import error
+        from app.bench.accuracy import error
         solve_curve, limits = error.solve_curve, [0.2, 600.0]
         def begun(gpu, solver, limit, look):
             print("begun", flush=True)

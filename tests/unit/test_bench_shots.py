@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from app.atlas.options import AtlasOptions
-from app.bench.copy import Copy
-from app.bench.measure import opened
-from app.bench.shots import bounds, passes_ms
-from app.bench.stream import Stream, texel_bytes
+from app.bench.papers.measure import opened
+from app.bench.speed.copy import Copy
+from app.bench.speed.shots import bounds, passes_ms
+from app.bench.speed.stream import Stream, texel_bytes
 from app.gpu import Gpu
 from app.solvers import ShootingOptions, UniformShooting
 from app.solvers.shooting.stages import BATCH
@@ -40,7 +40,7 @@ def test_what_bounds_the_receiver_pass(receive_ms: float, stream_ms: float, copy
 @pytest.mark.parametrize(("storage", "light"), [("rgba32f", 2 * 2 * 16), ("rgba16f", 2 * 2 * 8), ("fixed8", 2 * 2 * 4)])
 def test_bytes_of_a_texel_follow_from_its_formats(gpu: Gpu, storage: str, light: int) -> None:
     with opened(gpu, "textured-room", AtlasOptions(texels=600), ShootingOptions(storage=storage)) as (lightmap, _):
-        albedo = 4 * np.dtype(lightmap.nodes.arrays["t_albedo"].dtype).itemsize
+        albedo = 4 * np.dtype(lightmap.pool.arrays["t_albedo"].dtype).itemsize
         assert texel_bytes(lightmap, flat=True) == light + albedo
         assert texel_bytes(lightmap, flat=False) == light + albedo + 16 + 8
 

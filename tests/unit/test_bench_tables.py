@@ -13,15 +13,15 @@ import pytest
 
 from app.atlas.options import AtlasOptions
 from app.atlas.points import random_points
-from app.bench import equal, measure, published, tables
-from app.bench.points import irradiance_of
-from app.bench.report import Column, csv_text, markdown_table
-from app.bench.rooms import FEWEST, room_of
+from app.bench.papers import equal, measure, published, tables
+from app.bench.papers.rooms import FEWEST, room_of
 from app.cli import run
 from app.errors import UserError
 from app.gpu import Gpu
+from app.lightmap.at_points import irradiance_of
 from app.solvers import ShootingOptions
 from app.solvers.shooting.stages import BATCH
+from app.util.tables import Column, csv_text, markdown_table
 
 COLUMNS = (Column("scene", "scene"), Column("n", "texels", ","), Column("ms", "ms", ".2f"))
 ROWS = [{"scene": "a", "n": 31_000, "ms": 0.123456}, {"scene": "long name", "n": None, "other": 1}]
@@ -186,7 +186,7 @@ def test_without_an_extra_all_but_its_columns_is_measured(
 
 
 def test_flip_sees_what_has_changed(rng: np.random.Generator) -> None:
-    flip = pytest.importorskip("app.bench.flip", reason="of the extra bench", exc_type=ImportError).flip
+    flip = pytest.importorskip("app.bench.accuracy.flip", reason="of the extra bench", exc_type=ImportError).flip
     picture = rng.uniform(0.2, 0.8, (24, 32, 3))
     assert flip(picture, picture) == 0.0
     slightly, clearly = picture.copy(), picture.copy()
@@ -246,8 +246,8 @@ def test_a_lightmap_is_read_where_its_points_are(gpu: Gpu, adaptive: bool) -> No
         lightmap,
         _,
     ):
-        scene, nodes = lightmap.scene, lightmap.nodes
-        height = nodes.image_from_tiles(nodes.surfaces.position[..., 1:2].astype(np.float32))
+        scene, pool = lightmap.scene, lightmap.pool
+        height = pool.image_from_tiles(pool.surfaces.position[..., 1:2].astype(np.float32))
         lightmap.texture("t_irradiance").write(np.ascontiguousarray(height.repeat(4, -1) / lightmap.unit).tobytes())
         points = random_points(scene, 300, 3)
         read, position = irradiance_of(lightmap, points)[:, 0], points.positions_normals(scene)[0][:, 1]

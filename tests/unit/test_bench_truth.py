@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from solver_scenes import grey, quads_scene, room
 
-from app import cache
 from app.atlas.points import random_points
-from app.bench import truth
-from app.bench.points import open_above
-from app.bench.truth import Truth
-from app.metrics import relative_rms
+from app.reference import truth
+from app.reference.metrics import relative_rms
 from app.reference.patches import texture_at
+from app.reference.points import open_above
+from app.reference.truth import Truth
 from app.scene.arrays import arrays_of
 from app.scene.load import load_scene
 from app.scene.model import Material, Scene, Texture
+from app.util import cache
 
 
 @pytest.fixture(autouse=True)
@@ -125,7 +125,7 @@ def tracer() -> Any:
     pytest.importorskip("mitsuba", reason="of the extra peers")
     if (reason := truth.no_tracer()) is not None:
         pytest.skip(reason)
-    from app.bench import tracer
+    from app.reference import path_tracer as tracer
 
     return tracer
 

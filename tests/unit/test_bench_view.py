@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.atlas.node_set import Frame
-from app.bench import view
-from app.bench.report import FLIP, missing
-from app.bench.truth import Truth, no_tracer, truth_of
+from app.bench.accuracy import view
 from app.gpu import Gpu
+from app.lightmap.tile_pool import SolverSpace
+from app.reference.truth import Truth, no_tracer, truth_of
 from app.render.camera import CameraView
-from app.render.develop import encode_srgb
 from app.render.exposure import KEY
+from app.render.tone_mapping import encode_srgb
 from app.scene.load import load_scene
 from app.scene.model import Scene
+from app.util.tables import FLIP, missing
 
 needs_flip = pytest.mark.skipif(missing(FLIP) is not None, reason="of the extra bench")
 
@@ -55,11 +55,11 @@ def test_points_lie_behind_their_pixels(gpu: Gpu) -> None:
     """Row by row from the top, of the first camera."""
     scene, (width, height) = load_scene("textured-room"), view.SIZE
     shown, points = view._seen(gpu, scene)
-    frame, camera = Frame.of(scene), scene.cameras[0]
-    away = float(np.linalg.norm(np.asarray(camera.world_from_camera)[:3, 3] - frame.centre))
-    local = frame.local_from_world(points.positions_normals(scene)[0])
+    space, camera = SolverSpace.of(scene), scene.cameras[0]
+    away = float(np.linalg.norm(np.asarray(camera.world_from_camera)[:3, 3] - space.centre))
+    local = space.local_from_world(points.positions_normals(scene)[0])
     clip = np.pad(local, ((0, 0), (0, 1)), constant_values=1.0)
-    clip = clip @ CameraView.from_camera(camera, away).clip_from_local(width / height, frame).T
+    clip = clip @ CameraView.from_camera(camera, away).clip_from_local(width / height, space).T
     x, y = (clip[:, :2] / clip[:, 3:]).T
     at = np.stack([(x + 1) / 2 * width, (1 - y) / 2 * height])
     # positions are 32-bit floats interpolated across triangles as long as the room: a hundredth of a pixel
@@ -99,7 +99,7 @@ def test_the_back_of_one_side_is_black(gpu: Gpu) -> None:
 def test_paths_make_the_view_once(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     if (reason := no_tracer()) is not None:
         pytest.skip(reason)
-    from app.bench import tracer
+    from app.reference import path_tracer as tracer
 
     scene = load_scene("furnace")
     known = truth_of(scene, "closed-form", 1, silent)

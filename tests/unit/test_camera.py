@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from pictures import framing, ray
 
-from app.atlas.node_set import Frame
+from app.lightmap.tile_pool import SolverSpace
 from app.render.camera import CameraView
 
-FRAME = Frame(np.array([3.0, -1.0, 2.0]), 2.5)
+FRAME = SolverSpace(np.array([3.0, -1.0, 2.0]), 2.5)
 
 
 def a_view() -> CameraView:

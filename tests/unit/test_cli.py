@@ -297,7 +297,7 @@ def test_doctor_lists_what_is_there(capsys: pytest.CaptureFixture[str]) -> None:
 def test_doctor_names_packages_that_are_missing(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("app.doctor.PACKAGES", ("numpy", "no-such-package"))
+    monkeypatch.setattr("app.commands.doctor.PACKAGES", ("numpy", "no-such-package"))
     assert run(["doctor"]) == 2
     assert "missing package no-such-package: " in (out := capsys.readouterr().out)
     assert out.rstrip().endswith("-m pip install no-such-package")

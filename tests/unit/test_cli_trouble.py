@@ -15,9 +15,9 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-import app.window
+import app.viewer.window
 from app.cli import run
-from app.session import Session
+from app.session.session import Session
 
 ROOT = Path(__file__).parent.parent.parent
 NOWHERE = os.devnull + "/home"  # cannot be made, even by root
@@ -31,8 +31,8 @@ def test_the_layout_is_kept_where_it_can_be(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path, writable: bool
 ) -> None:
     given: dict[str, Any] = {}
-    monkeypatch.setattr(app.window, "no_display", lambda: None)
-    monkeypatch.setattr(app.window, "run_window", lambda make_session, **named: given.update(named))
+    monkeypatch.setattr(app.viewer.window, "no_display", lambda: None)
+    monkeypatch.setattr(app.viewer.window, "run_window", lambda make_session, **named: given.update(named))
     home = {"HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path / "new" / "config")}
     for name, value in (home if writable else NO_HOME).items():
         monkeypatch.setenv(name, value)
@@ -72,9 +72,9 @@ def poison(monkeypatch: pytest.MonkeyPatch, texture: str, call: int) -> None:
         made = shoot(session, shots)
         calls.append(made)
         if len(calls) == call:
-            nodes = session.lightmap.nodes
-            tile, y, x = np.argwhere(nodes.surfaces.face >= 0)[100]
-            at = tile % nodes.columns * nodes.tile + x, tile // nodes.columns * nodes.tile + y
+            pool = session.lightmap.pool
+            tile, y, x = np.argwhere(pool.surfaces.face >= 0)[100]
+            at = tile % pool.columns * pool.tile + x, tile // pool.columns * pool.tile + y
             session.lightmap.texture(texture).write(np.full(4, np.nan, "f4").tobytes(), viewport=(*map(int, at), 1, 1))
         return made
 

@@ -13,7 +13,6 @@ import pytest
 from solver_scenes import quads_scene, room
 
 from app.atlas.charts import Charts
-from app.atlas.node_set import NodeSet
 from app.atlas.parametrize import parametrize
 from app.atlas.points import Points, barycentric, bilinear
 from app.bake import write_bake
@@ -22,8 +21,9 @@ from app.compare.comparison import error_of
 from app.compare.fetching import Fetching
 from app.compare.light import ReferenceLight, light_of_bake
 from app.errors import UserError
-from app.loading import Progress
+from app.lightmap.tile_pool import TilePool
 from app.scene.model import F32, Material, Scene
+from app.util.background import Progress
 
 MATERIALS = (
     Material("plaster", (0.7, 0.6, 0.5)),
@@ -128,7 +128,7 @@ def test_a_full_disk_is_said() -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/somewhere")
 
     scene = sheet_in_a_room()
-    fetching = Fetching(NodeSet(scene, charts_of(scene)), work)
+    fetching = Fetching(TilePool(scene, charts_of(scene)), work)
     with pytest.raises(UserError, match="the reference: No space left on device"):
         assert fetching.result
 

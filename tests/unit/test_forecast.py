@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.atlas.node_set import NodeSet
 from app.atlas.options import AtlasOptions
-from app.loading import load
+from app.estimate.forecast import forecast
+from app.lightmap.tile_pool import TilePool
 from app.render.exposure import first_exposure
-from app.render.forecast import forecast
 from app.render.sample import sampled_colours
 from app.scene.library import scene_names
+from app.session.loading import load
 
 # EV of the automatic exposure when solved: residual 1e-3 to 2e-2 (the grotto: 0.12) at 20,000 to 60,000 texels; the furnace
 # is known, B = 2 W/m² and H = 2 W/m²: log2(0.18 π / (0.5 · 2)).
@@ -29,8 +29,8 @@ TOLERANCE = (
 TEXELS = {"grotto": 200_000}  # with few, cells are as large as its crystals, and what is near hides nothing
 
 
-def nodes_of(name: str) -> NodeSet:
-    return load(name, AtlasOptions(texels=TEXELS.get(name, 20_000))).nodes
+def nodes_of(name: str) -> TilePool:
+    return load(name, AtlasOptions(texels=TEXELS.get(name, 20_000))).pool
 
 
 @pytest.mark.parametrize("name", scene_names())
@@ -39,20 +39,20 @@ def test_a_scene_opens_with_about_the_exposure_it_will_have(name: str) -> None:
 
 
 def test_light_grows_with_the_lamp_and_no_lamp_gives_none() -> None:
-    nodes = nodes_of("cornell-box")
-    colours = [[getattr(m, key) for m in nodes.scene.materials] for key in ("albedo", "emission")]
-    albedo, emission = (sampled_colours(nodes, factors, None, slice(None)) for factors in colours)
-    once, thrice = (forecast(nodes.surfaces, albedo, k * emission).irradiance for k in (1, 3))
+    pool = nodes_of("cornell-box")
+    colours = [[getattr(m, key) for m in pool.scene.materials] for key in ("albedo", "emission")]
+    albedo, emission = (sampled_colours(pool, factors, None, slice(None)) for factors in colours)
+    once, thrice = (forecast(pool.surfaces, albedo, k * emission).irradiance for k in (1, 3))
     np.testing.assert_allclose(thrice, 3 * once, rtol=1e-6)  # emission is in single precision
-    assert not forecast(nodes.surfaces, albedo, 0 * emission).irradiance.any()
+    assert not forecast(pool.surfaces, albedo, 0 * emission).irradiance.any()
 
 
 def test_no_more_arrives_than_is_sent() -> None:
     """Energy: with black walls, what all points receive is at most what the lamps emit."""
-    nodes = nodes_of("cornell-box")
-    emission = sampled_colours(nodes, [m.emission for m in nodes.scene.materials], None, slice(None))
-    light = forecast(nodes.surfaces, np.zeros_like(emission), emission)
-    emitted = np.einsum("tijc,tij->c", emission, nodes.surfaces.area)
+    pool = nodes_of("cornell-box")
+    emission = sampled_colours(pool, [m.emission for m in pool.scene.materials], None, slice(None))
+    light = forecast(pool.surfaces, np.zeros_like(emission), emission)
+    emitted = np.einsum("tijc,tij->c", emission, pool.surfaces.area)
     received = light.area @ light.irradiance
     # sums of F are at most 1 towards either side; the box is open, and the lamp's front sees most of it
     assert (received <= emitted * (1 + 1e-5)).all() and (received > 0.6 * emitted).all()

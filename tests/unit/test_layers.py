@@ -10,41 +10,45 @@ import pytest
 
 APP = Path(__file__).parents[2] / "app"
 LAYERS = [
-    {"errors", "parts"},
-    {"options", "cache"},
+    {"errors"},
+    {"options", "util"},
     {"scene", "gpu"},
     {"atlas"},
-    {"projections"},
-    {"solvers", "reference", "render", "metrics", "bake"},
-    {"bookkeeping", "history", "picking", "pacing", "stats"},
-    {"loading", "solving", "viewing"},
-    {"compare"},
-    {"gathering"},
-    {"opening", "comparing", "expecting"},
+    {"lightmap"},
+    {"visibility"},
+    {"reference"},
+    {"solvers", "bake"},
+    {"estimate", "compare"},
+    {"render"},
     {"session"},
     {"ui"},
-    {"headless_ui", "console"},
-    {"window", "info", "doctor", "reference_worker"},
-    {"headless"},
+    {"viewer"},
+    {"commands", "validation"},
     {"bench"},
     {"cli"},
     {"__main__"},
 ]
 LAYER = {name: i for i, layer in enumerate(LAYERS) for name in layer}
 # packages of GL may be imported only here
-GL = {"gpu", "window"}
-READERS = ("render", "metrics", "bake")  # of what solvers write: they know neither how nor by what it was written
+GL = {"gpu", "viewer"}
+READERS = (
+    "render",
+    "bake",
+    "estimate",
+    "compare",
+)  # of what solvers write: they know neither how nor by what it was written
 FORBIDDEN = {
     ("scene", "gpu"),
     ("gpu", "scene"),
-    ("projections", "scene"),
-    *((reader, writer) for reader in READERS for writer in ("solvers", "projections", "reference")),
-    ("reference", "solvers"),
+    *((reader, "solvers") for reader in READERS),
     ("solvers", "reference"),
     ("ui", "gpu"),
 }
 FAMILIES = {path.parent.name for path in APP.glob("solvers/*/__init__.py")}
-BY_PARTS = {"bench"}  # takes the shots of one family apart; all others know solvers by their table and protocol
+BY_PARTS = {
+    "bench",
+    "validation",
+}  # takes the shots of one family apart; all others know solvers by their table and protocol
 FILES = sorted(APP.rglob("*.py"))
 
 

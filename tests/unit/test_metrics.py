@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from app import metrics
+from app.reference import metrics
 
 R = np.array([1.0, 2.0, 3.0, 2.0])
 

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from app import pacing
-from app.pacing import BRISK_BUDGET, BRISK_FRAME, LONG_FRAME, MOST_BANDS, Pacer
+from app.session import pacing
+from app.session.pacing import BRISK_BUDGET, BRISK_FRAME, LONG_FRAME, MOST_BANDS, Pacer
 
 PART = 3.0  # ms of a part of a shot
 PARTS = 40

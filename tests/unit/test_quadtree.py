@@ -10,9 +10,9 @@ from atlas_scenes import own_cache
 from quadtrees import DEPTH, SCENES, UNEVEN, WITH_TILES, grow, shuffle, small_lamp_room, tree_of
 from solver_scenes import grey, quads_scene, room
 
-from app.atlas.node_set import NodeSet
 from app.atlas.parametrize import parametrize
-from app.atlas.quadtree import SMALLEST, WHOLE_CHART, Quadtree, first_leaves
+from app.lightmap.quadtree import SMALLEST, WHOLE_CHART, Quadtree, first_leaves
+from app.lightmap.tile_pool import TilePool
 from app.scene.model import F64, Scene
 
 __all__ = ["own_cache"]
@@ -21,23 +21,23 @@ AREA = 1e-9  # relative: texels are cut exactly, in double precision
 
 
 def places(tree: Quadtree) -> set[tuple[int, int, int]]:
-    return {tree.tile(int(slot)) for slot in np.flatnonzero(tree.nodes.used)}
+    return {tree.tile(int(slot)) for slot in np.flatnonzero(tree.pool.used)}
 
 
-def charts_in(nodes: NodeSet, slot: int) -> set[int]:
-    face = nodes.surfaces.face[slot]
-    return set(nodes.charts.face_chart[face[face >= 0]].tolist())
+def charts_in(pool: TilePool, slot: int) -> set[int]:
+    face = pool.surfaces.face[slot]
+    return set(pool.charts.face_chart[face[face >= 0]].tolist())
 
 
-def worst_step(nodes: NodeSet) -> int:
+def worst_step(pool: TilePool) -> int:
     """Largest difference in level between two leaves that meet along an edge and share a chart."""
-    pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64) - 1
+    pages = pool.slot_tables["t_pages"][..., 0].astype(np.int64) - 1
     pairs = set()
     for a, b in ((pages[1:], pages[:-1]), (pages[:, 1:], pages[:, :-1])):
         met = (a >= 0) & (b >= 0) & (a != b)
         pairs |= set(zip(a[met].tolist(), b[met].tolist(), strict=True))
-    level = nodes.leaves.level
-    apart = [abs(int(level[a] - level[b])) for a, b in pairs if charts_in(nodes, a) & charts_in(nodes, b)]
+    level = pool.leaves.level
+    apart = [abs(int(level[a] - level[b])) for a, b in pairs if charts_in(pool, a) & charts_in(pool, b)]
     return max(apart, default=0)
 
 
@@ -48,49 +48,49 @@ def worst_step(nodes: NodeSet) -> int:
 @pytest.mark.parametrize("seed", range(2))
 def test_whatever_splits_and_merges_the_surface_is_covered_once(name: str, tile: int, seed: int) -> None:
     tree, rng = tree_of(name, tile=tile), np.random.default_rng(seed)
-    nodes = tree.nodes
-    _, areas = nodes.scene.normals_areas
-    surface = areas[nodes.charts.face_triangle].sum()
+    pool = tree.pool
+    _, areas = pool.scene.normals_areas
+    surface = areas[pool.charts.face_triangle].sum()
     for _ in range(3):
         shuffle(tree, rng, rounds=3)
-        assert len(set(nodes.leaves.level[nodes.used])) > 1, "nothing was split"
-        assert nodes.surfaces.area.sum() == pytest.approx(surface, rel=AREA)
-        assert ((nodes.surfaces.area > 0) == (nodes.surfaces.face >= 0)).all()
-        assert nodes.texel_count == (nodes.surfaces.face >= 0).sum()
-        by_object = np.bincount(object_of(nodes), nodes.surfaces.area[nodes.surfaces.face >= 0])
-        np.testing.assert_allclose(by_object, object_areas(nodes), rtol=AREA if name not in UNEVEN else 1e-2)
+        assert len(set(pool.leaves.level[pool.used])) > 1, "nothing was split"
+        assert pool.surfaces.area.sum() == pytest.approx(surface, rel=AREA)
+        assert ((pool.surfaces.area > 0) == (pool.surfaces.face >= 0)).all()
+        assert pool.texel_count == (pool.surfaces.face >= 0).sum()
+        by_object = np.bincount(object_of(pool), pool.surfaces.area[pool.surfaces.face >= 0])
+        np.testing.assert_allclose(by_object, object_areas(pool), rtol=AREA if name not in UNEVEN else 1e-2)
 
 
-def object_of(nodes: NodeSet) -> np.ndarray:
-    face = nodes.surfaces.face[nodes.surfaces.face >= 0]
-    return np.asarray(nodes.scene.object_ids[nodes.charts.face_triangle[face]])
+def object_of(pool: TilePool) -> np.ndarray:
+    face = pool.surfaces.face[pool.surfaces.face >= 0]
+    return np.asarray(pool.scene.object_ids[pool.charts.face_triangle[face]])
 
 
-def object_areas(nodes: NodeSet) -> F64:
-    triangle = nodes.charts.face_triangle
-    return np.bincount(nodes.scene.object_ids[triangle], nodes.scene.normals_areas[1][triangle])
+def object_areas(pool: TilePool) -> F64:
+    triangle = pool.charts.face_triangle
+    return np.bincount(pool.scene.object_ids[triangle], pool.scene.normals_areas[1][triangle])
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_neighbours_in_a_chart_differ_by_one_level_at_most(name: str) -> None:
     for seed in range(3):
         tree, rng = tree_of(name), np.random.default_rng(seed)
-        assert worst_step(tree.nodes) <= 1, "at the start"
+        assert worst_step(tree.pool) <= 1, "at the start"
         for _ in range(3):
             shuffle(tree, rng, rounds=3)
-            assert worst_step(tree.nodes) <= 1
-            assert tree.nodes.leaves.level.max() > 1, "nothing is tested"
+            assert worst_step(tree.pool) <= 1
+            assert tree.pool.leaves.level.max() > 1, "nothing is tested"
 
 
 def test_a_leaf_deep_in_a_corner_takes_its_neighbours_along() -> None:
     """Three splits of the leaf at one place leave all levels from 0 to 3 around it."""
     tree = tree_of("walls", density=24.0)
-    x, y, w, h = tree.nodes.charts.chart_rects[0]
-    assert min(w, h) >= 4 * tree.nodes.tile
+    x, y, w, h = tree.pool.charts.chart_rects[0]
+    assert min(w, h) >= 4 * tree.pool.tile
     for _ in range(3):
-        grow(tree, [tree.nodes.slot_at((x + w / 2 + 0.1, y + h / 2 + 0.1))])
-    assert set(tree.nodes.leaves.level[tree.nodes.used]) == {0, 1, 2, 3}
-    assert worst_step(tree.nodes) == 1
+        grow(tree, [tree.pool.slot_at((x + w / 2 + 0.1, y + h / 2 + 0.1))])
+    assert set(tree.pool.leaves.level[tree.pool.used]) == {0, 1, 2, 3}
+    assert worst_step(tree.pool) == 1
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -98,12 +98,12 @@ def test_merging_ends_at_the_first_leaves(name: str) -> None:
     tree, rng = tree_of(name), np.random.default_rng(7)
     first = places(tree)
     for _ in range(2):
-        grow(tree, np.flatnonzero(tree.nodes.used).tolist())
+        grow(tree, np.flatnonzero(tree.pool.used).tolist())
     assert len(tree) > 2 * len(first)
     assert not tree.merges(np.array([], np.int64))
-    while families := tree.merges(np.flatnonzero(tree.nodes.used & (rng.random(tree.nodes.tiles) < 0.9))):
+    while families := tree.merges(np.flatnonzero(tree.pool.used & (rng.random(tree.pool.tiles) < 0.9))):
         tree.merge(families)
-    while families := tree.merges(np.flatnonzero(tree.nodes.used)):
+    while families := tree.merges(np.flatnonzero(tree.pool.used)):
         tree.merge(families)
     assert places(tree) == first
 
@@ -121,11 +121,11 @@ def test_a_family_merges_whole_or_not_at_all() -> None:
 def test_depth_ends_splitting() -> None:
     tree = tree_of("table")
     for _ in range(5):
-        grow(tree, np.flatnonzero(tree.nodes.used).tolist(), depth=2)
-    assert not tree.splits(np.flatnonzero(tree.nodes.used).tolist(), 2)
-    assert set(tree.nodes.leaves.level[tree.nodes.used]) <= set(range(max(3, int(tree.nodes.leaves.level.max()) + 1)))
+        grow(tree, np.flatnonzero(tree.pool.used).tolist(), depth=2)
+    assert not tree.splits(np.flatnonzero(tree.pool.used).tolist(), 2)
+    assert set(tree.pool.leaves.level[tree.pool.used]) <= set(range(max(3, int(tree.pool.leaves.level.max()) + 1)))
     fresh = tree_of("table")
-    assert set(tree.nodes.leaves.level[tree.nodes.used]) == {2} | {level for level, *_ in places(fresh) if level > 2}
+    assert set(tree.pool.leaves.level[tree.pool.used]) == {2} | {level for level, *_ in places(fresh) if level > 2}
 
 
 def test_a_change_says_who_took_whose_place() -> None:
@@ -147,7 +147,7 @@ def test_a_change_says_who_took_whose_place() -> None:
 
 def test_fields_of_a_change_are_as_long_as_each_other() -> None:
     tree = tree_of("ball")
-    change = grow(tree, np.flatnonzero(tree.nodes.used).tolist())
+    change = grow(tree, np.flatnonzero(tree.pool.used).tolist())
     assert change is not None
     lengths = {len(getattr(change, f.name)) for f in dataclasses.fields(change) if f.name != "split"}
     assert len(lengths) == 1 and change.corner.shape[1] == 2
@@ -160,22 +160,22 @@ def test_slots_are_used_again() -> None:
     tree = tree_of("table")
     rooms, first = [], places(tree)
     for _ in range(20):
-        splits = tree.splits(np.flatnonzero(tree.nodes.used).tolist(), DEPTH)
+        splits = tree.splits(np.flatnonzero(tree.pool.used).tolist(), DEPTH)
         tree.split(splits)
-        assert tree.room + len(tree) == tree.nodes.tiles
-        while families := tree.merges(np.flatnonzero(tree.nodes.used)):
+        assert tree.room + len(tree) == tree.pool.tiles
+        while families := tree.merges(np.flatnonzero(tree.pool.used)):
             tree.merge(families)
         rooms.append(tree.room)
         assert places(tree) == first
-    assert len(set(rooms)) == 1 and tree.room + len(tree) == tree.nodes.tiles
-    assert sorted(tree.slots.values()) == np.flatnonzero(tree.nodes.used).tolist()
+    assert len(set(rooms)) == 1 and tree.room + len(tree) == tree.pool.tiles
+    assert sorted(tree.slots.values()) == np.flatnonzero(tree.pool.used).tolist()
 
 
 def test_coarse_leaves_split_first() -> None:
     """So that a list cut short leaves the tree balanced."""
     tree = tree_of("table")
     tree.split(tree.splits([min(tree.slots.values())], DEPTH))
-    levels = [tree.tile(slot)[0] for slot in tree.splits(np.flatnonzero(tree.nodes.used).tolist(), DEPTH)]
+    levels = [tree.tile(slot)[0] for slot in tree.splits(np.flatnonzero(tree.pool.used).tolist(), DEPTH)]
     assert levels == sorted(levels) and len(set(levels)) > 1
 
 
@@ -183,9 +183,9 @@ def test_merging_needs_no_room() -> None:
     """A tree that has used its budget up must be able to shrink."""
     tree = tree_of("table")
     first = places(tree)
-    grow(tree, np.flatnonzero(tree.nodes.used).tolist())
+    grow(tree, np.flatnonzero(tree.pool.used).tolist())
     tree._free = []
-    families = tree.merges(np.flatnonzero(tree.nodes.used))
+    families = tree.merges(np.flatnonzero(tree.pool.used))
     before = len(tree)
     tree.merge(families)
     assert places(tree) == first
@@ -194,22 +194,22 @@ def test_merging_needs_no_room() -> None:
 
 def test_enlarging_keeps_everything() -> None:
     tree = tree_of("table")
-    grow(tree, np.flatnonzero(tree.nodes.used)[::3].tolist())
-    nodes = tree.nodes
-    slots, tiles, columns, room = dict(tree.slots), nodes.tiles, nodes.columns, tree.room
-    arrays = nodes.tile_arrays(np.arange(tiles))
-    pages = nodes.slot_tables["t_pages"]
-    receivers = [a.copy() for a in (nodes.flat_spans, nodes.shaped_tiles)]
+    grow(tree, np.flatnonzero(tree.pool.used)[::3].tolist())
+    pool = tree.pool
+    slots, tiles, columns, room = dict(tree.slots), pool.tiles, pool.columns, tree.room
+    arrays = pool.tile_arrays(np.arange(tiles))
+    pages = pool.slot_tables["t_pages"]
+    receivers = [a.copy() for a in (pool.flat_spans, pool.shaped_tiles)]
     tree.resize(tiles + 100)
-    assert (nodes.tiles, nodes.columns, tree.room, tree.slots) == (tiles + 100, columns, room + 100, slots)
-    assert nodes.size == (columns * nodes.tile, -(-nodes.tiles // columns) * nodes.tile)
-    for name, array in nodes.tile_arrays(np.arange(tiles)).items():
+    assert (pool.tiles, pool.columns, tree.room, tree.slots) == (tiles + 100, columns, room + 100, slots)
+    assert pool.size == (columns * pool.tile, -(-pool.tiles // columns) * pool.tile)
+    for name, array in pool.tile_arrays(np.arange(tiles)).items():
         np.testing.assert_array_equal(array, arrays[name])
-    np.testing.assert_array_equal(nodes.slot_tables["t_pages"], pages)
-    for now, before in zip((nodes.flat_spans, nodes.shaped_tiles), receivers, strict=True):
+    np.testing.assert_array_equal(pool.slot_tables["t_pages"], pages)
+    for now, before in zip((pool.flat_spans, pool.shaped_tiles), receivers, strict=True):
         np.testing.assert_array_equal(now, before)
-    splits = tree.splits(np.flatnonzero(nodes.used).tolist(), DEPTH)
-    assert tree.split(splits).children.max() < nodes.tiles
+    splits = tree.splits(np.flatnonzero(pool.used).tolist(), DEPTH)
+    assert tree.split(splits).children.max() < pool.tiles
 
 
 # -- places ------------------------------------------------------------------------------------------------------------
@@ -219,16 +219,16 @@ def test_enlarging_keeps_everything() -> None:
 def test_the_page_table_finds_the_leaf_at_any_place(name: str, tile: int, rng: np.random.Generator) -> None:
     tree = tree_of(name, tile=tile)
     shuffle(tree, rng, rounds=3)
-    nodes = tree.nodes
-    pages = nodes.slot_tables["t_pages"][..., 0].astype(np.int64) - 1
+    pool = tree.pool
+    pages = pool.slot_tables["t_pages"][..., 0].astype(np.int64) - 1
     found = 0
-    for uv in rng.uniform(0, nodes.charts.size, (400, 2)):
-        slot = int(pages[tuple((uv * nodes.pages_per_texel).astype(int)[::-1])])
-        assert slot == nodes.slot_at((float(uv[0]), float(uv[1])))
+    for uv in rng.uniform(0, pool.charts.size, (400, 2)):
+        slot = int(pages[tuple((uv * pool.pages_per_texel).astype(int)[::-1])])
+        assert slot == pool.slot_at((float(uv[0]), float(uv[1])))
         if slot < 0:
             continue
         found += 1
-        leaf = nodes.leaves.only(np.array([slot]))
+        leaf = pool.leaves.only(np.array([slot]))
         low = np.array([leaf.x[0], leaf.y[0]]) * tile / 2.0 ** leaf.level[0]
         assert ((uv >= low) & (uv < low + tile / 2.0 ** leaf.level[0])).all()
     assert found > 100
@@ -238,10 +238,10 @@ def test_all_covered_places_have_a_leaf(rng: np.random.Generator) -> None:
     """Whatever was split: points inside of faces, not only tiles that happen to be there."""
     tree = tree_of("ball")
     shuffle(tree, rng, rounds=5)
-    uv = tree.nodes.charts.face_uv
+    uv = tree.pool.charts.face_uv
     weights = rng.dirichlet((1.0, 1.0, 1.0), len(uv))
     for u, v in np.einsum("fk,fkc->fc", weights, uv):
-        assert tree.nodes.slot_at((float(u), float(v))) >= 0
+        assert tree.pool.slot_at((float(u), float(v))) >= 0
 
 
 @pytest.mark.parametrize("tile", [8, 16])  # in a larger one the two share a leaf
@@ -250,11 +250,11 @@ def test_lamps_and_small_charts_begin_with_enough_texels(tile: int) -> None:
     scene = small_lamp_room()
     charts = parametrize(scene, density=10, tile=tile)
     leaves = first_leaves(scene, charts, 6)
-    nodes = NodeSet(scene, charts, leaves, adaptive=True)
+    pool = TilePool(scene, charts, leaves, adaptive=True)
     longer = charts.chart_rects[:, 2:].max(1)
     assert longer.min() < SMALLEST
     chart_of = {scene.object_ids[t]: c for t, c in zip(charts.face_triangle, charts.face_chart, strict=True)}
-    face = nodes.surfaces.face
+    face = pool.surfaces.face
     for name, enough in ((6, WHOLE_CHART), (7, SMALLEST)):
         chart = chart_of[name]
         mine = (face >= 0) & (charts.face_chart[face] == chart)

@@ -7,7 +7,7 @@
 
 const float FAINT = 1e-30;
 
-uniform vec2 u_size;  // of the node set [texels]
+uniform vec2 u_size;  // of the tile pool [texels]
 uniform sampler2D t_items;
 #if VISIBILITY != 0
 uniform sampler2D t_depth;

@@ -4,8 +4,8 @@
 const float PI = 3.14159265358979323846;
 
 struct Texel {
-    vec3 position;   // centroid of the covered surface, solver frame
-    float area;      // solver frame; 0 = nothing here
+    vec3 position;   // centroid of the covered surface, solver space
+    float area;      // solver space; 0 = nothing here
     vec3 normal;
     uint facet;      // from 1; 0 = nothing here
     uint material;

@@ -2,7 +2,7 @@
 // Held as floats, exact up to 2^24, because an integer target cannot be cleared portably.
 const float OPEN = 0.0;
 const float UNCHARTED = 16777215.0;
-const float FAR = 2.0;  // the scene's diameter in the solver frame
+const float FAR = 2.0;  // the scene's diameter in the solver space
 // Rounding of positions and of their dot products in single precision, a few 2^-24 of the scene's diameter: two surfaces that are
 // closer than this lie in one plane, and nothing nearer to the shooter can be told from its own surface.
 const float COPLANAR = 2e-6;

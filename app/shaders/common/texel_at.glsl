@@ -1,4 +1,4 @@
-// The texel of the node set at a place of the atlas [texels of level 0]; negative where there is none.
+// The texel of the tile pool at a place of the atlas [texels of level 0]; negative where there is none.
 #include "common/pages.glsl"
 #include "common/tile.glsl"
 

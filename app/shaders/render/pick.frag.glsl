@@ -4,7 +4,7 @@ in vec4 v_uv;
 
 layout(location = 0) out uvec2 out_ids;      // triangle, from 1, as they are drawn; 1 = back side
 layout(location = 1) out vec4 out_atlas;     // atlas texels u, v
-layout(location = 2) out vec4 out_position;  // solver frame
+layout(location = 2) out vec4 out_position;  // solver space
 
 void main() {
     out_ids = uvec2(uint(gl_PrimitiveID) + 1u, gl_FrontFacing ? 0u : 1u);

@@ -6,7 +6,7 @@ uniform float u_gain;  // exposure
 
 layout(location = 0) out vec4 out_colour;
 
-// layer_colour(texel_px): linear Rec.709 of a node-set texel
+// layer_colour(texel_px): linear Rec.709 of a tile-pool texel
 #include <layer>
 // develop(rgb): linear Rec.709 of the screen, 0 to 1
 #include <curve>

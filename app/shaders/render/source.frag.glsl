@@ -1,4 +1,4 @@
-// Which node-set texel each display texel copies (column | row << 16), made anew when leaves come or go. A texel that covers
+// Which tile-pool texel each display texel copies (column | row << 16), made anew when leaves come or go. A texel that covers
 // nothing copies a neighbour that does, the nearest first, so that neither gutters nor tile borders darken the picture.
 #include "common/atlas.glsl"
 #include "common/pages.glsl"

@@ -2,7 +2,7 @@
 
 Every leaf is judged on the GPU, and the host hears of it one step later: how much the gradient of H jumps in it, or how many of
 its texels lie in shadow [Wallner10, 5]. Light is pushed down to children and pulled up to parents. While leaves change they are
-judged at every second step, else when a quarter more shots have been made, and at the end. The node set grows with the tree,
+judged at every second step, else when a quarter more shots have been made, and at the end. The tile pool grows with the tree,
 and gives back what it has too much of once the tree rests.
 
 A leaf that came late inherited interpolated light from earlier shots: reshooting.py makes them again into fresh leaves.
@@ -15,10 +15,10 @@ from collections.abc import Callable, Generator, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import Lightmap
-from app.atlas.quadtree import FIRST_ROOM, Change, Quadtree, Tile
-from app.atlas.regrow import Regrowth
 from app.gpu import Gpu, Pass, ReadBack
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.quadtree import FIRST_ROOM, Change, Quadtree, Tile
+from app.lightmap.transfer import Regrowth
 from app.scene.model import Material
 from app.solvers.shooting.options import TREE, ShootingOptions
 from app.solvers.shooting.reshooting import Reshooting
@@ -34,14 +34,14 @@ PER_SHOT = 8  # leaves that split or families that merge, for each shot of a ste
 
 
 class AdaptiveShooting(Reshooting):
-    """Shoots a lightmap whose node set has room for more leaves than it holds. Whoever makes it releases it."""
+    """Shoots a lightmap whose tile pool has room for more leaves than it holds. Whoever makes it releases it."""
 
     adaptive = True
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
-        self.tree = Quadtree(lightmap.nodes)
+        self.tree = Quadtree(lightmap.pool)
         self._regrowth = Regrowth(gpu, lightmap)
-        self._judge = Pass(gpu, "shooting/judge", defines=lightmap.defines("TILE"))
+        self._judge = Pass(gpu, "solvers/shooting/judge", defines=lightmap.defines("TILE"))
         self._judged: tuple[int, ReadBack] | None = None  # on its way, and the version of the leaves that it is of
         self._look_at = 0
         self._split_at: dict[Tile, int] = {}  # shots in the log when a leaf was split
@@ -112,7 +112,7 @@ class AdaptiveShooting(Reshooting):
 
     def _levels_above(self, slots: NDArray[np.int64]) -> NDArray[np.int64]:
         """Patches are about as large in the scene in leaves of every level."""
-        return ROOT_LEVEL - self.lightmap.nodes.leaves.level[slots].astype(np.int64)
+        return ROOT_LEVEL - self.lightmap.pool.leaves.level[slots].astype(np.int64)
 
     def passes(self, shots: int) -> dict[str, Callable[[], None]]:
         return super().passes(shots) | {
@@ -140,7 +140,7 @@ class AdaptiveShooting(Reshooting):
         (version, readback), self._judged = self._judged, None
         data = np.frombuffer(readback.take(), np.float32).reshape(-1, 4)
         if version == self.lightmap.version:
-            self._calm = not self._grow(data[: self.lightmap.nodes.tiles].astype(np.float64), most)
+            self._calm = not self._grow(data[: self.lightmap.pool.tiles].astype(np.float64), most)
             self._calm_at = self._log.count
             if self._calm:
                 self._give_room_back()
@@ -166,15 +166,15 @@ class AdaptiveShooting(Reshooting):
 
     def _grow(self, judged: NDArray[np.float64], most: int) -> bool:
         """Split and merge where the judgement (slots, 4), see judge.frag.glsl, says so. Whether anything changed."""
-        nodes, options = self.lightmap.nodes, self.options
-        level = nodes.leaves.level
+        pool, options = self.lightmap.pool, self.options
+        level = pool.leaves.level
         rough, smooth = self._opinion(judged)
-        grows = np.flatnonzero(nodes.used & (level < options.depth) & rough)
+        grows = np.flatnonzero(pool.used & (level < options.depth) & rough)
         grows = grows[np.argsort(-judged[grows, 0])][:most]
         self.note = None
         splits = self.tree.splits(grows.tolist(), options.depth)[:most]
         self._make_room(4 * len(splits))
-        within_budget = max(options.budget // nodes.tile**2 - len(self.tree), 0) // 3  # four leaves for one
+        within_budget = max(options.budget // pool.tile**2 - len(self.tree), 0) // 3  # four leaves for one
         if len(splits) > min(self.tree.room // 4, within_budget):
             self.note = f"leaves stop growing: the budget of {options.budget:,} texels is reached"
             splits = splits[: min(self.tree.room // 4, within_budget)]
@@ -182,7 +182,7 @@ class AdaptiveShooting(Reshooting):
             self._split_at |= {self.tree.tile(slot): self._log.count for slot in splits}
             self._apply(self.tree.split(splits))
             return True
-        families = self.tree.merges(np.flatnonzero(nodes.used & ((level > options.depth) | smooth)))
+        families = self.tree.merges(np.flatnonzero(pool.used & ((level > options.depth) | smooth)))
         families = [family for family in families if self._may_merge(family)][:most]
         if families:
             self._apply(self.tree.merge(families))
@@ -198,20 +198,20 @@ class AdaptiveShooting(Reshooting):
 
     def _make_room(self, slots: int) -> None:
         """Have so many free slots, if the budget allows."""
-        nodes = self.lightmap.nodes
+        pool = self.lightmap.pool
         if self.tree.room >= slots:
             return
-        longest = self.gpu.limits.max_texture // (nodes.tile + 4)  # slots in a column of display texels and borders
-        most = min(self.options.budget // nodes.tile**2, nodes.columns * longest)
-        wanted = min(max(nodes.tiles * 3 // 2, nodes.tiles + slots), most)
-        if wanted > nodes.tiles:
+        longest = self.gpu.limits.max_texture // (pool.tile + 4)  # slots in a column of display texels and borders
+        most = min(self.options.budget // pool.tile**2, pool.columns * longest)
+        wanted = min(max(pool.tiles * 3 // 2, pool.tiles + slots), most)
+        if wanted > pool.tiles:
             self._resize(wanted)
 
     def _give_room_back(self) -> None:
         """Keep room for half as many leaves again, once there is more than twice that: leaves that come and go do not have it
         made anew each time."""
-        kept = max(FIRST_ROOM // self.lightmap.nodes.tile**2, len(self.tree) * 3 // 2)
-        if self.lightmap.nodes.tiles > 2 * kept:
+        kept = max(FIRST_ROOM // self.lightmap.pool.tile**2, len(self.tree) * 3 // 2)
+        if self.lightmap.pool.tiles > 2 * kept:
             self.poll(wait=True)  # reports on their way name their shooter by its slot
             self._resize(kept)
 

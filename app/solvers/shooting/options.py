@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.atlas.lightmap import STORAGE
-from app.atlas.quadtree import MAX_DEPTH
+from app.lightmap.lightmap import STORAGE
+from app.lightmap.quadtree import MAX_DEPTH
 from app.options import Options, option
-from app.projections import PROJECTIONS
+from app.visibility.projections import PROJECTIONS
 
 MAX_LEVEL = 4  # of the patches that shoot: 16×16 texels
 FORM_FACTORS = ("polygon", "disc")

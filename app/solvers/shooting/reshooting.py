@@ -20,9 +20,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import QUAD_FORMAT, Lightmap, quads, receiver_meshes
-from app.atlas.node_set import Moves
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
+from app.lightmap.lightmap import QUAD_FORMAT, Lightmap, quads, receiver_meshes
+from app.lightmap.tile_pool import Moves
 from app.scene.model import F64, Material
 from app.solvers.shooting.log import ShotLog
 from app.solvers.shooting.options import ShootingOptions
@@ -43,10 +43,10 @@ class Reshooting(UniformShooting):
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
         self.gpu, self.lightmap = gpu, lightmap
         self._log = ShotLog(gpu)
-        self._inherit = Pass(gpu, "shooting/inherit", vertex="common/rects")
+        self._inherit = Pass(gpu, "solvers/shooting/inherit", vertex="common/rects")
         self._correct = Pass(
             gpu,
-            "shooting/correct",
+            "solvers/shooting/correct",
             defines=lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"),
             vertex="common/rects",
         )
@@ -152,7 +152,7 @@ class Reshooting(UniformShooting):
         self._fresh = {now.get(slot, slot) for slot in self._fresh}
 
     def _texels(self, *, per_slot: bool = False) -> tuple[Texture, Framebuffer]:
-        """As large as the node set, or one for each of its slots."""
+        """As large as the tile pool, or one for each of its slots."""
         size = (self.lightmap.columns, self.lightmap.rows) if per_slot else self.lightmap.size
         texture = self.gpu.texture(size, 4, "f4")
         return texture, self.gpu.target(texture)
@@ -237,7 +237,7 @@ class Reshooting(UniformShooting):
 
     def _redo_one(self) -> None:
         """The shot that was chosen last once more, into all leaves."""
-        redo = _Redo(self.gpu, self.lightmap, np.flatnonzero(self.lightmap.nodes.used), 1)
+        redo = _Redo(self.gpu, self.lightmap, np.flatnonzero(self.lightmap.pool.used), 1)
         self._take_back(redo)
         self._receive(self._correction_target, 0, 1, blend="add", meshes=redo.receivers)
         self._put_right(redo)
@@ -255,10 +255,10 @@ class _Redo:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, slots: NDArray[np.int64], shots: int) -> None:
         self._gpu, self.slots, self.next, self.end, self.weak = gpu, slots, 0, shots, False
-        nodes = lightmap.nodes
-        place = nodes.corners(slots)
-        self.quads = Mesh(gpu, quads(place, nodes.tile, place).tobytes(), QUAD_FORMAT, per_instance=True)
-        flat, shaped = nodes.receivers_of(slots)
+        pool = lightmap.pool
+        place = pool.corners(slots)
+        self.quads = Mesh(gpu, quads(place, pool.tile, place).tobytes(), QUAD_FORMAT, per_instance=True)
+        flat, shaped = pool.receivers_of(slots)
         self.receivers = receiver_meshes(gpu, flat, shaped)
 
     def release(self) -> None:

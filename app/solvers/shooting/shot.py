@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import Lightmap
 from app.gpu import Buffer, Framebuffer, Gpu, Mesh
+from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.stages import (
@@ -45,7 +45,7 @@ AUDITED, SOUND, SMALL = 0.005, 0.02, 2
 
 @dataclass(frozen=True)
 class Shot:
-    """The shooter of one shot: centre [m], unit normal, area [m²], lower corner (x, y) and edge of its patch in the node set as
+    """The shooter of one shot: centre [m], unit normal, area [m²], lower corner (x, y) and edge of its patch in the tile pool as
     it is then [texels], and (u, v, u, v) of it in the virtual atlas [texels of level 0]; rows (SHOOTER_ROWS, 4): all of it, see
     shooter.glsl."""
 
@@ -117,7 +117,7 @@ class ShotPasses(ABC):
     _audits: bool  # whether batches are still strong enough to be audited
     _emitted: F64  # RGB [W]
     _albedo: tuple[float, ...]  # mean, RGB
-    _area: float  # of all texels, solver frame
+    _area: float  # of all texels, solver space
 
     @property
     @abstractmethod
@@ -232,7 +232,7 @@ class ShotPasses(ABC):
         choice.add_runs.draw(
             self.buffers.run_target,
             textures={"t_candidates": candidates, "t_unshot": unshot},
-            uniforms={"u_runs": self.buffers.runs.width, "u_slots": self.lightmap.nodes.slots_in_use},
+            uniforms={"u_runs": self.buffers.runs.width, "u_slots": self.lightmap.pool.slots_in_use},
         )
 
     def _describe(self, choice: ChoiceStages, shots: int) -> None:
@@ -361,15 +361,15 @@ class ShotPasses(ABC):
             )
 
     def _shot_from_rows(self, rows: F64) -> Shot:
-        frame, corner, edge = self.lightmap.frame, (int(rows[3, 3]), int(rows[4, 3])), int(edges_of(rows))
-        area = float(rows[0, 3]) * frame.scale**2
-        rect = self.lightmap.nodes.atlas_rect(corner, edge)
-        return Shot(frame.world_from_local(rows[2, :3]), rows[1, :3], area, corner, edge, rect, rows[:SHOOTER_ROWS])
+        space, corner, edge = self.lightmap.space, (int(rows[3, 3]), int(rows[4, 3])), int(edges_of(rows))
+        area = float(rows[0, 3]) * space.scale**2
+        rect = self.lightmap.pool.atlas_rect(corner, edge)
+        return Shot(space.world_from_local(rows[2, :3]), rows[1, :3], area, corner, edge, rect, rows[:SHOOTER_ROWS])
 
     @property
     def _watt(self) -> float:
         """Watts in one stored unit of power: lightmap unit [W/m²] times solver area."""
-        return self.lightmap.unit * self.lightmap.frame.scale**2
+        return self.lightmap.unit * self.lightmap.space.scale**2
 
     def _count_vanished(self, shot: Shot) -> int:
         """Triangles that it sees, but between the samples of its map. Waits for the GPU."""

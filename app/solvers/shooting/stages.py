@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from app.atlas.lightmap import Lightmap
-from app.atlas.node_set import Moves
-from app.atlas.quadtree import Change
 from app.gpu import Gpu, Pass, Texture
-from app.projections import PROJECTIONS, Occluders
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.quadtree import Change
+from app.lightmap.tile_pool import Moves
 from app.scene.model import F32, F64
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions, highest_level
+from app.visibility.projections import PROJECTIONS, Occluders
 
 BATCH = 8  # shooters chosen at once: choosing reads every texel, so one choice serves several shots
 RUNS = 64  # at least, of squares: a batch is chosen from the strongest patch of each
@@ -42,15 +42,15 @@ MAPS_TEXELS = 2**21  # of visibility that are drawn at once: more gain little an
 
 def fitting_resolution(lightmap: Lightmap, *, adaptive: bool) -> int:
     """Edge of a map's full face [px] in which a texel half the scene's diagonal away fills one sample: a face of N samples is 2
-    wide at distance 1, so N = 2 / texel in the solver frame; of a quadtree, a texel of the level that shoots by patches."""
-    texel = 1.0 / (lightmap.charts.density * lightmap.frame.scale) / (1 << ROOT_LEVEL if adaptive else 1)
+    wide at distance 1, so N = 2 / texel in the solver space; of a quadtree, a texel of the level that shoots by patches."""
+    texel = 1.0 / (lightmap.charts.density * lightmap.space.scale) / (1 << ROOT_LEVEL if adaptive else 1)
     return int(np.clip(64 * round(2.0 / texel / 64), *RESOLUTIONS))
 
 
 def patch_levels(lightmap: Lightmap, options: ShootingOptions, *, adaptive: bool) -> list[int]:
     """Of the patches that shoot, those that begin and the finest, as powers of 2 of texels; in quadtrees, of uniform ones."""
-    top = MAX_LEVEL if adaptive else highest_level(lightmap.nodes.tile)
-    texels = lightmap.nodes.surfaces.area.sum() * lightmap.charts.density**2 * (4**ROOT_LEVEL if adaptive else 1)
+    top = MAX_LEVEL if adaptive else highest_level(lightmap.pool.tile)
+    texels = lightmap.pool.surfaces.area.sum() * lightmap.charts.density**2 * (4**ROOT_LEVEL if adaptive else 1)
     last = min(LEVEL if options.level is None else options.level, top)
     while options.level is None and last < top and texels / 4**last > MOST_PATCHES:
         last += 1
@@ -69,7 +69,7 @@ class ShotBuffers:
     """What a shot writes besides the lightmap and does not depend on the options."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
-        self._gpu, self._tile = gpu, lightmap.nodes.tile
+        self._gpu, self._tile = gpu, lightmap.pool.tile
         self.shooters = gpu.texture((BLOCK_ROWS, BATCH), 4, "f4")
         self.shooter_blocks = gpu.buffer(BATCH * BLOCK_BYTES)  # the same, as uniforms
         self.inspected_block = gpu.buffer(BATCH * BLOCK_BYTES)  # the first is a shooter that is looked at by itself
@@ -86,7 +86,7 @@ class ShotBuffers:
         self.all_alike()
 
     def _fit(self, lightmap: Lightmap) -> None:
-        """Make what is as large as the node set."""
+        """Make what is as large as the tile pool."""
         gpu, (width, height) = self._gpu, lightmap.size
         squares = (self._tile >> SQUARE_LEVEL) ** 2
         self.runs = gpu.texture((-(-max(RUNS, lightmap.rows) // squares) * squares, 1), 4, "f4")
@@ -213,7 +213,7 @@ class ChoiceStages:
     ) -> None:
         self._gpu, self.level, self.pays = gpu, level, pays
         self._fit(lightmap)
-        tile = lightmap.nodes.tile
+        tile = lightmap.pool.tile
         root, top = ROOT_LEVEL if adaptive else 0, {"HIGHEST": highest_level(tile)}
         of_block = {"BLOCK": 1 << BLOCK_LEVEL, "BLOCK_LEVEL": BLOCK_LEVEL}
         of_block["LEVELS"] = LEVELS
@@ -221,10 +221,10 @@ class ChoiceStages:
         reads = lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE")
         levels = {"LEVEL": level - root, "FINEST": finest - root, "EMITTER": EMITTER, "PAYS": pays}
         square = {"SQUARE_LEVEL": SQUARE_LEVEL}
-        self.add_patches = Pass(gpu, "shooting/patches", defines=reads | of_block | levels | top)
-        self.begin = Pass(gpu, "shooting/begin", defines=of_block | of_tile | top | square)
-        self.add_runs = Pass(gpu, "shooting/runs", defines=of_tile)
-        self.choose = Pass(gpu, "shooting/choose", defines=reads | of_block | levels | top | square)
+        self.add_patches = Pass(gpu, "solvers/shooting/patches", defines=reads | of_block | levels | top)
+        self.begin = Pass(gpu, "solvers/shooting/begin", defines=of_block | of_tile | top | square)
+        self.add_runs = Pass(gpu, "solvers/shooting/runs", defines=of_tile)
+        self.choose = Pass(gpu, "solvers/shooting/choose", defines=reads | of_block | levels | top | square)
 
     def _fit(self, lightmap: Lightmap) -> None:
         width, height = lightmap.size
@@ -281,30 +281,32 @@ class ShotStages:
         resolution = {"RESOLUTION": self.resolution}
         reads = {"projection": self.projection.glsl}
         keeps = {"KEEPS": options.storage != "fixed8"}
-        self.zero = Pass(gpu, "shooting/zero", defines=keeps | lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"))
+        self.zero = Pass(
+            gpu, "solvers/shooting/zero", defines=keeps | lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE")
+        )
         self.see = Pass(
             gpu,
-            "shooting/visibility",
+            "solvers/shooting/visibility",
             defines=resolution | {"VIEWS": self.projection.views},
             slots=self.projection.drawing,
         )
-        self.see_small = Pass(gpu, "shooting/small", defines=resolution, slots=reads)
-        self.count_small = Pass(gpu, "shooting/small", defines=resolution | {"COUNT": 1}, slots=reads)
+        self.see_small = Pass(gpu, "solvers/shooting/small", defines=resolution, slots=reads)
+        self.count_small = Pass(gpu, "solvers/shooting/small", defines=resolution | {"COUNT": 1}, slots=reads)
         self.receive = {
             (flat, near): self._receive(gpu, lightmap, options, flat=flat, near=near)
             for flat in ((True, False) if adaptive else lightmap.receivers)
             for near in (False, True)
         }
-        self.add_open = Pass(gpu, "shooting/open", defines={"BLOCK": OPEN_BLOCK})
-        self.audit = Pass(gpu, "shooting/audit", defines=lightmap.defines("TILE"))
-        self.enter = Pass(gpu, "shooting/ledger")
-        self.tell = Pass(gpu, "shooting/report")
-        self.expect = Pass(gpu, "shooting/ambient")
+        self.add_open = Pass(gpu, "solvers/shooting/open", defines={"BLOCK": OPEN_BLOCK})
+        self.audit = Pass(gpu, "solvers/shooting/audit", defines=lightmap.defines("TILE"))
+        self.enter = Pass(gpu, "solvers/shooting/ledger")
+        self.tell = Pass(gpu, "solvers/shooting/report")
+        self.expect = Pass(gpu, "solvers/shooting/ambient")
         weights_target = gpu.target(self.weights)
-        Pass(gpu, "shooting/weights", defines=resolution, slots=reads).draw(weights_target)
+        Pass(gpu, "solvers/shooting/weights", defines=resolution, slots=reads).draw(weights_target)
         gpu.release_all(weights_target)
         self.add_books = Pass(
-            gpu, "shooting/books", defines=lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE")
+            gpu, "solvers/shooting/books", defines=lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE")
         )
 
     @property
@@ -343,7 +345,9 @@ class ShotStages:
         }
         defines |= lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE")
         label = f"shooting/receive {'flat' if flat else 'shaped'} {'near' if near else 'far'}"
-        return Pass(gpu, "shooting/receive", defines=defines, slots={"projection": self.projection.glsl}, label=label)
+        return Pass(
+            gpu, "solvers/shooting/receive", defines=defines, slots={"projection": self.projection.glsl}, label=label
+        )
 
     def release(self) -> None:
         release_all(self._gpu, self)

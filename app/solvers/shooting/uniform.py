@@ -21,11 +21,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.lightmap import Lightmap
 from app.gpu import Gpu, ReadBack, Texture
-from app.parts import whole
+from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64, Material
-from app.solvers.base import EnergyBook, StepReport
+from app.solvers.base import EnergyBalance, StepReport
 from app.solvers.shooting.options import ShootingOptions, highest_level
 from app.solvers.shooting.shot import Audit, AuditTargets, Shot, ShotPasses, powers_of
 from app.solvers.shooting.stages import (
@@ -38,6 +37,7 @@ from app.solvers.shooting.stages import (
     ShotBuffers,
     ShotStages,
 )
+from app.util.parts import whole
 
 # Large patches shoot first, and finer ones what those leave once so little of the emitted power is unshot. What is left then is
 # more here and less there: light that hardly leaves its corner. So they end once they hold so many times the residual asked for.
@@ -85,7 +85,7 @@ class UniformShooting(ShotPasses):
         self._weigh_scene()
         self._divide_emitters()
         if self.lightmap.storage != "fixed8":  # 8 bits do not hold what a small one gives
-            self.buffers.divide_at(self.lightmap.nodes.surfaces.cut, FEET)
+            self.buffers.divide_at(self.lightmap.pool.surfaces.cut, FEET)
         self.report = StepReport(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
 
     def set_options(self, options: ShootingOptions) -> None:
@@ -161,7 +161,7 @@ class UniformShooting(ShotPasses):
         others may be owed light there."""
         if self.lightmap.storage == "fixed8":
             return
-        power = self.lightmap.emission().sum(-1, dtype=np.float64) * self.lightmap.nodes.surfaces.area
+        power = self.lightmap.emission().sum(-1, dtype=np.float64) * self.lightmap.pool.surfaces.area
         slots = np.arange(len(power))
         largest, finest = (self._levels_of(slots, choice) for choice in (self._choice, self.stages.choices[-1]))
         self.buffers.divide(power, MOST * self._emitted.sum(), largest, finest, self._levels_above(slots))
@@ -224,14 +224,14 @@ class UniformShooting(ShotPasses):
             self.shots = self.report.shots
         return self.report
 
-    def books(self) -> EnergyBook:
+    def books(self) -> EnergyBalance:
         """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
         self.finish()
         absorbed, unshot, reflectance = self._tile_sums()
         ledger = np.frombuffer(self.buffers.ledger.read(), np.float32).reshape(LEDGER_ROWS, BATCH, 4)
         escaped, blackened, _ = ledger[..., :3].astype(np.float64).sum(1) * self._watt
         area = absorbed[3] / self.lightmap.unit
-        return EnergyBook(
+        return EnergyBalance(
             self._emitted,
             absorbed[:3] + blackened,
             escaped,
@@ -241,8 +241,8 @@ class UniformShooting(ShotPasses):
         )
 
     def audit(self, corner: tuple[int, int]) -> Audit:
-        """What becomes of a shot from the patch with this lower corner [texels of the node set] if it shot now. Changes no light.
-        The patch must hold some residual."""
+        """What becomes of a shot from the patch with this lower corner [texels of the tile pool] if it shot now. Changes no
+        light. The patch must hold some residual."""
         self.finish()
         runs = np.zeros((self.buffers.runs.width, 4), np.float32)
         level = self.patch_edge(corner).bit_length() - 1
@@ -280,23 +280,23 @@ class UniformShooting(ShotPasses):
             yield
 
     def patch_edge(self, texel: tuple[int, int]) -> int:
-        """Texels along the edge of the largest patch that a texel (column, row) of the node set may shoot from now: the level, or
-        as much finer as an audit made it."""
+        """Texels along the edge of the largest patch that a texel (column, row) of the tile pool may shoot from now: the level,
+        or as much finer as an audit made it."""
         slot, finer = self._slot_at(texel), self.buffers.finer_at(texel)
         if finer > 0:
             return 1 << max(self._level_of(slot, self.stages.choices[-1]) + 1 - finer, 0)
         return 1 << self._level_of(slot, self._choice)
 
     def _slot_at(self, texel: tuple[int, int]) -> int:
-        nodes = self.lightmap.nodes
-        return texel[1] // nodes.tile * nodes.columns + texel[0] // nodes.tile
+        pool = self.lightmap.pool
+        return texel[1] // pool.tile * pool.columns + texel[0] // pool.tile
 
     def _level_of(self, slot: int, choice: ChoiceStages) -> int:
         return int(self._levels_of(np.array([slot]), choice)[0])
 
     def _levels_of(self, slots: NDArray[np.int64], choice: ChoiceStages) -> NDArray[np.int64]:
         """The largest that patches of leaves have by this choice."""
-        return np.clip(choice.level - self._levels_above(slots), 0, highest_level(self.lightmap.nodes.tile))
+        return np.clip(choice.level - self._levels_above(slots), 0, highest_level(self.lightmap.pool.tile))
 
     def _levels_above(self, slots: NDArray[np.int64]) -> NDArray[np.int64]:
         """By how much patches of leaves are finer, as their texels are coarser."""

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
 
-from app.picking import leaf_at
+from app.session.picking import leaf_at
 from app.ui import theme, widgets
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.session import Session
+    from app.session.session import Session
 
 REFRESH_SECONDS = 0.25  # between two pictures of it
 MOST_PX = 512  # along its longer edge

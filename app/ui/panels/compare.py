@@ -11,7 +11,7 @@ from app.ui.state import State
 
 if TYPE_CHECKING:
     from app.compare.comparison import Comparison
-    from app.session import Session
+    from app.session.session import Session
 
 ICONS = theme.ICONS
 VIEWS = ("solution", "reference", "split", "error")

@@ -11,7 +11,7 @@ from app.ui import theme, widgets
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.session import Session
+    from app.session.session import Session
 
 MOST_POINTS = 400  # per curve: more cannot be told apart in a panel
 SMALLEST = 1e-6  # of the power emitted, for the logarithmic axis

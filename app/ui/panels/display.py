@@ -12,7 +12,7 @@ from app.ui.panels import compare
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.session import Session
+    from app.session.session import Session
 
 SCALED, DEVELOPED = ("false_colour_log", "false_colour_max"), ("tone_map", "exposure")
 COMPARED = ("show", "split")  # the Compare panel has them

@@ -12,8 +12,8 @@ from app.ui.panels import atlas
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.picking import Picked
-    from app.session import Session
+    from app.session.picking import Picked
+    from app.session.session import Session
 
 REFRESH_SECONDS = 0.25  # between two pictures of it
 

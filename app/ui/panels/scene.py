@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from imgui_bundle import imgui
 
-from app.render.develop import encode_srgb
+from app.render.tone_mapping import encode_srgb
 from app.ui import theme, widgets
 from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
-    from app.session import Session
+    from app.session.session import Session
 
 TALL_EM = 53.0  # a window in which the whole panel has room
 ROWS_SHOWN = 5  # of the material list before it scrolls

@@ -12,7 +12,7 @@ from app.ui import theme, widgets
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.session import Session
+    from app.session.session import Session
 
 ICONS = theme.ICONS
 BAR_EM = 0.5  # height of the bars

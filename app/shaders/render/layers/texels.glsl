@@ -1,8 +1,8 @@
 // Texel density: grey on target, blue up to 2 octaves too coarse, orange up to 2 too fine.
 #include "common/atlas.glsl"
 uniform usampler2D t_normal_ids;
-uniform sampler2D t_facets;    // ∂p/∂u, ∂p/∂v per atlas texel, solver frame
-uniform float u_target_texel;  // edge of a texel at the density aimed at, solver frame
+uniform sampler2D t_facets;    // ∂p/∂u, ∂p/∂v per atlas texel, solver space
+uniform float u_target_texel;  // edge of a texel at the density aimed at, solver space
 
 vec3 layer_colour(ivec2 texel_px) {
     int width = textureSize(t_facets, 0).x;

@@ -1,0 +1,180 @@
+"""The triangles of a scene as they are drawn: corners shared, and where there are many, cut by place into clusters.
+
+Clusters that a view does not see are left out, and the others come from near to far, so that what is hidden costs no shading.
+Where two faces lie in one plane, a depth test shows the one that was drawn first: triangles that overlap another one of their
+plane come before all others, in the scene's order. So no picture depends on the order of clusters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.charts import Charts
+from app.scene.model import F64, Scene
+
+Array = NDArray[np.generic]
+Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+CLUSTERED = 4096  # triangles from which on clusters pay
+CLUSTER = 128  # triangles
+MORTON_BITS = 10  # along each axis
+SAME_PLANE = 1e-4  # of the normal and, in the solver space, of the distance: below that, planes are compared as one
+TOUCHING = 1e-6  # solver space: what overlaps by no more only shares an edge, to single precision
+COMPARED = 512  # neighbours in its plane with which a triangle is compared, at most
+
+VERTEX = np.dtype([("in_position", "f4", 3), ("in_uv_front", "f4", 2), ("in_uv_back", "f4", 2), ("in_material", "u4")])
+VERTEX_FORMAT = {"in_position": "3f", "in_uv_front": "2f", "in_uv_back": "2f", "in_material": "1u"}
+
+
+@dataclass(frozen=True, eq=False)
+class Clusters:
+    """Runs of triangles.
+
+    lower, upper (k, 3): corners of their boxes, solver space; first (k + 1,): the first triangle of each, and their
+    number; fixed: that many are drawn before the others, in this order.
+    """
+
+    lower: F64
+    upper: F64
+    first: Ints
+    fixed: int
+
+    def seen(self, clip_from_local: F64) -> Ints:
+        """Those that a view (4, 4) may see, in drawing order: the fixed ones, then the others from near to far."""
+        x, y, _, w = clip_from_local
+        # Neither near nor far plane: what lies beyond them is drawn at them, see render/frame.py
+        sides = np.stack([w + x, w - x, w + y, w - y])
+        middle, half = (self.lower + self.upper) / 2, (self.upper - self.lower) / 2
+        inside = (middle @ sides[:, :3].T + sides[:, 3] + half @ np.abs(sides[:, :3].T) >= 0).all(1)
+        eye = np.linalg.solve(np.stack([x, y, w])[:, :3], -np.array([x[3], y[3], w[3]]))
+        away = np.linalg.norm(middle - eye, axis=1)
+        away[: self.fixed] = -1.0
+        order = np.argsort(away, kind="stable")
+        return np.asarray(order[inside[order]])
+
+    def triangles(self, order: Ints) -> Ints:
+        """The triangles of these, one run after another."""
+        count = self.first[order + 1] - self.first[order]
+        end = np.cumsum(count)
+        return np.asarray(np.arange(count.sum()) + np.repeat(self.first[order] - end + count, count))
+
+
+@dataclass(frozen=True, eq=False)
+class VisibleMesh:
+    """vertices: (v,) VERTEX; corners: (n, 3) u32, its rows the triangles in drawing order; triangle: (n,) of the scene, of each
+    row; clusters: None where there are few triangles."""
+
+    vertices: Array
+    corners: NDArray[np.uint32]
+    triangle: Ints
+    clusters: Clusters | None
+
+
+def visible_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
+    """local (positions, 3): of the scene, solver space."""
+    vertices, corners = _shared_vertices(scene, charts, local)
+    count = len(corners)
+    if count < CLUSTERED:
+        return VisibleMesh(vertices, corners, np.arange(count), None)
+    points = local[scene.triangles]
+    fixed = _overlaps_in_plane(points)
+    cluster = np.empty(count, np.int64)
+    for mine, order in ((fixed, np.arange(fixed.sum())), (~fixed, _morton_order(points[~fixed].mean(1)))):
+        cluster[np.flatnonzero(mine)[order]] = np.arange(len(order)) // CLUSTER
+    order = np.lexsort((cluster, ~fixed))  # stable: within a cluster in the scene's order
+    of, is_fixed = cluster[order], fixed[order]
+    first = np.flatnonzero(np.r_[True, (of[1:] != of[:-1]) | (is_fixed[1:] != is_fixed[:-1])])
+    clusters = Clusters(
+        lower=np.minimum.reduceat(points.min(1)[order], first),
+        upper=np.maximum.reduceat(points.max(1)[order], first),
+        first=np.r_[first, count],
+        fixed=int(is_fixed[first].sum()),
+    )
+    return VisibleMesh(vertices, corners[order], order, clusters)
+
+
+def _shared_vertices(scene: Scene, charts: Charts, local: F64) -> tuple[Array, NDArray[np.uint32]]:
+    """One vertex for all corners that are alike: position, atlas texel of front and back, -1 without a chart, material."""
+    count = len(scene.triangles)
+    data = np.zeros((count, 3), VERTEX)
+    data["in_position"] = local[scene.triangles]
+    data["in_uv_front"] = data["in_uv_back"] = -1.0
+    for side, uv in enumerate(("in_uv_front", "in_uv_back")):
+        faces = np.flatnonzero(charts.face_back == bool(side))
+        data[uv][charts.face_triangle[faces]] = charts.face_uv[faces]
+    data["in_material"] = scene.material_ids[:, None]
+    flat = data.reshape(-1)
+    # Number what has been told apart so far together with one more property, in turn: numbers stay below 2³²
+    number = np.zeros(3 * count, np.uint64)
+    for name, more in (("in_position", 3), ("in_uv_front", 2), ("in_uv_back", 2), ("in_material", 1)):
+        words = np.ascontiguousarray(flat[name]).view(np.uint32).reshape(-1, more)
+        for word in words.T:
+            number = _numbers(number << np.uint64(32) | word)
+    _, example = np.unique(number, return_index=True)
+    return flat[example], number.reshape(-1, 3).astype(np.uint32)
+
+
+def _numbers(values: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Equal numbers, from 0, for equal values."""
+    return np.unique(values, return_inverse=True)[1].astype(np.uint64)
+
+
+def _morton_order(centres: F64) -> Ints:
+    """(n, 3) points along a Z-curve through their cube."""
+    if not len(centres):
+        return np.zeros(0, np.int64)
+    lower, extent = centres.min(0), float(np.ptp(centres, axis=0).max())
+    cells = ((centres - lower) / max(extent, 1e-300) * (2**MORTON_BITS - 1)).astype(np.int64)
+    code = np.zeros(len(centres), np.int64)
+    for bit in range(MORTON_BITS):
+        for axis in range(3):
+            code |= (cells[:, axis] >> bit & 1) << (3 * bit + axis)
+    return np.asarray(np.argsort(code, kind="stable"))
+
+
+def _overlaps_in_plane(points: F64) -> Mask:
+    """Whether a triangle (points (n, 3, 3)) overlaps another one of its plane, or has more neighbours than are compared."""
+    count, found, row = len(points), np.zeros(len(points), bool), np.arange(len(points))
+    normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    steep = (np.abs(normal) > 0.5).argmax(1)  # an axis that the plane is not parallel to: a unit vector has such
+    normal *= np.sign(normal[row, steep])[:, None]  # either winding
+    plane = np.concatenate([normal, (normal * points.mean(1)).sum(1, keepdims=True)], 1)
+    across = (steep[:, None] + [1, 2]) % 3
+    flat = np.take_along_axis(points, across[:, None], 2)  # (n, 3, 2), seen along that axis
+    (u0, v0), (u1, v1) = (flat.min(1) + TOUCHING).T, (flat.max(1) - TOUCHING).T
+    for shift in (0.0, 0.5):  # or rounding would part equal planes
+        of = np.zeros(count, np.uint64)
+        for cell in np.floor(plane / SAME_PLANE + shift).T:
+            of = _numbers(of << np.uint64(32) | (cell + (1 << 30)).astype(np.uint64))
+        order = np.lexsort((u0, of))
+        here = np.arange(count)
+        for ahead in range(1, COMPARED + 1):
+            here = here[: np.searchsorted(here, count - ahead)]
+            a, b = order[here], order[here + ahead]
+            near = (of[a] == of[b]) & (u0[b] < u1[a])
+            here, a, b = here[near], a[near], b[near]
+            if not len(here):
+                break
+            boxes = (v0[a] < v1[b]) & (v0[b] < v1[a])
+            a, b = a[boxes], b[boxes]
+            hit = ~_apart(flat[a], flat[b])
+            found[a[hit]] = found[b[hit]] = True
+        found[order[here]] = True
+    return found
+
+
+def _apart(a: F64, b: F64) -> Mask:
+    """Whether pairs of triangles (m, 3, 2) have an edge, of either, with one on this side and the other on that."""
+    apart = np.zeros(len(a), bool)
+    for one, other in ((a, b), (b, a)):
+        edge = np.roll(one, -1, 1) - one
+        across = np.stack([-edge[..., 1], edge[..., 0]], -1)
+        across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-300)
+        mine, others = (np.einsum("mei,mki->mek", across, triangle) for triangle in (one, other))
+        apart |= (others.min(-1) > mine.max(-1) - TOUCHING).any(1) | (others.max(-1) < mine.min(-1) + TOUCHING).any(1)
+    return apart

@@ -1,0 +1,1 @@
+"""Milliseconds: of shots, passes and frames."""

@@ -1,0 +1,190 @@
+"""``glowtree bench frames``: milliseconds per frame of the viewer at 1280×720 while it shoots, by part.
+
+The scene opens as in the window, beside the first frames. A frame is the window's own, drawn into a texture instead: hear and
+shoot, build the interface and draw it with the view, wait until the GPU has done it. Every part ends with glFinish, so that its
+time is its own. CPU time is that of the whole process over all cores: on a software rasteriser it includes the GPU's work, and
+other programs on the machine do not change it.
+
+With ``--drag`` a hand moves the sliders of the quadtrees meanwhile, a little in each frame: see drag.py.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from app.atlas.options import AtlasOptions
+from app.bench.speed.drag import DRAGGED, drag
+from app.errors import UserError
+from app.gpu import Gpu, gpu_context
+from app.options import from_flags
+from app.session.pacing import Turns
+from app.session.session import Session
+from app.solvers import ShootingOptions
+from app.ui.app import Ui
+from app.ui.state import Pace
+from app.util.console import Console
+from app.viewer.ui_frame import UiFrame
+
+SIZE = (1280, 720)
+PARTS = ("hear", "shoot", "draw")
+WARM_UP = 30  # frames: shaders are compiled, the panels stand
+FRAMES = 300
+SLOW = 1e3 / 30  # ms
+GROWTH = 1.0  # s from opening on, in which a tree has grown visibly
+
+
+def bench_frames(flags: argparse.Namespace) -> int:
+    """Print what a frame costs. Raises UserError."""
+    if flags.drag and not flags.adaptive:
+        raise UserError("--drag: only --adaptive has the sliders that it moves")
+    console = Console(quiet=flags.json)
+    with gpu_context() as gpu, console.progress("frames") as tell:
+        session = Session(
+            gpu, shooting=from_flags(ShootingOptions, flags), atlas=from_flags(AtlasOptions, flags), expose_on_open=True
+        )
+        tell(f"opening {flags.scene}", 0.0)
+        session.open(flags.scene)
+        viewer = _Viewer(gpu, session)
+        try:
+            times = _measure_drags(viewer, tell) if flags.drag else _measure(viewer)
+        finally:
+            viewer.release()
+        values = {"scene": session.name, "renderer": gpu.limits.renderer, "texels": session.stats.texels, **times}
+        session.release()
+    console.result(values, _drag_table(values) if flags.drag else _table(values))
+    return 0
+
+
+class _Viewer:
+    """The viewer's frames, drawn into a texture."""
+
+    def __init__(self, gpu: Gpu, session: Session) -> None:
+        self._gpu, self.session = gpu, session
+        self._texture = gpu.texture(SIZE, 4, "f1")
+        self._target = gpu.target(self._texture)
+        self._ui = Ui()
+        self._frame = UiFrame(gpu, self._ui, whole=False)
+        self._turns, self._seconds = Turns(), 0.0
+        gpu.timers.enabled = True  # as in the window
+
+    def open(self) -> list[list[float]]:
+        """The frames beside which the scene is opened. Raises UserError."""
+        rows = []
+        while self.session.loading is not None:
+            rows.append(self.frame())
+        if not self.session.opened:
+            raise UserError(self.session.message or f"{self.session.name}: did not open")
+        return rows
+
+    def frame(self, options: ShootingOptions | None = None) -> list[float]:
+        """One frame: milliseconds by part, and of CPU time. options: that a hand at a slider asks for."""
+        session, held = self.session, options is not None
+        cpu, clock = time.process_time(), [time.perf_counter()]
+        session.poll()
+        clock.append(time.perf_counter())
+        shoot, look = self._turns.next(self._seconds) if session.shooting_goes_on else (False, True)
+        if shoot:
+            session.advance(budget_ms=Pace().frame_budget, shots=1, brisk=held)
+        self._gpu.ctx.finish()
+        clock.append(time.perf_counter())
+        if options is not None and options != session.shooting:
+            session.set_shooting(options)
+        self._frame.draw(session, self._target, size=SIZE, look=look)
+        self._gpu.ctx.finish()
+        clock.append(time.perf_counter())
+        self._seconds = clock[-1] - clock[0]
+        return [*(np.diff(clock) * 1e3), (time.process_time() - cpu) * 1e3]
+
+    def release(self) -> None:
+        self._gpu.timers.enabled = False
+        self._frame.release()
+        self._ui.release()
+        self._gpu.release_all(self._target, self._texture)
+
+
+def _measure(viewer: _Viewer) -> dict[str, Any]:
+    opening = viewer.open() + [viewer.frame() for _ in range(WARM_UP)]
+    rows = []
+    for _ in range(FRAMES):
+        if viewer.session.converged:
+            viewer.session.restart()
+        rows.append(viewer.frame())
+    first = np.array(opening)[1:, :-1].sum(1)  # the very first builds the interface
+    return _summary(rows) | {"opening_worst_ms": float(first.max())}
+
+
+def _measure_drags(viewer: _Viewer, tell: Callable[[str, float], None]) -> dict[str, Any]:
+    """How the tree grows, and frames while a hand is at each slider."""
+    viewer.open()
+    session, start = viewer.session, time.perf_counter()
+    opened = session.lightmap.tiles
+    while time.perf_counter() - start < GROWTH:
+        viewer.frame()
+    grown = session.lightmap.tiles
+    for _ in range(WARM_UP):
+        viewer.frame()
+    drags = {}
+    for nth, name in enumerate(DRAGGED):
+        tell(f"dragging {name}", nth / len(DRAGGED))
+        rows = [viewer.frame(options) for options in drag(name, session.shooting)]
+        drags[name] = _summary(rows) | {"leaves": session.lightmap.tiles}
+    return {"leaves_opened": opened, "leaves_after_1_s": grown, "drags": drags}
+
+
+def _summary(rows: list[list[float]]) -> dict[str, Any]:
+    """Of frames as ``_Viewer.frame`` returns them."""
+    parts, cpu = np.array(rows)[:, :-1], np.array(rows)[:, -1]
+    whole = parts.sum(1)
+    return {
+        "frames": len(rows),
+        "median_ms": float(np.median(whole)),
+        "p99_ms": float(np.percentile(whole, 99)),
+        "worst_ms": float(whole.max()),
+        "frames_per_second": float(1e3 / whole.mean()),
+        "slow_frames": int((whole > SLOW).sum()),
+        "cpu_ms": float(cpu.mean()),
+        "parts_ms": dict(zip(PARTS, np.median(parts, 0).tolist(), strict=True)),
+    }
+
+
+def _title(values: dict[str, Any]) -> str:
+    size = f"{SIZE[0]}×{SIZE[1]}"
+    return f"{values['renderer']}: {values['scene']}, {values['texels']:,} texels, {size}, 1 shot per frame"
+
+
+def _table(values: dict[str, Any]) -> str:
+    lines = [
+        _title(values),
+        "",
+        f"median {values['median_ms']:.1f} ms ({1e3 / values['median_ms']:.0f} frames/s), "
+        f"99 % below {values['p99_ms']:.1f} ms, worst {values['worst_ms']:.1f} ms, CPU {values['cpu_ms']:.1f} ms",
+        f"while the scene opens, and the first {WARM_UP} frames after: worst {values['opening_worst_ms']:.1f} ms",
+        *_parts(values["parts_ms"]),
+    ]
+    return "\n".join(lines)
+
+
+def _drag_table(values: dict[str, Any]) -> str:
+    lines = [
+        _title(values),
+        f"{values['leaves_opened']:,} leaves when opened, {values['leaves_after_1_s']:,} after {GROWTH:g} s",
+    ]
+    for name, row in values["drags"].items():
+        lines += [
+            "",
+            f"dragging {name}, {row['frames']} frames: median {row['median_ms']:.1f} ms, 99 % below {row['p99_ms']:.1f} ms, "
+            f"worst {row['worst_ms']:.1f} ms, {row['frames_per_second']:.1f} frames/s, CPU {row['cpu_ms']:.1f} ms",
+            f"{row['slow_frames']} frames above {SLOW:.0f} ms; {row['leaves']:,} leaves at the end",
+            *_parts(row["parts_ms"]),
+        ]
+    return "\n".join(lines)
+
+
+def _parts(parts: dict[str, float]) -> list[str]:
+    total = sum(parts.values())
+    return [f"  {name:<6}{ms:7.2f} ms  {ms / total:4.0%}" for name, ms in parts.items()]

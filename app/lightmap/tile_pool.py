@@ -1,0 +1,377 @@
+"""A scene cut into leaf tiles, ready for the GPU: plain arrays, made in any thread. See lightmap.py for what they mean."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.charts import Charts
+from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents, uniform_leaves
+from app.atlas.visible_mesh import VisibleMesh, visible_mesh
+from app.errors import UserError
+from app.lightmap.receivers import KIND, TileTexels, receivers, tile_kinds
+from app.lightmap.tiles import Tiles
+from app.scene.model import F32, F64, Scene
+
+Array = NDArray[np.generic]
+ScalarT = TypeVar("ScalarT", bound=np.generic)
+
+MAX_FACETS = (1 << 24) - 2  # item ids are held as floats, see common/item.glsl
+TABLE_WIDTH = 2048  # columns of the facet table
+UNCHARTED = 16777215.0  # item of a side that has no texels, see common/item.glsl
+
+
+@dataclass(frozen=True, eq=False)
+class SolverSpace:
+    """World [m] to solver space (radius 1) and back: x_world = centre + scale·x_local."""
+
+    centre: F64
+    scale: float
+
+    @staticmethod
+    def of(scene: Scene) -> SolverSpace:
+        lower, upper = scene.bounds
+        return SolverSpace((lower + upper) / 2, float(np.linalg.norm(upper - lower) / 2))
+
+    def local_from_world(self, points: F64) -> F64:
+        return (points - self.centre) / self.scale
+
+    def world_from_local(self, points: F64) -> F64:
+        return self.centre + points * self.scale
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """How a tile pool gets so many ``slots``: the first ``staying`` are as before, but that leaves which lay beyond them, in the
+    slots ``old`` (n,), are now in those of ``new`` (n,), which were free."""
+
+    slots: int
+    staying: int
+    old: NDArray[np.int64]
+    new: NDArray[np.int64]
+
+    def array(self, array: Any, value: float) -> Any:
+        """What was kept for each slot, as it is to be kept now; ``value`` in slots that are new."""
+        more = np.full((self.slots - self.staying, *array.shape[1:]), value, array.dtype)
+        moved = np.concatenate([array[: self.staying], more])
+        moved[self.new] = array[self.old]
+        return moved
+
+
+class TilePool:
+    """Leaf tiles side by side in one rectangle of ``columns``×``rows`` slots, and the tables that go with them.
+
+    tile: edge of a leaf [texels], t below; tiles: number of slots; used (tiles,) bool: those that hold a leaf; adaptive: whether
+    leaves may be of several levels; depth: the level in which pages are counted, that of the finest leaf or one more.
+    leaves, surfaces, albedo_tiles, emission_tiles: of every slot, empty where it is not used.
+    occluders: of the visibility map; flat_spans, shaped_tiles: the receivers.
+    Raises UserError where facets and materials do not fit the 32 bits of a texel's ids.
+    """
+
+    def __init__(
+        self, scene: Scene, charts: Charts, leaves: Leaves | None = None, *, adaptive: bool = False, slots: int = 0
+    ) -> None:
+        """leaves: by default all of level 0; slots: room for so many, at least."""
+        self.scene, self.charts, self.adaptive, self.tile = scene, charts, adaptive, charts.tile
+        self.space = SolverSpace.of(scene)
+        self.material_bits = max(1, (len(scene.materials) - 1).bit_length())
+        if charts.facet_count > min(MAX_FACETS, (1 << (32 - self.material_bits)) - 2):
+            raise UserError(f"{charts.facet_count} facets × {len(scene.materials)} materials do not fit 32 bits")
+        self._dpdu, self._dpdv = self._facet_tangents()
+        self._facet_material = np.zeros(charts.facet_count, np.int32)
+        self._facet_material[charts.face_facet] = scene.material_ids[charts.face_triangle]
+        cut = Tiles.cut(scene, charts, uniform_leaves(charts) if leaves is None else leaves)
+        self._make_room(cut, max(len(cut), slots))
+        self.put(np.arange(len(cut)), cut)
+        self.occluders = occluders(scene, charts, self.space)
+
+    def _make_room(self, cut: Tiles, slots: int) -> None:
+        self.columns = max(1, int(np.ceil(np.sqrt(slots))))
+        none = np.full(0, -1, np.int32)
+        self.leaves = Leaves(none, none, none)
+        shape = (0, self.tile, self.tile)
+        vectors, colours = np.zeros((*shape, 3)), np.zeros((*shape, 3), np.float32)
+        self.surfaces = TexelSurfaces(
+            vectors, np.zeros(shape), colours, np.zeros(shape, np.int32), vectors, np.zeros(shape, bool)
+        )
+        self.albedo_tiles = None if cut.albedo is None else colours
+        self.emission_tiles = None if cut.emission is None else colours
+        self._kinds, self.used = np.zeros(0, KIND), np.zeros(0, bool)
+        self._texels = np.zeros(0, np.int64)  # of each slot, that cover a surface
+        self.depth = 0
+        self._pages = np.zeros([side // self.tile for side in self.charts.size[::-1]], np.uint32)
+        nowhere = np.empty(0, np.int64)
+        self.resize(Moves(slots, 0, nowhere, nowhere))
+
+    def resize(self, moves: Moves) -> None:
+        """Have another number of slots, in rows as long as before, with the leaves where ``moves`` has them."""
+        self.leaves = _moved(self.leaves, moves, -1)
+        self.surfaces = _moved(self.surfaces, moves, 0)
+        if self.albedo_tiles is not None:
+            self.albedo_tiles = moves.array(self.albedo_tiles, 1.0)
+        if self.emission_tiles is not None:
+            self.emission_tiles = moves.array(self.emission_tiles, 1.0)
+        self._kinds, self.used = moves.array(self._kinds, 0), moves.array(self.used, False)
+        self._texels = moves.array(self._texels, 0)
+        self.surfaces.face[moves.staying :] = -1
+        self.tiles, self.rows = moves.slots, max(1, -(-moves.slots // self.columns))
+        self.size = (self.columns * self.tile, self.rows * self.tile)
+        self._turn_pages(moves.new, moves.new + 1)
+        self.flat_spans, self.shaped_tiles = self.receivers_of(np.flatnonzero(self.used))
+
+    # -- leaves that come and go ---------------------------------------------------------------------------------------
+
+    def put(self, slots: NDArray[np.int64], tiles: Tiles) -> None:
+        """Let these slots hold these tiles."""
+        for mine, given in ((self.leaves, tiles.leaves), (self.surfaces, tiles.surfaces)):
+            for field in dataclasses.fields(mine):
+                getattr(mine, field.name)[slots] = getattr(given, field.name)
+        for own, colours in ((self.albedo_tiles, tiles.albedo), (self.emission_tiles, tiles.emission)):
+            if own is not None:
+                own[slots] = 1.0 if colours is None else colours
+        self._texels[slots] = (tiles.surfaces.face >= 0).sum((1, 2))
+        self._kinds[slots] = tile_kinds(self._tile_texels(tiles), self._facet_material)
+        self.used[slots] = True
+        self._fit_pages()
+        self._turn_pages(slots, slots + 1)
+        if self.emission_tiles is not None:  # finer texels hold other shares of an image
+            self.__dict__.pop("emission_weights", None)
+        self.flat_spans, self.shaped_tiles = self.receivers_of(np.flatnonzero(self.used))
+
+    def receivers_of(self, slots: NDArray[np.int64]) -> tuple[F32, F32]:
+        """Flat spans and shaped tiles of these slots, in ascending order, see receivers.py."""
+        return receivers(self._kinds, slots, self.leaves, self.columns, self.tile)
+
+    def free(self, slots: NDArray[np.int64]) -> None:
+        """Let these slots hold nothing. The receivers follow with the next ``put``."""
+        self.used[slots] = False
+        self._turn_pages(slots, np.zeros_like(slots))
+        self.leaves.level[slots] = self.leaves.x[slots] = self.leaves.y[slots] = -1
+        self.surfaces.face[slots] = -1
+        self.surfaces.area[slots] = 0.0
+
+    def _fit_pages(self) -> None:
+        """Count pages in the level of the finest leaf; in finer ones too, until they are two levels finer."""
+        finest = int(self.leaves.level.max(initial=0))
+        if finest > self.depth:
+            times = 1 << (finest - self.depth)
+            self._pages = self._pages.repeat(times, 0).repeat(times, 1)
+        elif finest < self.depth - 1:
+            step = 1 << (self.depth - finest)
+            self._pages = np.ascontiguousarray(self._pages[::step, ::step])
+        else:
+            return
+        self.depth = finest
+
+    def _turn_pages(self, slots: NDArray[np.int64], numbers: NDArray[np.int64]) -> None:
+        """Write these numbers where the leaves of these slots are."""
+        self.__dict__.pop("_leaf_table", None)
+        height, width = self._pages.shape
+        for level in np.unique(self.leaves.level[slots]).tolist():
+            mine = self.leaves.level[slots] == level
+            side = 1 << (self.depth - level)
+            cells = self._pages.reshape(height // side, side, width // side, side).swapaxes(1, 2)
+            cells[self.leaves.y[slots[mine]], self.leaves.x[slots[mine]]] = numbers[mine, None, None]
+
+    def page_blocks(self, slots: NDArray[np.int64]) -> Iterator[tuple[tuple[int, int, int, int], Array]]:
+        """The rectangle (x, y, width, height) of pages of each tile of level 0 where these slots hold leaves, and the pages."""
+        leaves, side = self.leaves.only(slots[self.used[slots]]), 1 << self.depth
+        for x, y in np.unique(np.stack([leaves.x >> leaves.level, leaves.y >> leaves.level], 1), axis=0).tolist():
+            rows, columns = slice(y * side, (y + 1) * side), slice(x * side, (x + 1) * side)
+            yield (x * side, y * side, side, side), np.ascontiguousarray(self._pages[rows, columns])
+
+    @functools.cached_property
+    def visible_mesh(self) -> VisibleMesh:
+        """The triangles as they are seen: for pictures, and from points."""
+        return visible_mesh(self.scene, self.charts, self.space.local_from_world(self.scene.positions))
+
+    @functools.cached_property
+    def emission_weights(self) -> F64:
+        """(materials, 3) [m²]: the area of each material, weighted with its emission texture."""
+        covered = self.surfaces.face >= 0
+        material = self.scene.material_ids[self.charts.face_triangle[self.surfaces.face[covered]]]
+        area = self.surfaces.area[covered]
+        weights = np.zeros((len(self.scene.materials), 3))
+        for channel in range(3):
+            tint = 1.0 if self.emission_tiles is None else self.emission_tiles[covered][:, channel]
+            weights[:, channel] = np.bincount(material, area * tint, len(weights))
+        return weights
+
+    @property
+    def slots_in_use(self) -> int:
+        """Up to the last that holds a leaf."""
+        return int(np.flatnonzero(self.used)[-1]) + 1 if self.used.any() else 0
+
+    @property
+    def texel_count(self) -> int:
+        """Texels that cover a surface."""
+        return int(self._texels[self.used].sum())
+
+    def uniform_texels(self, depth: int) -> int:
+        """About as many as there would be if all leaves were of that level."""
+        used = np.flatnonzero(self.used)
+        return int((self._texels[used] * 4.0 ** (depth - self.leaves.level[used])).sum())
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """Texture name -> (height, width, components) array as the texture holds it."""
+        tiles = self.tile_arrays(np.arange(self.tiles))
+        return {name: self.image_from_tiles(array) for name, array in tiles.items()} | self._tables()
+
+    @property
+    def pages_per_texel(self) -> float:
+        """Along an edge, of the page table, for each texel of level 0."""
+        return float(2**self.depth) / self.tile
+
+    def corner(self, slot: int) -> tuple[int, int]:
+        """Column and row of a slot's first texel."""
+        return slot % self.columns * self.tile, slot // self.columns * self.tile
+
+    def corners(self, slots: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(n, 2) column and row of each slot's first texel."""
+        return np.stack([slots % self.columns, slots // self.columns], 1) * self.tile
+
+    def tiles_from_image(self, image: Array) -> Array:
+        """A tile-pool image (height, width, c) as tiles (tiles, t, t, c)."""
+        cells = image.reshape(self.rows, self.tile, self.columns, self.tile, -1).swapaxes(1, 2)
+        return cells.reshape(-1, self.tile, self.tile, image.shape[-1])[: self.tiles]
+
+    def image_from_tiles(self, tiles: Array) -> Array:
+        """Tiles (tiles, t, t, c) as a tile-pool image (height, width, c)."""
+        grid = np.zeros((self.rows * self.columns, *tiles.shape[1:]), tiles.dtype)
+        grid[: self.tiles] = tiles
+        cells = grid.reshape(self.rows, self.columns, self.tile, self.tile, -1).swapaxes(1, 2)
+        return np.ascontiguousarray(cells).reshape(self.rows * self.tile, self.columns * self.tile, -1)
+
+    def slot_at(self, uv: tuple[float, float]) -> int:
+        """The slot of the leaf at a place of the virtual atlas [texels of level 0]; -1 where there is none."""
+        tile = np.floor(np.array(uv)[:, None] / self.tile * 2.0**self.leaves.level).astype(np.int64)
+        found = np.flatnonzero(self.used & (self.leaves.x == tile[0]) & (self.leaves.y == tile[1]))
+        return int(found[0]) if len(found) else -1
+
+    def atlas_rect(self, corner: tuple[int, int], size: int) -> tuple[float, float, float, float]:
+        """The square of ``size`` texels at ``corner`` of the tile pool, as (u, v, u, v) in the virtual atlas."""
+        slot = min((corner[1] // self.tile) * self.columns + corner[0] // self.tile, self.tiles - 1)
+        texel = 0.5 ** max(int(self.leaves.level[slot]), 0)
+        u = float(self.leaves.x[slot] * self.tile + corner[0] % self.tile) * texel
+        v = float(self.leaves.y[slot] * self.tile + corner[1] % self.tile) * texel
+        return u, v, u + size * texel, v + size * texel
+
+    def material_table(self, scene: Scene) -> F32:
+        """(materials, 2, 4): albedo ρ, exitance E = πL [W/m²]."""
+        table = np.zeros((len(scene.materials), 2, 4), np.float32)
+        table[:, 0, :3] = [m.albedo for m in scene.materials]
+        table[:, 1, :3] = np.pi * np.array([m.emission for m in scene.materials])
+        return table
+
+    def tile_arrays(self, slots: NDArray[np.int64]) -> dict[str, Array]:
+        """Texture name -> (n, t, t, components) of these slots, as the texture holds them."""
+        charts, face = self.charts, self.surfaces.face[slots]
+        covered = face >= 0
+        position = np.where(covered[..., None], self.space.local_from_world(self.surfaces.position[slots]), 0.0)
+        area = self.surfaces.area[slots][..., None] / self.space.scale**2
+        facet = (charts.face_facet[face] + 1).astype(np.uint32)
+        material = self.scene.material_ids[charts.face_triangle[face]].astype(np.uint32)
+        ids = np.where(covered, facet << np.uint32(self.material_bits) | material, np.uint32(0))
+        out: dict[str, Array] = {
+            "t_position_area": np.concatenate([position, area], -1).astype(np.float32),
+            "t_normal_ids": np.stack([octahedral(self.surfaces.normal[slots]), ids.astype(np.uint32)], -1),
+        }
+        for name, tiles in (("t_albedo", self.albedo_tiles), ("t_emission", self.emission_tiles)):
+            if tiles is not None:
+                out[name] = np.concatenate([tiles[slots], np.ones_like(tiles[slots][..., :1])], -1).astype(np.float16)
+        return out
+
+    @property
+    def slot_tables(self) -> dict[str, Array]:
+        """Tables that follow the leaves. t_pages (H, W, 1) u32: the slot, from 1, of each cell of t×t texels of level ``depth``;
+        t_leaves (rows, columns, 4) f32: x, y [tiles of its level] and size of a texel [texels of level 0] of each slot, 0
+        where it is free."""
+        return {"t_pages": self._pages[..., None], "t_leaves": self._leaf_table}
+
+    @functools.cached_property
+    def _leaf_table(self) -> F32:
+        leaves = np.zeros((self.rows * self.columns, 4), np.float32)
+        size = np.where(self.used, 0.5**self.leaves.level, 0.0)
+        leaves[: self.tiles, :3] = np.column_stack([self.leaves.x, self.leaves.y, size])
+        return leaves.reshape(self.rows, self.columns, 4)
+
+    def _tables(self) -> dict[str, Array]:
+        return self.slot_tables | {"t_facets": self._facet_table(), "t_materials": self.material_table(self.scene)}
+
+    def _facet_table(self) -> F32:
+        """(rows, TABLE_WIDTH, 4): per facet, from 1, two entries: ∂p/∂u per texel of level 0 and its chart; ∂p/∂v."""
+        rows = -(-2 * (self.charts.facet_count + 1) // TABLE_WIDTH)
+        table = np.zeros((rows * TABLE_WIDTH, 4), np.float32)
+        table[2 : 2 * len(self._dpdu) + 2 : 2, :3] = self._dpdu
+        table[2 * self.charts.face_facet + 2, 3] = self.charts.face_chart
+        table[3 : 2 * len(self._dpdv) + 3 : 2, :3] = self._dpdv
+        return table.reshape(rows, TABLE_WIDTH, 4)
+
+    def _tile_texels(self, tiles: Tiles) -> TileTexels:
+        s, charts = tiles.surfaces, self.charts
+        return TileTexels(
+            position=self.space.local_from_world(s.position),
+            normal=s.normal,
+            area=s.area / self.space.scale**2,
+            facet=np.where(s.face >= 0, charts.face_facet[s.face], -1).astype(np.int32),
+            size=np.exp2(-tiles.leaves.level.astype(np.float64)),
+            dpdu=self._dpdu,
+            dpdv=self._dpdv,
+        )
+
+    def _facet_tangents(self) -> tuple[F64, F64]:
+        """∂p/∂u and ∂p/∂v of each facet (facets, 3), solver space per atlas texel."""
+        out = np.zeros((2, self.charts.facet_count, 3))
+        out[:, self.charts.face_facet] = faces_tangents(self.scene, self.charts)
+        return out[0] / self.space.scale, out[1] / self.space.scale
+
+
+ArraysT = TypeVar("ArraysT", Leaves, TexelSurfaces)
+
+
+def _moved(arrays: ArraysT, moves: Moves, value: float) -> ArraysT:
+    return type(arrays)(*(moves.array(getattr(arrays, field.name), value) for field in dataclasses.fields(arrays)))
+
+
+def octahedral(normals: NDArray[np.floating]) -> NDArray[np.uint32]:
+    """Unit normals (…, 3) as 2×snorm16 on the octahedron, as GLSL's unpackSnorm2x16 reads them [Cigolle14]."""
+    n = normals / np.maximum(np.abs(normals).sum(-1, keepdims=True), 1e-30)
+    sign = np.where(n[..., :2] >= 0, 1.0, -1.0)
+    folded = np.where(n[..., 2:] < 0, (1 - np.abs(n[..., 1::-1])) * sign, n[..., :2])
+    packed = np.round(folded * 32767).astype(np.int32).astype(np.uint32) & np.uint32(0xFFFF)
+    return np.asarray(packed[..., 0] | packed[..., 1] << np.uint32(16), np.uint32)
+
+
+OCCLUDER = np.dtype([("in_position", "f4", 3), ("in_sides", "f4", 2)])
+OCCLUDER_FORMAT = {"in_position": "3f", "in_sides": "2f"}
+
+
+def occluders(scene: Scene, charts: Charts, space: SolverSpace) -> tuple[Array, Array]:
+    """What a shooter sees: vertices (v,) OCCLUDER and triangles (m, 3) u32.
+
+    in_sides: the items of front and back, facet from 1 or UNCHARTED, of the one triangle that has this vertex last (flat values
+    come from there). The other two corners share any vertex in their place: one vertex per triangle, not three.
+    """
+    count = len(scene.triangles)
+    sides = np.full((count, 2), UNCHARTED, np.float32)
+    sides[charts.face_triangle, charts.face_back.astype(int)] = charts.face_facet + 1
+    last = scene.triangles[:, 2]
+    vertex_at = np.full(len(scene.positions), -1, np.int64)
+    vertex_at[last] = np.arange(count)
+    bare = np.setdiff1d(scene.triangles, last)
+    vertex_at[bare] = count + np.arange(len(bare))
+    vertices = np.zeros(count + len(bare), OCCLUDER)
+    vertices["in_position"] = space.local_from_world(scene.positions[np.concatenate([last, bare])])
+    vertices["in_sides"][:count] = sides
+    triangles = np.column_stack([vertex_at[scene.triangles[:, :2]], np.arange(count)])
+    return vertices, triangles.astype(np.uint32)
+
+
+__all__ = ["OCCLUDER_FORMAT", "Array", "Moves", "ScalarT", "SolverSpace", "TilePool", "octahedral"]

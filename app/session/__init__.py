@@ -1,0 +1,1 @@
+"""One open scene and its solution: opened, solved, paced, compared, looked at."""

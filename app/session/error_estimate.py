@@ -1,0 +1,61 @@
+"""The error that is expected of the light as it is: some points per frame, while nothing else is to be done."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+from app.estimate.error import Expectation, ExpectedError
+from app.gpu import Gpu
+from app.lightmap.lightmap import Lightmap
+from app.scene.model import F64
+
+SECONDS = 10.0  # that are spent on it, unless fewer points would be too few
+MAPS = 4  # hemicubes per part: 30 ms of a Cornell box in software
+MANY = 20_000  # triangles from which on it is one
+
+
+class Expecting:
+    """Whoever makes it calls ``forget`` before the lightmap is released.
+
+    error: None as long as it is not known, or where nothing is lit; share: of the points that have been looked from.
+    """
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._expectation: Expectation | None = None
+        self._parts: Generator[float, None, ExpectedError | None] | None = None
+        self._of: object = None
+        self.error: ExpectedError | None = None
+        self.share = 0.0
+
+    def knows(self, state: object) -> bool:
+        """Whether all is known of the light in this state."""
+        return self._of == state and self._parts is None
+
+    def part(self, lightmap: Lightmap, returned: F64, state: object) -> None:
+        """Some points of the light in this state; of another state than the last one's from the first point on. returned: see
+        EnergyBalance."""
+        if self._of != state:
+            self.changed()
+            if self._expectation is None:
+                maps = MAPS if len(lightmap.scene.triangles) < MANY else 1
+                self._expectation = Expectation(self._gpu, lightmap, maps)
+            self._of, self._parts = state, self._expectation.parts(returned, SECONDS)
+        elif self._parts is not None:
+            try:
+                self.share = next(self._parts)
+            except StopIteration as end:
+                self.error, self._parts = end.value, None
+
+    def changed(self) -> None:
+        """The light is another one."""
+        if self._parts is not None:
+            self._parts.close()
+        self._of, self._parts, self.error, self.share = None, None, None, 0.0
+
+    def forget(self) -> None:
+        """The lightmap is going."""
+        self.changed()
+        if self._expectation is not None:
+            self._expectation.release()
+            self._expectation = None

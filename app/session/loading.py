@@ -1,0 +1,88 @@
+"""From a file, or a scene that is open, to a tile pool, in a thread of its own: the window never waits for it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.atlas.charts import Charts
+from app.atlas.options import AtlasOptions
+from app.atlas.parametrize import parametrize
+from app.lightmap.quadtree import quadtree_pool
+from app.lightmap.tile_pool import Array, TilePool
+from app.render.exposure import first_exposure
+from app.scene.load import load_scene
+from app.scene.model import Scene
+from app.util.background import BackgroundTask, Progress
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """A tile pool and what of it is uploaded, how it was cut, the exposure to open it with [EV] if that was asked for, and how
+    long each stage took [s]."""
+
+    pool: TilePool
+    arrays: dict[str, Array]
+    atlas: AtlasOptions
+    exposure: float | None
+    seconds: dict[str, float]
+
+
+def read_and_unfold(
+    source: str | Path | Scene, atlas: AtlasOptions, default_light: bool, tell: Progress
+) -> tuple[Scene, Charts, dict[str, float]]:
+    """The scene, its charts, and the seconds of both stages. Raises UserError (SceneError)."""
+    start = time.perf_counter()
+    tell("reading", 0.0)
+    scene = source if isinstance(source, Scene) else load_scene(source, default_light=default_light)
+    middle = time.perf_counter()
+    tell("unfolding", 0.1)
+    charts = parametrize(
+        scene,
+        density=atlas.density,
+        texels=atlas.texels,
+        tile=atlas.tile,
+        roots=atlas.adaptive,
+        progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share),
+    )
+    return scene, charts, {"read": middle - start, "unfold": time.perf_counter() - middle}
+
+
+def load(
+    source: str | Path | Scene,
+    atlas: AtlasOptions,
+    *,
+    default_light: bool = False,
+    expose: bool = False,
+    progress: Progress | None = None,
+) -> Loaded:
+    """Read a scene, or take one as it is; unfold it, cut it into texels, and with ``expose`` find its exposure. Raises UserError
+    (SceneError)."""
+    tell: Progress = progress or (lambda stage, share: None)
+    scene, charts, seconds = read_and_unfold(source, atlas, default_light, tell)
+    start = time.perf_counter()
+    tell("cutting into texels", 0.6)
+    pool = quadtree_pool(scene, charts) if atlas.adaptive else TilePool(scene, charts)
+    exposure, arrays = first_exposure(pool) if expose else None, pool.arrays
+    _ = pool.emission_weights, pool.visible_mesh  # cached here: the window, which reads them next, does not wait
+    tell("done", 1.0)
+    return Loaded(pool, arrays, atlas, exposure, seconds | {"texels": time.perf_counter() - start})
+
+
+class Loading(BackgroundTask[Loaded]):
+    """A scene on its way, see ``load``."""
+
+    def __init__(
+        self, source: str | Path | Scene, atlas: AtlasOptions, *, default_light: bool = False, expose: bool = False
+    ) -> None:
+        self.source = source
+        super().__init__(
+            "this scene",
+            lambda tell: load(source, atlas, default_light=default_light, expose=expose, progress=tell),
+        )
+
+    @property
+    def name(self) -> str:
+        """What is loaded, for messages."""
+        return self.source.name if isinstance(self.source, Scene) else str(self.source)

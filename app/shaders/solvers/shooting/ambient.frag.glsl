@@ -1,0 +1,40 @@
+// The irradiance that all unshot light will make on average, after all its reflections [Cohen88, eq. 9], in an open scene:
+//
+//   Φ f (1 + ρf + ρ²f² + …) / A = Φ f / (A (1 - ρf))
+//
+// Φ: unshot power; ρ: mean albedo; f: share of what was shot until now that stayed in the scene; A: area of all texels.
+#include "solvers/shooting/shooter.glsl"
+
+uniform sampler2D t_unshot;  // of runs: Σ r A, and Σ |Σ r A| over tiles, summed over RGB, before the batch
+uniform sampler2D t_ledger;
+uniform sampler2D t_shooters;
+uniform int u_shots;  // of a batch that has shot since
+uniform vec3 u_albedo;
+uniform float u_area;  // solver space
+
+layout(location = 0) out vec4 out_ambient;  // a: over what was received until now, on average
+
+const float LEAST_LOST = 0.01;  // at a bounce: with less, errors of form factors would be shot ahead, a thousandfold
+const float CANCELS = 1e-6;  // under this share of Σ |Σ r A| over tiles, Σ r A is what rounding leaves
+
+void main() {
+    vec4 sum = vec4(0.0);
+    for (int i = 0; i < textureSize(t_unshot, 0).x; ++i) sum += texelFetch(t_unshot, ivec2(i, 0), 0);
+    vec3 batch = vec3(0.0);
+    for (int shot = 0; shot < u_shots; ++shot) {
+        Shooter s = load_shooter(t_shooters, shot);
+        if (s.size_px > 0) batch += s.exitance * s.area;
+    }
+    vec3 unshot = mix(vec3(0.0), sum.rgb, greaterThan(abs(sum.rgb), vec3(CANCELS * sum.a)));
+    vec3 shot = vec3(0.0), gone = vec3(0.0);
+    for (int i = 0; i < textureSize(t_ledger, 0).x; ++i) {
+        gone += texelFetch(t_ledger, ivec2(i, 0), 0).rgb + texelFetch(t_ledger, ivec2(i, 1), 0).rgb;
+        shot += texelFetch(t_ledger, ivec2(i, 2), 0).rgb;
+    }
+    vec3 stays = clamp(1.0 - gone / max(shot, vec3(1e-30)), 0.0, 1.0);
+    stays = mix(vec3(0.0), stays, greaterThan(shot, vec3(0.0)));
+    unshot -= batch * (1.0 - u_albedo * stays);  // what it shot, and what surfaces keep of that to shoot
+    vec3 ambient = unshot * stays / max(u_area * max(1.0 - u_albedo * stays, LEAST_LOST), 1e-30);
+    vec3 arrived = shot * stays / u_area;
+    out_ambient = vec4(ambient, dot(abs(ambient), vec3(1.0)) / max(dot(abs(arrived), vec3(1.0)), 1e-30));
+}

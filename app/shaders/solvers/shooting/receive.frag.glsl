@@ -1,0 +1,69 @@
+// The light of some shots on every texel, blended into H and r:
+//
+//   ΔH_j = Σ_i R_i F_ji V_ji,   Δr_j = ρ_j ΔH_j      [Coombe03, eq. 1; F_ji from the texel to the shooter's polygon]
+#define FLAT 1
+#include "common/atlas.glsl"
+#include "common/albedo.glsl"
+#include "common/item.glsl"
+#include <projection>
+#include "solvers/shooting/shooter_block.glsl"
+#include "solvers/shooting/form_factor.glsl"
+#include "solvers/shooting/visible.glsl"
+
+flat in uint v_shots;  // a bit for each shot that may light this receiver
+#if FLAT
+in vec3 v_position;
+flat in vec3 v_normal;
+flat in float v_facet;
+flat in vec3 v_albedo;
+#else
+#include "solvers/shooting/belongs.glsl"
+uniform int u_own;  // whether patches are still where they shot from
+uniform sampler2D t_position_area;
+uniform usampler2D t_normal_ids;
+uniform sampler2D t_materials;
+#endif
+
+// a: Σ_i P_i F_ji V_ji and Σ_i P_i F_ji, with P the sum of |r| over RGB: how much of its light a texel sees
+layout(location = 0) out vec4 out_irradiance;
+layout(location = 1) out vec4 out_residual;
+
+// F_ji, V_ji
+vec2 received(vec3 position, vec3 normal, float facet, Shooter s, int shot) {
+    mat3 axes = world_axes(s);
+    vec3 local = (position - s.origin) * axes;
+    vec2 FV = vec2(form_factor(position, normal, s), visible(facet, local, normal * axes, shot));
+    return local.z > COPLANAR ? FV : vec2(0.0);
+}
+
+void main() {
+    ivec2 texel_px = ivec2(gl_FragCoord.xy);
+#if FLAT
+    vec3 position = v_position, normal = v_normal;
+    vec3 albedo = v_albedo * albedo_texture(texel_px);
+    float facet = v_facet;
+#else
+    Texel texel = load_texel(t_position_area, t_normal_ids, texel_px);
+    vec3 position = texel.position, normal = texel.normal;
+    vec3 albedo = albedo_of(t_materials, texel.material, texel_px);
+    float facet = float(texel.facet), chart = chart_of(texel.facet);
+#endif
+    vec3 light = vec3(0.0);
+    vec2 share = vec2(0.0);
+    uint shots = v_shots;
+    do {
+        int shot = findLSB(shots);
+        shots &= shots - 1u;
+        Shooter s = shooter_of(shot);
+        vec2 FV = received(position, normal, facet, s, shot);
+#if !FLAT
+        // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it. Another chart in it is no part of it.
+        bool within = u_own != 0 && all(lessThan(uvec2(texel_px - s.patch_px), uvec2(s.size_px)));
+        FV = within && chart == s.chart || texel.area <= 0.0 ? vec2(0.0) : FV;
+#endif
+        light += s.exitance * FV.x * FV.y;
+        share += dot(abs(s.exitance), vec3(1.0)) * FV.x * vec2(FV.y, 1.0);
+    } while (shots != 0u);
+    out_irradiance = vec4(light, share.x);
+    out_residual = vec4(albedo * light, share.y);
+}

@@ -1,0 +1,1 @@
+"""Windows and frames: the viewer on a screen, and the same pictures without one."""

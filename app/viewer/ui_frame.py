@@ -1,0 +1,197 @@
+"""One frame of the viewer into any framebuffer: the 3-D view in its place and the interface over it.
+
+The window draws every frame with it; a headless shot with ``--ui`` draws one.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from app.errors import UserError
+from app.gpu import Framebuffer, Gpu, Pass, ShaderError, Texture
+from app.gpu.imgui import ImguiRenderer
+from app.render.false_colour import Scale, colour_map, false_colour_scale, measured
+from app.render.resolve import BORDER, TEXELS_PER_FRAME, display_size
+from app.ui import theme
+from app.ui.app import Ui
+from app.ui.state import Legend, Request
+
+if TYPE_CHECKING:
+    from app.session.session import Session
+
+LEGEND_COLOURS = 48
+SCALE_SHARE = 0.05  # of the time may go into finding the false-colour scale
+SCALE_SECONDS = 0.5  # between two searches, at least
+WARM_UP = 4  # frames until docked windows, their contents' heights and scroll bars have settled
+SAMPLES = 2  # per pixel of a headless picture, along each axis: smooth edges
+LEGEND_SIZE = 900  # px: the shorter side of a picture beyond which its legend grows with it
+STEP = 1.0 / 60.0  # s: a headless frame's time, whatever the clock says
+SCREENSHOT = "glowtree-{:04d}.png"
+
+
+class UiFrame:
+    """Owns the interface's renderer and the target of the 3-D view; borrows the interface. Whoever makes it releases
+    it.
+
+    samples: of the view, per pixel along each axis. whole: show all light as it is now; False bounds the work of a frame.
+    """
+
+    def __init__(self, gpu: Gpu, ui: Ui, *, samples: int = 1, whole: bool = True) -> None:
+        self._gpu, self._ui, self._samples, self._whole = gpu, ui, samples, whole
+        ui.use()
+        self._renderer = ImguiRenderer(gpu)
+        self._present = Pass(gpu, "imgui/present")
+        self._view: tuple[Texture, Framebuffer] | None = None
+        self._scale: Scale | None = None
+        self._scale_of: object = None
+        self._scale_due = 0.0
+
+    def draw(
+        self,
+        session: Session,
+        target: Framebuffer,
+        *,
+        size: tuple[float, float],
+        ratio: float = 1.0,
+        seconds: float = STEP,
+        look: bool = True,
+    ) -> list[Request]:
+        """Build and draw one frame into ``target``; what is left for the host to do.
+
+        size: of the window [display units]; ratio: pixels per unit, so that the target has size·ratio pixels;
+        seconds: since the last frame. look: draw the view anew, or show it as it was drawn last. Reloads shaders itself.
+        """
+        scale = self._false_colour(session)
+        legend = None if scale is None else _legend(measured(session.shown), scale)
+        data = self._ui.frame(
+            session, size=size, ratio=ratio, seconds=seconds, texture_id=self._renderer.texture_id, legend=legend
+        )
+        left, bottom, width, height = self._ui.view_rect
+        known = self._view
+        texture, view_target = self._view_of(width, height)
+        if not session.opened:
+            view_target.clear(*theme.PANEL)
+        elif look or known is not self._view:
+            session.draw(view_target, (width, height), scale=scale, samples=self._samples, whole=self._whole)
+        target.use()
+        target.clear(*theme.PANEL)
+        self._present.draw(
+            target,
+            textures={"t_image": texture},
+            uniforms={"u_corner_px": (left, bottom)},
+            viewport=(left, bottom, width, height),
+        )
+        self._renderer.draw(target, data)
+        requests = self._ui.take_requests()
+        if Request.RELOAD_SHADERS in requests:
+            self._reload()
+        return [r for r in requests if r is not Request.RELOAD_SHADERS]
+
+    def frames_to_show(self, session: Session) -> int:
+        """How many frames it takes until a change is seen everywhere."""
+        if self._whole or not session.opened:
+            return WARM_UP
+        border = BORDER[session.display.interpolation]
+        return WARM_UP + math.ceil(math.prod(display_size(session.lightmap, border)) / TEXELS_PER_FRAME)
+
+    def release(self) -> None:
+        """Give back the GL objects. The interface is still usable by another renderer, or can be released."""
+        self._ui.use()
+        self._renderer.release()
+        self._release_view()
+
+    def _view_of(self, width: int, height: int) -> tuple[Texture, Framebuffer]:
+        if self._view is None or self._view[0].size != (width, height):
+            self._release_view()
+            texture = self._gpu.texture((width, height), 4, "f1")
+            self._view = texture, self._gpu.target(texture)
+        return self._view
+
+    def _release_view(self) -> None:
+        if self._view is not None:
+            self._gpu.release_all(*self._view)
+            self._view = None
+
+    def _false_colour(self, session: Session) -> Scale | None:
+        """The scale of what is shown. Finding its top reads all light back, so that is done only now and then."""
+        if not session.opened:
+            return None
+        display = session.shown
+        kind = measured(display)
+        if kind == "off":
+            return None
+        asked = (session.lightmap, kind, display.false_colour_log, display.false_colour_max)
+        now = time.perf_counter()
+        if self._scale is None or asked != self._scale_of or (now >= self._scale_due and not display.false_colour_max):
+            self._scale = false_colour_scale(display, session.lightmap)
+            self._scale_of = asked
+            cost = time.perf_counter() - now
+            self._scale_due = now + max(SCALE_SECONDS, cost / SCALE_SHARE)
+        return self._scale
+
+    def _reload(self) -> None:
+        state = self._ui.state
+        try:
+            self._gpu.shaders.reload()
+        except ShaderError as error:
+            state.notify(str(error).strip().splitlines()[0], error=True)
+        else:
+            state.notify("shaders reloaded")
+
+
+def _legend(kind: str, scale: Scale) -> Legend:
+    colours = tuple((float(r), float(g), float(b)) for r, g, b in colour_map(LEGEND_COLOURS))
+    return Legend(kind.capitalize(), scale.unit, max(scale.low, 0.0), scale.high, scale.low > 0, colours)
+
+
+def ui_image(
+    gpu: Gpu, session: Session, size: tuple[int, int], *, measured: bool = True, panels: bool = True
+) -> NDArray[np.uint8]:
+    """The viewer's window as it would look, (height, width, 3) u8, top row first, for a ``size`` (width, height) [px].
+
+    The session is not stepped. ``measured=False`` leaves out what depends on the machine's speed, so that pictures
+    can be compared; ``panels=False`` all but the picture and the legend of its false colour.
+    """
+    limit = gpu.limits.max_texture
+    if not (1 <= min(size) and max(size) <= limit):
+        raise UserError(f"a picture of {size[0]}×{size[1]} pixels: each side must be 1 to {limit} on this GPU")
+    texture = gpu.texture(size, 4, "f1")
+    target = gpu.target(texture)
+    ui = Ui(measured=measured, live=False, scale=1.0 if panels else max(1.0, min(size) / LEGEND_SIZE))
+    ui.state.show_ui = panels
+    frame = UiFrame(gpu, ui, samples=SAMPLES)
+    try:
+        for _ in range(WARM_UP):
+            frame.draw(session, target, size=size)
+        return pixels(target, size)
+    finally:
+        frame.release()
+        ui.release()
+        gpu.release_all(target, texture)
+
+
+def pixels(target: Framebuffer, size: tuple[int, int]) -> NDArray[np.uint8]:
+    """The lower left ``size`` (width, height) of ``target``, (height, width, 3) u8, top row first. Waits for the
+    GPU.
+    """
+    image = np.frombuffer(target.read(viewport=(0, 0, *size), components=3, alignment=1), np.uint8)
+    return np.ascontiguousarray(image.reshape(size[1], size[0], 3)[::-1])
+
+
+def save_screenshot(target: Framebuffer, size: tuple[int, int], folder: Path) -> Path:
+    """Write what ``target`` shows into ``folder`` under the next free number; where it went. Raises UserError."""
+    number = 1
+    while (path := folder / SCREENSHOT.format(number)).exists():
+        number += 1
+    try:
+        Image.fromarray(pixels(target, size)).save(path)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written: {error.strerror or error}") from None
+    return path

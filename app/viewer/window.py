@@ -1,0 +1,325 @@
+"""The window: moderngl-window over pyglet gives context, events and time; every frame is poll, shoot, draw.
+
+Events go to Dear ImGui through its queue, so that a press shorter than a frame is seen; keys and mouse are answered by
+``app.ui``, which knows no window.
+"""
+
+from __future__ import annotations
+
+import os
+import string
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from imgui_bundle import imgui
+from moderngl_window import activate_context
+from moderngl_window.context.base import WindowConfig
+from moderngl_window.timers.clock import Timer
+
+from app.errors import GpuError, UserError
+from app.gpu import Gpu
+from app.session.pacing import Turns
+from app.ui.app import Ui
+from app.ui.state import Request
+from app.viewer.ui_frame import UiFrame, save_screenshot
+
+if TYPE_CHECKING:
+    from app.session.session import Session
+
+GL_VERSION = (4, 1)
+TITLE = "Glowtree"
+AWAKE_SECONDS = 1.0  # that frames go on after the last event: tooltips appear, scroll bars settle
+LOADING_PAUSE = 0.03  # s between frames while there is only a scene to wait for: loading gets the processor
+REST_SECONDS = 0.5  # between two looks around at rest; an event ends the rest at once
+NOWHERE = -3.4e38  # where Dear ImGui has the mouse when it is outside the window
+BUTTONS = {1: 0, 2: 1, 3: 2}  # left, right, middle: moderngl-window to Dear ImGui
+MODIFIERS = {
+    imgui.Key.mod_ctrl: (imgui.Key.left_ctrl, imgui.Key.right_ctrl),
+    imgui.Key.mod_shift: (imgui.Key.left_shift, imgui.Key.right_shift),
+    imgui.Key.mod_alt: (imgui.Key.left_alt, imgui.Key.right_alt),
+    imgui.Key.mod_super: (imgui.Key.left_super, imgui.Key.right_super),
+}
+# pyglet's name of a key, and Dear ImGui's
+NAMED_KEYS = """
+    RETURN:enter ESCAPE:escape BACKSPACE:backspace TAB:tab SPACE:space DELETE:delete INSERT:insert HOME:home END:end
+    PAGEUP:page_up PAGEDOWN:page_down LEFT:left_arrow RIGHT:right_arrow UP:up_arrow DOWN:down_arrow
+    MENU:menu PAUSE:pause
+    LCTRL:left_ctrl RCTRL:right_ctrl LSHIFT:left_shift RSHIFT:right_shift LALT:left_alt RALT:right_alt
+    LCOMMAND:left_super RCOMMAND:right_super LWINDOWS:left_super RWINDOWS:right_super
+    PERIOD:period COMMA:comma MINUS:minus EQUAL:equal SLASH:slash BACKSLASH:backslash SEMICOLON:semicolon
+    APOSTROPHE:apostrophe GRAVE:grave_accent BRACKETLEFT:left_bracket BRACKETRIGHT:right_bracket
+    CAPSLOCK:caps_lock NUMLOCK:num_lock SCROLLLOCK:scroll_lock PRINT:print_screen
+    NUM_ENTER:keypad_enter NUM_ADD:keypad_add NUM_SUBTRACT:keypad_subtract NUM_MULTIPLY:keypad_multiply
+    NUM_DIVIDE:keypad_divide NUM_DECIMAL:keypad_decimal NUM_EQUAL:keypad_equal
+"""
+KEY_NAMES = {
+    **dict(pair.split(":") for pair in NAMED_KEYS.split()),
+    **{f"NUM_{i}": f"keypad{i}" for i in range(10)},
+    **{f"_{i}": f"_{i}" for i in range(10)},
+    **{f"F{i}": f"f{i}" for i in range(1, 13)},
+    **{letter: letter.lower() for letter in string.ascii_uppercase},
+}
+# pyglet's events after which the window is drawn again
+EVENTS = """
+    on_key_press on_key_release on_text on_mouse_motion on_mouse_drag on_mouse_press on_mouse_release on_mouse_scroll
+    on_mouse_enter on_mouse_leave on_file_drop on_resize on_expose on_show on_activate on_deactivate on_close
+""".split()
+CURSORS = {
+    imgui.MouseCursor_.arrow: "CURSOR_DEFAULT",
+    imgui.MouseCursor_.text_input: "CURSOR_TEXT",
+    imgui.MouseCursor_.resize_all: "CURSOR_SIZE",
+    imgui.MouseCursor_.resize_ns: "CURSOR_SIZE_UP_DOWN",
+    imgui.MouseCursor_.resize_ew: "CURSOR_SIZE_LEFT_RIGHT",
+    imgui.MouseCursor_.resize_nesw: "CURSOR_SIZE_DOWN_LEFT",
+    imgui.MouseCursor_.resize_nwse: "CURSOR_SIZE_DOWN_RIGHT",
+    imgui.MouseCursor_.hand: "CURSOR_HAND",
+    imgui.MouseCursor_.not_allowed: "CURSOR_NO",
+}
+
+
+def run_window(
+    make_session: Callable[[Gpu], Session],
+    *,
+    size: tuple[int, int] = (1280, 720),
+    scenes: Sequence[str] = (),
+    suffixes: Sequence[str] = (),
+    layout_file: Path | None = None,
+    vsync: bool = True,
+    frames: int | None = None,
+) -> None:
+    """Open the window, run until it is closed, release everything.
+
+    make_session: makes the session once there is a context. size: of the window [display units]. scenes: names for
+    the menu. suffixes: of the files that can be opened. layout_file: keeps the places of the panels. frames: close
+    after so many (for tests and measurements). Raises UserError where no window can be opened, and what
+    ``make_session`` raises.
+    """
+    window = _open(size, vsync)
+    gpu = Gpu(window.ctx)
+    gpu.timers.enabled = True
+    timer = Timer()
+    try:
+        session = make_session(gpu)
+    except UserError:
+        gpu.release()
+        window.close()
+        raise
+    ui = Ui(scale=_text_scale(window), layout_file=layout_file, scenes=scenes, suffixes=suffixes)
+    frame = UiFrame(gpu, ui, whole=False)
+    try:
+        ViewerWindow(window, timer, session, frame, ui, frames).main_loop()
+    finally:
+        frame.release()
+        ui.release()
+        session.release()
+        gpu.release()
+        window.close()  # last: it takes the context along
+
+
+def no_display() -> str | None:
+    """Why no window can be opened here, in one line; None where one can."""
+    try:
+        import moderngl_window.context.pyglet.window  # noqa: F401  # its import already opens the display
+    except Exception as error:  # pyglet and X11 each raise their own
+        return _reason(error)
+    return None
+
+
+def _reason(error: Exception) -> str:
+    text = str(error).strip()
+    if type(error).__name__ == "NoSuchDisplayException" and not os.environ.get("DISPLAY"):
+        return "there is no display: DISPLAY is not set"
+    return text.splitlines()[0] if text else type(error).__name__
+
+
+def _open(size: tuple[int, int], vsync: bool) -> Any:
+    """A pyglet window with an OpenGL 4.1 core context. Raises UserError."""
+    try:
+        from moderngl_window.context.pyglet.window import Window  # its import already opens the display
+
+        window = Window(title=TITLE, size=size, gl_version=GL_VERSION, vsync=vsync, resizable=True)
+    except GpuError:
+        raise
+    except Exception as error:  # pyglet, X11, GLX and moderngl each raise their own
+        hint = "without a screen, use 'glowtree shot' or 'glowtree bake'"
+        raise UserError(f"no window with OpenGL {GL_VERSION[0]}.{GL_VERSION[1]}: {_reason(error)}; {hint}") from None
+    window.exit_key = None  # Esc first closes what lies over the view
+    window.fullscreen_key = None
+    activate_context(window=window)
+    return window
+
+
+def _text_scale(window: Any) -> float:
+    """How much larger text must be on this screen: its scale, less what the framebuffer's pixels already give."""
+    return max(1.0, float(window._window.scale) / window.pixel_ratio)
+
+
+class ViewerWindow(WindowConfig):
+    """Steps and draws a session, frame by frame, and passes events on. Owns none of what it is given."""
+
+    clear_color = None  # type: ignore[assignment]  # the frame clears; the base class allows None, its type does not
+
+    def __init__(
+        self, window: Any, timer: Timer, session: Session, frame: UiFrame, ui: Ui, frames: int | None = None
+    ) -> None:
+        super().__init__(ctx=window.ctx, wnd=window, timer=timer)
+        self._session, self._frame, self._ui, self._frames_left = session, frame, ui, frames
+        self._keys = _keys()
+        self._pyglet = window._window
+        self._held: set[imgui.Key] = set()
+        self._cursor: int | None = None
+        self._caption = ""
+        self._turns = Turns()
+        self._awake_until, self._frames_due = 0.0, 0
+        ui.use()
+        platform = imgui.get_platform_io()
+        platform.platform_get_clipboard_text_fn = lambda _context: self._pyglet.get_clipboard_text()
+        platform.platform_set_clipboard_text_fn = lambda _context, text: self._pyglet.set_clipboard_text(text)
+        ui.io.backend_flags |= imgui.BackendFlags_.has_mouse_cursors
+        self._pyglet.push_handlers(
+            on_activate=lambda: ui.io.add_focus_event(True),
+            on_deactivate=self._on_deactivate,
+            on_mouse_leave=lambda x, y: ui.io.add_mouse_pos_event(NOWHERE, NOWHERE),
+        )
+        self._pyglet.push_handlers(**dict.fromkeys(EVENTS, self._wake))
+
+    # -- frames --------------------------------------------------------------------------------------------------------
+
+    def main_loop(self) -> None:
+        """Frame after frame until the window is closed; where nothing changes, wait for an event instead."""
+        import pyglet
+
+        self.timer.start()
+        while not self.wnd.is_closing:
+            if self._at_rest():
+                pyglet.app.platform_event_loop.step(REST_SECONDS)
+                self._pyglet.dispatch_events()  # the step only queued them
+                continue
+            now, elapsed = self.timer.next_frame()
+            self.wnd.use()
+            self.wnd.render(now, min(elapsed, REST_SECONDS))
+            if not self.wnd.is_closing:
+                self.wnd.swap_buffers()
+            waiting = self._session.loading is not None or self._session.fetching is not None
+            if waiting and not self._session.shooting_goes_on:
+                time.sleep(LOADING_PAUSE)
+
+    def _wake(self, *_: object) -> None:
+        self._awake_until = time.perf_counter() + AWAKE_SECONDS
+        self._frames_due = self._frame.frames_to_show(self._session)
+
+    def _at_rest(self) -> bool:
+        """Whether another frame would look like the last one."""
+        if not self._session.at_rest or self._ui.moving or self._frames_left is not None:
+            self._wake()
+        return time.perf_counter() > self._awake_until and self._frames_due <= 0
+
+    def on_render(self, time: float, frame_time: float) -> None:
+        """Collect what is ready, shoot within the budget, draw, do what was asked for."""
+        session, state, look = self._session, self._ui.state, True
+        try:
+            session.poll(brisk=self._ui.held)
+            shoot, look = self._turns.next(frame_time) if session.shooting_goes_on else (False, True)
+            if shoot:
+                pace = state.pace
+                session.advance(budget_ms=pace.frame_budget, shots=pace.shots_per_frame, brisk=self._ui.held)
+        except UserError as error:
+            session.running = False
+            state.notify(str(error), error=True)
+        target, ratio = self.wnd.fbo, self.wnd.pixel_ratio
+        requests = self._frame.draw(session, target, size=self.wnd.size, ratio=ratio, seconds=frame_time, look=look)
+        self._show_cursor()
+        self._show_name()
+        for request in requests:
+            if request is Request.SCREENSHOT:
+                self._screenshot()
+            elif request is Request.QUIT:
+                self.wnd.is_closing = True
+        self._frames_due -= 1
+        if self._frames_left is not None:
+            self._frames_left -= 1
+            if self._frames_left <= 0:
+                self.wnd.is_closing = True
+
+    def _screenshot(self) -> None:
+        try:
+            path = save_screenshot(self.wnd.fbo, self.wnd.buffer_size, Path.cwd())
+        except UserError as error:
+            self._ui.state.notify(str(error), error=True)
+        else:
+            self._ui.state.notify(f"saved {path}")
+
+    def _show_cursor(self) -> None:
+        wanted = imgui.get_mouse_cursor()
+        if wanted != self._cursor:
+            self._cursor = wanted
+            window = self._pyglet
+            name = CURSORS.get(imgui.MouseCursor_(wanted), "CURSOR_DEFAULT")
+            window.set_mouse_visible(wanted != imgui.MouseCursor_.none)
+            window.set_mouse_cursor(window.get_system_mouse_cursor(getattr(window, name)))
+
+    def _show_name(self) -> None:
+        caption = f"{self._session.name} - {TITLE}" if self._session.opened else TITLE
+        if caption != self._caption:
+            self._caption = caption
+            self.wnd.title = caption
+
+    # -- events --------------------------------------------------------------------------------------------------------
+
+    def on_key_event(self, key: Any, action: Any, modifiers: Any) -> None:
+        """A key went down or up."""
+        known = self._keys.get(key)
+        if known is None:
+            return
+        down = action == self.wnd.keys.ACTION_PRESS
+        (self._held.add if down else self._held.discard)(known)
+        for modifier, keys in MODIFIERS.items():
+            if known in keys:
+                self._ui.io.add_key_event(modifier, any(k in self._held for k in keys))
+        self._ui.io.add_key_event(known, down)
+
+    def on_unicode_char_entered(self, char: str) -> None:
+        """Text was typed."""
+        self._ui.io.add_input_characters_utf8(char)
+
+    def on_mouse_position_event(self, x: int, y: int, dx: int, dy: int) -> None:
+        """The mouse moved."""
+        self._ui.io.add_mouse_pos_event(x, y)
+
+    def on_mouse_drag_event(self, x: int, y: int, dx: int, dy: int) -> None:
+        """The mouse moved with a button down."""
+        self._ui.io.add_mouse_pos_event(x, y)
+
+    def on_mouse_press_event(self, x: int, y: int, button: int) -> None:
+        """A mouse button went down."""
+        self._button(x, y, button, True)
+
+    def on_mouse_release_event(self, x: int, y: int, button: int) -> None:
+        """A mouse button went up."""
+        self._button(x, y, button, False)
+
+    def on_mouse_scroll_event(self, x_offset: float, y_offset: float) -> None:
+        """The wheel turned."""
+        self._ui.io.add_mouse_wheel_event(x_offset, y_offset)
+
+    def on_files_dropped_event(self, x: int, y: int, paths: list[str]) -> None:
+        """Files were dropped: the first one is opened."""
+        if paths:
+            self._ui.drop(self._session, Path(paths[0]))
+
+    def _button(self, x: int, y: int, button: int, down: bool) -> None:
+        self._ui.io.add_mouse_pos_event(x, y)
+        self._ui.io.add_mouse_button_event(BUTTONS[button], down)
+
+    def _on_deactivate(self) -> None:
+        self._held.clear()
+        self._ui.io.add_focus_event(False)
+
+
+def _keys() -> dict[int, imgui.Key]:
+    """pyglet's key constants and what Dear ImGui calls them; needs a display, as everything of pyglet.window does."""
+    from pyglet.window import key
+
+    return {getattr(key, name): imgui.Key[ours] for name, ours in KEY_NAMES.items() if hasattr(key, name)}

@@ -1,0 +1,1 @@
+"""Who sees whom: projections of the scene onto a patch's hemisphere."""
