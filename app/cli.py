@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, NoReturn
 from app import __version__
 from app.atlas.options import AtlasOptions
 from app.errors import UserError
-from app.lightmap.lightmap import STORAGE
+from app.lightmap.options import STORAGE
 from app.options import add_flags
 from app.render.options import DisplayOptions
 from app.solvers import ShootingOptions

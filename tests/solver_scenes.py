@@ -14,13 +14,17 @@ from app.atlas.charts import DEFAULT_TILE
 from app.atlas.parametrize import parametrize
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
+from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import TilePool
+from app.options import specs
 from app.scene.model import F32, F64, Material, Scene
-from app.solvers import SOLVERS, EnergyBalance, ShootingOptions, UniformShooting
+from app.solvers import EnergyBalance, ShootingOptions
 from app.solvers.shooting.options import MAX_LEVEL
 from app.solvers.shooting.shot import Audit
+from app.solvers.shooting.solver import Shooting
 from app.solvers.shooting.stages import BATCH, LEVEL, ROOT_LEVEL
+from app.util.parts import run_to_end
 from app.visibility.projections import PROJECTIONS
 
 UNIT_SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])  # faces +z
@@ -75,12 +79,18 @@ def table_room() -> Scene:
 
 
 EVERY_WAY = pytest.mark.parametrize(
-    ("solver", "projection"),
+    ("adaptive", "projection"),
     [
-        pytest.param(*way, marks=() if way[1] == "hemicube" else pytest.mark.long)
-        for way in itertools.product(SOLVERS, PROJECTIONS)
+        pytest.param(
+            adaptive,
+            projection,
+            id=f"{'adaptive' if adaptive else 'uniform'}-{projection}",
+            marks=() if projection == "hemicube" else pytest.mark.long,
+        )
+        for adaptive, projection in itertools.product((False, True), PROJECTIONS)
     ],
 )
+EVERY_LIGHTMAP = pytest.mark.parametrize("adaptive", [False, True], ids=["uniform", "adaptive"])
 
 
 @dataclass
@@ -89,7 +99,7 @@ class Solution:
     surface, and ``H`` and ``r`` (n, 3) [W/m²], read from the GPU anew: of the leaves that there are now."""
 
     lightmap: Lightmap
-    solver: UniformShooting
+    solver: Shooting
 
     @property
     def _covered(self) -> NDArray[np.bool_]:
@@ -130,29 +140,36 @@ class Solution:
 
     @property
     def book(self) -> EnergyBalance:
-        return self.solver.books()
+        return self.solver.energy()
 
     def means(self, values: F64) -> F64:
         """(objects, 3) area-weighted means, the two sides of an object together."""
         weights = np.bincount(self.object, self.area)
         return np.stack([np.bincount(self.object, self.area * v) / weights for v in values.T], -1)
 
+    def step(self, shots: int) -> None:
+        """Up to so many shots at once."""
+        run_to_end(self.solver.work(shots))
+
+    def refine(self, **options: object) -> None:
+        """Let leaves follow other options of LightmapOptions."""
+        assert self.lightmap.refinement is not None
+        self.lightmap.refinement.set_options(self.lightmap.options.replace(**options))
+
     def shoot(self, shots: int = ENOUGH) -> None:
         """Up to so many shots more, or until converged."""
-        last = self.solver.shots + shots
-        while self.solver.shots < last and self.solver.report.residual > self.solver.options.residual:
-            self.solver.step(min(BATCH, last - self.solver.shots))
-            self.solver.poll()
+        last = self.solver.issued + shots
+        while self.solver.issued < last and self.solver.poll().remaining > self.solver.options.residual:
+            self.step(min(BATCH, last - self.solver.issued))
         self.solver.poll(wait=True)
-        assert self.solver.shots < ENOUGH, "did not converge"
+        assert self.solver.issued < ENOUGH, "did not converge"
 
     def settle(self, steps: int = ENOUGH) -> None:
         """Until converged and, on quadtrees, until the tree has stopped growing and holds all shots."""
         for _ in range(steps):
-            if self.solver.report.residual <= self.solver.options.residual and self.solver.settled:
+            if self.solver.poll().converged:
                 break
-            self.solver.step(BATCH)
-            self.solver.poll()
+            self.step(BATCH)
         else:
             raise AssertionError("did not settle")
         self.solver.poll(wait=True)
@@ -188,20 +205,21 @@ def begin(
     texels: int | None = None,
     density: float | None = None,
     tile: int = DEFAULT_TILE,
-    solver: str = "shooting",
+    adaptive: bool = False,
     **options: object,
 ) -> Solution:
-    """The scene before the first shot. options: of ShootingOptions. Where leaves come and go, texels and density are those of the
-    roots, which uniform texels are as fine as, and shooting levels count from there."""
+    """The scene before the first shot. options: of ShootingOptions and LightmapOptions. Where leaves come and go, texels and
+    density are those of the roots, which uniform texels are as fine as, and shooting levels count from there."""
     charts = parametrize(scene, texels=texels, density=density, tile=tile)
-    shooting = ShootingOptions(depth=1).replace(**options)
-    pool = quadtree_pool(scene, charts) if SOLVERS[solver].adaptive else TilePool(scene, charts)
-    if SOLVERS[solver].adaptive:
+    held = {spec.name: options.pop(spec.name) for spec in specs(LightmapOptions) if spec.name in options}
+    shooting = ShootingOptions().replace(**options)
+    pool = quadtree_pool(scene, charts) if adaptive else TilePool(scene, charts)
+    if adaptive:
         shooting = shooting.replace(
             level=min((LEVEL if shooting.level is None else shooting.level) + ROOT_LEVEL, MAX_LEVEL)
         )
-    lightmap = Lightmap(gpu, pool, storage=shooting.storage)
-    return Solution(lightmap, SOLVERS[solver](gpu, lightmap, shooting))
+    lightmap = Lightmap(gpu, pool, LightmapOptions(adaptive=adaptive, depth=1).replace(**held))
+    return Solution(lightmap, Shooting(gpu, lightmap, shooting))
 
 
 def solve(gpu: Gpu, scene: Scene, **options: object) -> Solution:

@@ -15,9 +15,6 @@ class AtlasOptions(Options):
     density: float | None = option(
         None, "texels per metre; unset: from --texels", unit="1/m", minimum=1e-9, maximum=1e9
     )
-    adaptive: bool = option(
-        False, "texture quadtrees that follow the light; --texels and --density are then those of the roots"
-    )
     texels: int | None = option(None, "texels in all; unset: chosen from the scene", minimum=1, maximum=MAX_TEXELS)
     tile: int = option(
         DEFAULT_TILE,

@@ -9,7 +9,7 @@ from typing import Any
 from app.atlas.charts import Charts
 from app.atlas.options import AtlasOptions
 from app.atlas.texels import texel_count, uniform_leaves
-from app.lightmap.lightmap import STORAGE
+from app.lightmap.options import STORAGE
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import TABLE_WIDTH
 from app.options import from_flags

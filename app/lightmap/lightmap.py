@@ -24,15 +24,17 @@ from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
+from app.lightmap.options import STORAGE, LightmapOptions
 from app.lightmap.receivers import RECEIVER_FORMAT
+from app.lightmap.refinement import Refinement
 from app.lightmap.tile_pool import OCCLUDER_FORMAT, Array, Moves, SolverSpace, TilePool
 from app.scene.model import F32, F64, Material, Scene
 
-STORAGE = {"rgba32f": "f4", "rgba16f": "f2", "fixed8": "f1"}  # name: moderngl dtype
 SHARES = np.float32(4.0)  # of what is still to come, that a texel may have, see common/ambient.glsl
 HALF_HEADROOM = 64.0  # of 65504, the largest half float: H may be many times the largest exitance
 LIGHT = ("t_irradiance", "t_residual")
 QUAD_FORMAT = {"in_rect": "4f", "in_from": "2f"}  # see common/rects.vert.glsl
+DEFAULT = LightmapOptions()
 _DTYPES = {"f4": np.float32, "f2": np.float16, "f1": np.uint8}
 _BYTES = {"f4": 4, "u4": 4, "f2": 2, "f1": 1}
 
@@ -45,7 +47,12 @@ class Lightmap:
     """
 
     def __init__(
-        self, gpu: Gpu, pool: TilePool, *, storage: str = "rgba32f", textures: Mapping[str, Texture] | None = None
+        self,
+        gpu: Gpu,
+        pool: TilePool,
+        options: LightmapOptions = DEFAULT,
+        *,
+        textures: Mapping[str, Texture] | None = None,
     ) -> None:
         """textures: of ``pool.arrays``, where they were made before; they are the lightmap's from now on."""
         self.gpu, self.pool, self.scene, self.charts = gpu, pool, pool.scene, pool.charts
@@ -63,12 +70,14 @@ class Lightmap:
         self.ambient_target = gpu.target(self._textures["t_ambient"])
         self.version = 0  # counts changes of the leaves
         self._targets: list[Framebuffer] = []
-        self.set_storage(storage)
+        self._options = options
+        self.refinement = Refinement(options) if pool.adaptive else None
+        self.set_storage(options.storage)
 
     @staticmethod
     def of(gpu: Gpu, scene: Scene, charts: Charts, *, storage: str = "rgba32f") -> Lightmap:
         """With no light yet."""
-        lightmap = Lightmap(gpu, TilePool(scene, charts), storage=storage)
+        lightmap = Lightmap(gpu, TilePool(scene, charts), LightmapOptions(storage=storage))
         lightmap.clear()
         return lightmap
 
@@ -102,6 +111,20 @@ class Lightmap:
         return self._targets[1]
 
     # -- state ---------------------------------------------------------------------------------------------------------
+
+    @property
+    def options(self) -> LightmapOptions:
+        """How it holds light now."""
+        options = self._options if self.refinement is None else self.refinement.options
+        return options.replace(storage=self.storage)
+
+    def set_options(self, options: LightmapOptions) -> None:
+        """Hold light in another way: leaves follow by and by; with another storage it is undefined, reset the solver then."""
+        self._options = options
+        if self.refinement is not None:
+            self.refinement.set_options(options)
+        if options.storage != self.storage:
+            self.set_storage(options.storage)
 
     def set_storage(self, storage: str) -> None:
         """Choose how H and r are stored (a key of STORAGE). What they hold then is undefined: clear."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.lightmap.lightmap import STORAGE, Lightmap
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.options import STORAGE
 from app.lightmap.tile_pool import TilePool
 from app.scene.model import F32, RGB
 

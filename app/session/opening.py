@@ -13,7 +13,7 @@ from app.lightmap.lightmap import Lightmap, upload
 from app.render.frame import FrameRenderer
 from app.session.loading import Loaded, Loading
 from app.solvers import DEFAULT_SOLVER, SOLVERS, ShootingOptions, Solver
-from app.util.parts import whole
+from app.util.parts import run_to_end
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Opening:
 
     def at_once(self, loaded: Loaded, options: ShootingOptions, interpolation: str) -> Ready:
         """All of what was loaded elsewhere. Raises UserError."""
-        return whole(self._upload(loaded, options, interpolation))
+        return run_to_end(self._upload(loaded, options, interpolation))
 
     def _upload(self, loaded: Loaded, options: ShootingOptions, interpolation: str) -> Generator[None, None, Ready]:
         """Upload what was loaded, and draw once with each program, since drivers compile it then; yields after each part.

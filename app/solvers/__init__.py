@@ -1,27 +1,63 @@
-"""Ways to solve for the light. Explicit beats discovery: one line for each solver."""
+"""Ways to solve for the light. Explicit beats discovery: one row of SOLVERS for each."""
+
+from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
-from app.solvers.base import EnergyBalance, Solver, StepReport
-from app.solvers.shooting.adaptive import AdaptiveShooting
-from app.solvers.shooting.options import TREE, ShootingOptions
-from app.solvers.shooting.uniform import UniformShooting
+from app.options import Options
+from app.solvers.base import EnergyBalance, Inspection, Progress, Rect, Solver
+from app.solvers.shooting.options import ShootingOptions
+from app.solvers.shooting.solver import Shooting
+from app.solvers.shooting.stages import BATCH
 
-SOLVERS: dict[str, Callable[[Gpu, Lightmap, ShootingOptions], Solver[ShootingOptions]]] = {
-    "shooting": UniformShooting,
-    "adaptive": AdaptiveShooting,
+
+@dataclass(frozen=True)
+class Family:
+    """A row of the table of solvers.
+
+    title: what the viewer calls it. options: its knobs, each a flag and a widget. make: it for a lightmap, without any light.
+    unit: of its work, in the plural, as in ``--shots``. remains: what is left of what it has to do, as in "0.1 % unshot".
+    batch: work that it does at once when nothing waits for it. keeps_light: whether it can begin with light that another solver
+    has left in the lightmap; else it begins anew. threshold: the option that says how little may remain when it has converged.
+    """
+
+    title: str
+    help: str
+    options: type[Options]
+    make: Callable[[Gpu, Lightmap, Any], Solver[Any]]
+    unit: str
+    remains: str
+    batch: int
+    threshold: str
+    keeps_light: bool = False
+
+
+SOLVERS: dict[str, Family] = {
+    "shooting": Family(
+        title="Shooting",
+        help="progressive radiosity: one patch after the other shoots its light (Cohen et al. 1988, Coombe et al. 2003)",
+        options=ShootingOptions,
+        make=Shooting,
+        unit="shots",
+        remains="unshot",
+        batch=BATCH,
+        threshold="residual",
+    ),
 }
 DEFAULT_SOLVER = "shooting"
 
 __all__ = [
     "DEFAULT_SOLVER",
     "SOLVERS",
-    "TREE",
     "EnergyBalance",
+    "Family",
+    "Inspection",
+    "Progress",
+    "Rect",
     "ShootingOptions",
     "Solver",
-    "StepReport",
-    "UniformShooting",
 ]

@@ -1,10 +1,14 @@
-"""What every solver is: it writes a Lightmap in bounded steps and says how far it is."""
+"""What every solver is: it writes the light of a Lightmap in bounded pieces of work, and says how far it is.
+
+Three families share this contract: shooting [Cohen88], gathering along rays [Kahl22], the local matrix [Shcherbakov19]. Each
+counts its work in a unit of its own (shots, rays, updates), and says in its own words what remains: unshot light, or noise.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -12,23 +16,32 @@ from app.gpu import Texture
 from app.options import Options
 from app.scene.model import F64, Material
 
+Rect = tuple[float, float, float, float]  # (u, v, u, v) in the virtual atlas [texels of level 0]
+
 
 @dataclass(frozen=True)
-class StepReport:
-    """What is known after a step, a few steps late: nothing waits for the GPU.
+class Progress:
+    """How far a solve is, as of a few pieces of work ago: nothing waits for the GPU.
 
-    shots made so far; residual: unshot share of the emitted power [-], 1 before the first shot; escaped: power that left the
-    scene, RGB [W].
+    done: work done so far, in the family's unit. remaining: share of the emitted power that is still to be distributed, or
+    the noise that is left, over the mean [-]; 1 before any work, and not finite where the light is not. escaped: power that left
+    the scene, RGB [W]. converged: whether what remains is as little as the options ask for, and nothing else changes any more.
+    refining: whether leaves of a quadtree come or go, or do not yet hold all of their light. note: what the user should know of
+    the solution, if anything.
     """
 
-    shots: int
-    residual: float
+    done: int
+    remaining: float
     escaped: F64
+    converged: bool = False
+    refining: bool = False
+    note: str | None = None
 
 
 @dataclass(frozen=True)
 class EnergyBalance:
-    """emitted = absorbed + escaped + unshot + imbalance, RGB [W]; the imbalance is the error of form factors and visibility.
+    """Where all emitted power is, RGB [W]: emitted = absorbed + escaped + unshot + imbalance. The imbalance is the error of form
+    factors and visibility.
 
     reflectance: area-weighted mean albedo, RGB; area: of all texels [m²].
     """
@@ -57,90 +70,75 @@ class EnergyBalance:
         return np.asarray(self.reflectance * received / np.maximum(received + self.escaped, 1e-300))
 
 
+@dataclass(frozen=True)
+class Inspection:
+    """What a solver shows of its last piece of work, and of one texel.
+
+    images: pictures by caption, the solver's own: valid until it works again. rectangles: places of the virtual atlas to mark, by
+    name. facts: what there is to say, name and value. texel_facts: the same of the texel that was asked for.
+    """
+
+    images: Mapping[str, Texture] = field(default_factory=dict)
+    rectangles: Mapping[str, Rect] = field(default_factory=dict)
+    facts: Mapping[str, str] = field(default_factory=dict)
+    texel_facts: Mapping[str, str] = field(default_factory=dict)
+
+
 OptionsT = TypeVar("OptionsT", bound=Options)
 
 
-class PatchShot(Protocol):
-    """The patch that shot, (u, v, u, v) in the virtual atlas [texels of level 0]: its leaf may be gone since, or elsewhere."""
-
-    @property
-    def rect(self) -> tuple[float, float, float, float]: ...
-
-
 class Solver(Protocol[OptionsT]):
-    """The whole interface of what writes a lightmap. ``step`` is one bounded unit of work: no UI, no clock.
+    """The whole interface of what writes a lightmap: no UI, no clock.
 
-    options: the knobs that the next shot obeys. report: the newest that ``poll`` has heard. shots: issued so far.
+    options: the knobs that the next piece of work obeys. issued: work given to the GPU so far, in the family's unit; Progress
+    tells, a little later, what came of it.
     """
 
     options: OptionsT
-    report: StepReport
-    shots: int
-    note: str | None  # what the user should know of the solution, if anything
 
     @property
-    def last_shot(self) -> PatchShot | None:
-        """The last shooter that ``poll`` has heard of."""
+    def issued(self) -> int: ...
 
     def reset(self) -> None:
         """Forget all light and begin again."""
 
     def set_options(self, options: OptionsT) -> None:
-        """Use other knobs from the next shot on. Raises UserError."""
+        """Use other knobs from the next piece of work on. Raises UserError."""
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
-        """Other albedos and emissions of the scene, from the next step on; solves for the difference if it can."""
+        """Use other albedos and emissions of the scene from the next piece of work on; solve for the difference where the method
+        can."""
 
-    @property
-    def grown(self) -> bool:
-        """Whether no leaves come or go, and all hold what the shots gave them."""
+    def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
+        """Do about so much work, in the family's unit, but no more than suits the method at once (one batch), in bounded parts:
+        one for each ``next``, the longest passes cut into so many bands. Returns how much was issued. Whatever needs whole pieces
+        of work (``poll`` that waits, ``energy``, options, materials, other work) ends it first; the generator is then over."""
 
-    @property
-    def settled(self) -> bool:
-        """Whether the solution is as even as it will be: once the residual is small as well, it is solved."""
+    def poll(self, *, wait: bool = False) -> Progress:
+        """The newest progress that has arrived; with ``wait`` that of the last piece of work."""
 
-    def unshot_share(self) -> float:
-        """The residual as a share of the emitted power, now. Waits for the GPU."""
+    def settle(self) -> Progress:
+        """End the work under way, wait for the GPU, and measure what remains now: ``poll`` says so from then on."""
 
-    def step(self, shots: int) -> int:
-        """Make up to ``shots`` shots, or a few more where some belong together, and no more than one batch of its own; how many
-        were issued. Other work that must be done first is done instead, and counts as so many."""
-
-    def step_part(self, bands: int) -> bool:
-        """A part of a step of one shot, its longest pass cut into so many bands; whether the step is whole now. Everything else
-        that needs whole steps finishes it first."""
-
-    def poll(self, *, wait: bool = False) -> StepReport:
-        """The newest report that has arrived; with ``wait`` that of the last step."""
-
-    def books(self) -> EnergyBalance:
+    def energy(self) -> EnergyBalance:
         """Where all emitted energy is now. Reads every texel and waits for the GPU."""
 
-    def passes(self, shots: int) -> dict[str, Callable[[], None]]:
-        """Each part of a step of so many shots by itself, to be timed. They spoil the light: reset afterwards."""
-
-    def warm_up(self, shots: int) -> Iterator[None]:
-        """Do once, in parts, all that a solve will do, so that no step waits for a driver that compiles. Spoils the light."""
-
-    def patch_edge(self, texel: tuple[int, int]) -> int:
-        """Texels along the edge of the largest patch that a texel (column, row) of the tile pool may shoot from now."""
-
     @property
-    def level(self) -> int:
-        """Mip level that shoots in the end: as set, or as the scene asks for."""
+    def resolved(self) -> Mapping[str, Any]:
+        """The values in this scene of options that were left unset, by name."""
 
-    @property
-    def resolution(self) -> int:
-        """Edge of a full face of the visibility map [px]: as set, or as the scene asks for."""
+    def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
+        """What there is to see of the last piece of work, and of a texel (column, row) of the tile pool. With ``images`` it draws
+        its pictures, and what takes as long; it may then wait for the GPU."""
 
-    def inspect(self) -> dict[str, Texture]:
-        """Textures that explain ``last_shot``, by name; ``items`` and ``depth`` are what it sees, nothing before the first."""
+    def passes(self, amount: int) -> dict[str, Callable[[], None]]:
+        """Each pass of a piece of work by itself, to be timed. They spoil the light: reset afterwards."""
 
-    def vanished(self) -> int:
-        """Triangles that ``last_shot`` sees only because each is drawn as one sample at least. Waits for the GPU."""
+    def warm_up(self) -> Iterator[None]:
+        """Do once, in parts, all that a solve will do, so that no frame waits for a driver that compiles. Spoils the light."""
 
     def release(self) -> None:
         """Give back what is on the GPU, but for the lightmap."""
 
 
-__all__ = ["EnergyBalance", "PatchShot", "Solver", "StepReport"]
+__all__ = ["EnergyBalance", "Inspection", "Progress", "Rect", "Solver"]

@@ -8,7 +8,7 @@ from typing import TypeVar
 ResultT = TypeVar("ResultT")
 
 
-def whole(parts: Generator[object, None, ResultT]) -> ResultT:
+def run_to_end(parts: Generator[object, None, ResultT]) -> ResultT:
     """Do all parts of something; what it returns."""
     while True:
         try:

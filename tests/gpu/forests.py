@@ -13,6 +13,7 @@ from app.atlas.charts import DEFAULT_TILE, TILES
 from app.atlas.parametrize import parametrize
 from app.gpu import Gpu
 from app.lightmap.lightmap import LIGHT, Lightmap
+from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import Quadtree, quadtree_pool
 from app.lightmap.transfer import Regrowth
 from app.render.options import INTERPOLATIONS
@@ -33,7 +34,7 @@ class Forest:
         self, gpu: Gpu, scene: Scene, *, texels: int = 3000, tile: int = DEFAULT_TILE, storage: str = "rgba32f"
     ) -> None:
         charts = parametrize(scene, texels=texels, tile=tile)
-        self.lightmap = Lightmap(gpu, quadtree_pool(scene, charts), storage=storage)
+        self.lightmap = Lightmap(gpu, quadtree_pool(scene, charts), LightmapOptions(adaptive=True, storage=storage))
         self.lightmap.clear()
         self.pool, self.storage = self.lightmap.pool, storage
         self.tree, self.regrowth = Quadtree(self.pool), Regrowth(gpu, self.lightmap)

@@ -24,7 +24,7 @@ from app.reference.metrics import bias, lit_points, relative_rms
 from app.scene.model import F64
 from app.session.session import Session, Stop
 from app.solvers import ShootingOptions
-from app.util.parts import whole
+from app.util.parts import run_to_end
 
 __all__ = ["box", "cornell", "forest", "forgotten"]
 
@@ -163,12 +163,12 @@ def test_nothing_is_expected_of_the_dark_or_the_broken(broken: float) -> None:
 def test_time_that_is_up_leaves_some_points(gpu: Gpu, box: Lightmap) -> None:
     box.light_target.clear(*[1.0] * 3, 0.0)
     expectation = Expectation(gpu, box, 8)
-    all_of_them, some = (whole(expectation.parts(np.zeros(3), seconds)) for seconds in (np.inf, 0.0))
+    all_of_them, some = (run_to_end(expectation.parts(np.zeros(3), seconds)) for seconds in (np.inf, 0.0))
     assert all_of_them is not None and some is not None
     assert 0 < some.points <= FEWEST < all_of_them.points <= POINTS
     assert some.rms == pytest.approx(all_of_them.rms, rel=0.5)
     box.light_target.clear(*[np.inf] * 3, 0.0)
-    assert whole(expectation.parts(np.zeros(3), 0.0)) is None
+    assert run_to_end(expectation.parts(np.zeros(3), 0.0)) is None
     expectation.release()
 
 
@@ -182,7 +182,7 @@ def test_a_furnace_knows_what_it_lacks(gpu: Gpu, residual: float) -> None:
     H = irradiance_of(half.lightmap, points)
     truth = np.full_like(H, 3.0 / (1 - 0.5))
     expectation = Expectation(gpu, half.lightmap, 32)
-    error = whole(expectation.parts(half.book.returned, np.inf))
+    error = run_to_end(expectation.parts(half.book.returned, np.inf))
     assert error is not None and error.points == POINTS
     # what is unshot is not even: its light that comes back is taken to be
     assert error.rms == pytest.approx(relative_rms(H, truth), rel=0.2)
@@ -204,7 +204,7 @@ def test_shadows_on_coarse_texels_are_expected_to_be_off(gpu: Gpu) -> None:
     errors = []
     for one in (coarse, fine):
         expectation = Expectation(gpu, one.lightmap, 16)
-        error = whole(expectation.parts(one.book.returned, np.inf))
+        error = run_to_end(expectation.parts(one.book.returned, np.inf))
         assert error is not None
         errors.append(error.rms)
         expectation.release()

@@ -14,15 +14,16 @@ from app.atlas.options import AtlasOptions
 from app.commands.headless import picture
 from app.gpu import Gpu, Texture
 from app.lightmap.collapse import collapse
-from app.lightmap.lightmap import LIGHT, STORAGE, Lightmap
+from app.lightmap.lightmap import LIGHT, Lightmap
+from app.lightmap.options import STORAGE
 from app.lightmap.quadtree import Quadtree, Tile, quadtree_pool
 from app.render import resolve
 from app.render.ages import LeafAges
 from app.render.options import DisplayOptions
 from app.render.resolve import BORDER, DisplayTexels
 from app.session.session import Session
-from app.solvers import SOLVERS, EnergyBalance, ShootingOptions
-from app.solvers.shooting.adaptive import AdaptiveShooting
+from app.solvers import EnergyBalance, ShootingOptions
+from app.solvers.shooting.solver import Shooting
 from app.solvers.shooting.stages import EMITTER, ShotBuffers
 
 __all__ = ["forest"]
@@ -185,7 +186,7 @@ def planted(gpu: Gpu) -> Iterator[Callable[..., Solution]]:
 
     def plant(**options: object) -> Solution:
         known: dict[str, object] = {"density": 3.0, "level": 1, "resolution": 64, "residual": 0.1}
-        made.append(begin(gpu, table_room(), solver="adaptive", **(known | options)))  # type: ignore[arg-type]
+        made.append(begin(gpu, table_room(), adaptive=True, **(known | options)))  # type: ignore[arg-type]
         return made[-1]
 
     yield plant
@@ -195,14 +196,13 @@ def planted(gpu: Gpu) -> Iterator[Callable[..., Solution]]:
 
 def follow(solution: Solution, **options: object) -> None:
     """Turn knobs, and let the leaves follow until they rest."""
-    solver = tree_solver(solution)
-    solver.set_options(solver.options.replace(**options))
-    solver.step(8)
+    solution.refine(**options)
+    solution.step(8)
     solution.settle(3000)
 
 
-def tree_solver(solution: Solution) -> AdaptiveShooting:
-    assert isinstance(solution.solver, AdaptiveShooting)
+def tree_solver(solution: Solution) -> Shooting:
+    assert isinstance(solution.solver, Shooting)
     return solution.solver
 
 
@@ -215,11 +215,11 @@ def test_memory_follows_the_light(planted: Callable[..., Solution]) -> None:
     resize = solver._resize
 
     def watched(slots: int) -> None:
-        before, books = leaves_of(box), solver.books()
+        before, books = leaves_of(box), solver.energy()
         resize(slots)
         sizes.append(pool.tiles)
         assert leaves_of(box) == before
-        assert_same_books(solver.books(), books)
+        assert_same_books(solver.energy(), books)
 
     solver._resize = watched  # type: ignore[method-assign]
     box.settle()
@@ -260,7 +260,7 @@ def test_a_solver_takes_along_what_it_knows_of_its_leaves(planted: Callable[...,
     box.settle()
     solver = tree_solver(box)
     assert solver._carried, "no strong light is kept"
-    solver.set_options(solver.options.replace(**FEW))
+    box.refine(**FEW)
     fresh = solver.tree.splits([slot for tile, slot in solver.tree.slots.items() if tile[0] < 2], 3)
     solver._make_room(4 * len(fresh) + 400)
     solver._apply(solver.tree.split(fresh))
@@ -285,8 +285,8 @@ def twin(gpu: Gpu, solution: Solution) -> Solution:
         if tree.room < 4 * len(splits):
             tree.resize(pool.tiles + 4 * len(splits))
         tree.split(splits)
-    lightmap = Lightmap(gpu, pool)
-    return Solution(lightmap, SOLVERS["adaptive"](gpu, lightmap, solution.solver.options))
+    lightmap = Lightmap(gpu, pool, solution.lightmap.options)
+    return Solution(lightmap, Shooting(gpu, lightmap, solution.solver.options))
 
 
 @pytest.mark.long
@@ -325,7 +325,7 @@ def test_the_picture_stays_and_the_panel_tells(gpu: Gpu) -> None:
     session = Session(gpu, shooting=shooting, atlas=AtlasOptions(adaptive=True, texels=900))
     session.open_now("cornell-box")
     solver = session.solver
-    assert isinstance(solver, AdaptiveShooting)
+    assert isinstance(solver, Shooting)
     while not (solver.settled and session.converged):
         session.shoot(8)
         session.hear(books=False)
@@ -335,9 +335,9 @@ def test_the_picture_stays_and_the_panel_tells(gpu: Gpu) -> None:
 
     def watched(slots: int) -> None:
         pictures.append(picture(session, (240, 160)))
-        books = solver.books()
+        books = solver.energy()
         resize(slots)
-        assert_same_books(solver.books(), books)
+        assert_same_books(solver.energy(), books)
         assert books.escaped.min() > 0
         pictures.append(picture(session, (240, 160)))
 

@@ -167,7 +167,7 @@ def test_map_shows_what_a_ray_meets(probe: Gpu, name: str, scene: str) -> None:
         solver = solution.solver
         shot = solver.audit((int(x), int(y))).shot
         item, distance = met_from(solution, shot, weight)
-        seen = solver.inspect(shot)
+        seen = solver.sight(shot)
         shown, depth = (np.frombuffer(seen[k].read(), np.float32) for k in ("items", "depth"))
         share = weight[shown != item, 3].sum()
         if distance.min() < CLOSE:
@@ -191,21 +191,21 @@ def test_map_shows_what_a_ray_meets(probe: Gpu, name: str, scene: str) -> None:
 def test_inspect_shows_what_the_last_shot_saw(probe: Gpu) -> None:
     """Before the first one, after a step of several maps, while earlier shots are made again, and with another projection."""
     solution = begin(
-        probe, table_room(), density=4.0, solver="adaptive", level=1, resolution=64, depth=0, gradient=0.1, residual=0.2
+        probe, table_room(), density=4.0, adaptive=True, level=1, resolution=64, depth=0, gradient=0.1, residual=0.2
     )
     solver = solution.solver
 
     def share_wrong() -> float:
         weight, _, _ = probed(probe, solver.options.projection, 64)
         item, _ = met_from(solution, solver.last_shot, weight)
-        return float(weight[np.frombuffer(solver.inspect()["items"].read(), np.float32) != item, 3].sum())
+        return float(weight[np.frombuffer(solver.sight()["items"].read(), np.float32) != item, 3].sum())
 
-    assert not np.frombuffer(solver.inspect()["items"].read(), np.float32).any() and solver.vanished() == 0
+    assert not np.frombuffer(solver.sight()["items"].read(), np.float32).any() and solver.vanished() == 0
     solution.settle()
     assert share_wrong() < EDGES_OF_64
-    solver.set_options(solver.options.replace(depth=1))
+    solution.refine(depth=1)
     while solver._redo_under_way is None:
-        solver.step(BATCH)
+        solution.step(BATCH)
         solver.poll()
     solver.poll(wait=True)
     assert share_wrong() < EDGES_OF_64
@@ -221,9 +221,9 @@ def test_inspecting_a_shot_under_way_leaves_its_light_alone(gpu: Gpu) -> None:
         solution.shoot(4)
         assert solution.solver.last_shot is not None
         for _ in range(4):
-            while not solution.solver.step_part(3):
+            for _ in solution.solver.work(1, 3):
                 if looked_at:
-                    solution.solver.inspect()
+                    solution.solver.sight()
                     solution.solver.vanished()
         light.append(solution.H)
         solution.release()

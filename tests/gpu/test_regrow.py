@@ -12,7 +12,7 @@ from solver_scenes import grey, quads_scene, room, table_room
 
 from app.atlas.charts import DEFAULT_TILE, TILES
 from app.gpu import Gpu
-from app.lightmap.lightmap import STORAGE
+from app.lightmap.options import STORAGE
 from app.scene.load import load_scene
 
 __all__ = ["forest", "forgotten"]

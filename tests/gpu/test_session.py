@@ -18,7 +18,7 @@ from app.atlas.options import AtlasOptions
 from app.commands.headless import picture
 from app.errors import SceneError, UserError
 from app.gpu import Gpu
-from app.lightmap.lightmap import STORAGE
+from app.lightmap.options import STORAGE
 from app.render.false_colour import colour_map
 from app.session.picking import read_again
 from app.session.session import Session, Stop

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from pictures import render_image
-from solver_scenes import begin, solve, table_room
+from solver_scenes import EVERY_LIGHTMAP, begin, solve, table_room
 
 from app.atlas.charts import TILES
 from app.atlas.options import AtlasOptions
@@ -21,7 +21,7 @@ from app.render.options import LAYERS, DisplayOptions
 from app.render.resolve import PLACES_WIDTH
 from app.scene.load import load_scene
 from app.session.session import Session, Stop
-from app.solvers import SOLVERS, ShootingOptions
+from app.solvers import ShootingOptions
 from app.solvers.shooting.options import MAX_LEVEL, highest_level
 
 SIZE = (160, 120)
@@ -96,10 +96,10 @@ def test_lines_of_the_grid_are_as_far_apart_as_tiles(gpu: Gpu) -> None:
     assert marked[0] > 1.5 * marked[1] > 2.2 * marked[2] > 0, marked
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_the_light_does_not_depend_on_the_tile(gpu: Gpu, solver: str) -> None:
+@EVERY_LIGHTMAP
+def test_the_light_does_not_depend_on_the_tile(gpu: Gpu, adaptive: bool) -> None:
     """Means over each object's area. What is still unshot is that of other patches each time, and makes twice its light."""
-    options: dict[str, object] = {"density": 4.0, "level": 1, "resolution": 64, "residual": 0.015, "solver": solver}
+    options: dict[str, object] = {"density": 4.0, "level": 1, "resolution": 64, "residual": 0.015, "adaptive": adaptive}
     means = []
     for tile in (8, 32):
         mine = solve(gpu, table_room(), tile=tile, **options)  # type: ignore[arg-type]
@@ -111,13 +111,13 @@ def test_the_light_does_not_depend_on_the_tile(gpu: Gpu, solver: str) -> None:
 
 
 @pytest.mark.usefixtures("undivided")
-@pytest.mark.parametrize(("solver", "density"), [("shooting", 8.0), ("adaptive", 4.0)])
-def test_no_patch_is_larger_than_its_leaf(gpu: Gpu, solver: str, density: float) -> None:
+@pytest.mark.parametrize(("adaptive", "density"), [(False, 8.0), (True, 4.0)], ids=["uniform", "adaptive"])
+def test_no_patch_is_larger_than_its_leaf(gpu: Gpu, adaptive: bool, density: float) -> None:
     """On quadtrees, the lamp's leaves begin two levels below the roots: those of the others shoot from smaller patches."""
     assert [highest_level(tile) for tile in TILES] == [3, 4, 4]
     for tile in TILES:
-        room = begin(gpu, table_room(), density=density, tile=tile, level=MAX_LEVEL, resolution=64, solver=solver)
-        room.solver.step(1)
+        room = begin(gpu, table_room(), density=density, tile=tile, level=MAX_LEVEL, resolution=64, adaptive=adaptive)
+        room.step(1)
         room.solver.poll(wait=True)
         assert room.solver.last_shot is not None and room.solver.last_shot.size == min(tile, 16)
         pool = room.lightmap.pool

@@ -33,7 +33,7 @@ def grown(gpu: Gpu, scene: Scene, **options: object) -> Solution:
         "gradient": ROUGH,
         "residual": 0.02,
     }
-    return begin(gpu, scene, solver="adaptive", **(known | options))  # type: ignore[arg-type]
+    return begin(gpu, scene, adaptive=True, **(known | options))  # type: ignore[arg-type]
 
 
 @pytest.fixture
@@ -56,9 +56,9 @@ def test_furnace(planted: Callable[..., Solution]) -> None:
     box = planted(scene, density=16.0, residual=2e-3, gradient=0.8, depth=0)
     leaves = set(box.solver.tree.slots)  # type: ignore[attr-defined]
     box.settle(FEW_STEPS)
-    box.solver.set_options(box.solver.options.replace(depth=2))
+    box.refine(depth=2)
     for _ in range(12):  # until the leaves have been judged
-        box.solver.step(8)
+        box.step(8)
         box.solver.poll()
     box.settle(FEW_STEPS)
     material = scene.materials[0]
@@ -104,16 +104,16 @@ def test_it_does_not_matter_when_the_tree_grows(planted: Callable[..., Solution]
     early = planted(table_room(), **(SHADOW | {"depth": 2}))
     early.settle()
     late = planted(table_room(), **(SHADOW | {"depth": 0}))
-    while late.solver.shots < 800:
-        late.solver.step(8)
+    while late.solver.issued < 800:
+        late.step(8)
     roots = late.lightmap.texel_count
-    late.solver.set_options(late.solver.options.replace(depth=2))
+    late.refine(depth=2)
     late.settle()
     assert min(early.lightmap.texel_count, late.lightmap.texel_count) > 2 * roots, "nothing grew"
     (a, here), (b, there) = finest_light(early), finest_light(late)
     both = here & there
     alike = levels(early) == levels(late)
-    for where, most in ((both & alike, PATCHES), (both & ~alike, early.solver.options.gradient / 8)):
+    for where, most in ((both & alike, PATCHES), (both & ~alike, early.lightmap.options.gradient / 8)):
         assert where.sum() > both.sum() / 4
         assert np.sqrt(((a - b)[where] ** 2).mean() / (a[both] ** 2).mean()) < most
     assert max(abs(early.book.imbalance_share), abs(late.book.imbalance_share)) < CONTACTS
@@ -126,13 +126,13 @@ def test_a_tree_grows_as_deep_late_as_early(planted: Callable[..., Solution]) ->
     early.settle()
     late = planted(table_room(), **(options | {"depth": 0}))
     late.settle()
-    late.solver.set_options(late.solver.options.replace(depth=2))
+    late.refine(depth=2)
     late.settle()
     leaves = [set(one.solver.tree.slots) for one in (early, late)]  # type: ignore[attr-defined]
     # the first shots split what later light makes smooth beside its mean, and merging waits for an eighth of the threshold
     assert len(leaves[0]) > len(leaves[1]) > len(leaves[0]) / 2
     assert {level for level, _, _ in leaves[1]} == {level for level, _, _ in leaves[0]}
-    late.solver.set_options(late.solver.options.replace(depth=2))
+    late.refine(depth=2)
     late.settle()
     assert set(late.solver.tree.slots) == leaves[1], "it was not done"  # type: ignore[attr-defined]
 
@@ -146,9 +146,9 @@ def test_a_restart_after_a_slider_was_moved_is_a_restart(planted: Callable[..., 
         lambda: box.solver.set_materials(box.lightmap.scene.materials),
         box.solver.reset,
     ):
-        box.solver.set_options(box.solver.options.replace(depth=box.solver.options.depth + 1))
+        box.refine(depth=box.lightmap.options.depth + 1)
         while box.solver._redo_under_way is None:  # type: ignore[attr-defined]
-            box.solver.step(8)
+            box.step(8)
             box.solver.poll()
         disturb()
         assert box.solver._redo_under_way is None  # type: ignore[attr-defined]
@@ -162,9 +162,9 @@ def test_leaves_follow_threshold_depth_and_budget(planted: Callable[..., Solutio
     box = planted(table_room(), **(SHADOW | {"depth": 2, "residual": 0.2, "gradient": 5.0}))
 
     def settled(**options: object) -> int:
-        box.solver.set_options(box.solver.options.replace(**options))
+        box.refine(**options)
         for _ in range(12):  # until the knob has been heard of
-            box.solver.step(8)
+            box.step(8)
             box.solver.poll()
         box.settle()
         assert np.isfinite(box.H).all() and abs(box.book.imbalance_share) < CONTACTS
@@ -177,7 +177,7 @@ def test_leaves_follow_threshold_depth_and_budget(planted: Callable[..., Solutio
     assert few < settled(depth=1) < many
     assert few <= settled(depth=2, gradient=5.0) <= stay
     full = settled(depth=4, gradient=1e-3, budget=65_536)  # half of the room that is there from the start
-    assert 65_536 // 256 - 3 <= full <= 65_536 // 256 and "65,536" in (box.solver.note or "")
+    assert 65_536 // 256 - 3 <= full <= 65_536 // 256 and "65,536" in (box.solver.poll().note or "")
 
 
 def test_an_edit_of_a_grown_tree(planted: Callable[..., Solution]) -> None:
@@ -190,9 +190,9 @@ def test_an_edit_of_a_grown_tree(planted: Callable[..., Solution]) -> None:
     materials = list(box.lightmap.scene.materials)
     materials[2] = grey(0.2, 5.0, double_sided=True)  # a quarter of the lamp's 20 W/m²
     box.solver.set_materials(tuple(materials))
-    box.solver.set_options(box.solver.options.replace(depth=2))
+    box.refine(depth=2)
     for _ in range(12):
-        box.solver.step(8)
+        box.step(8)
         box.solver.poll()
     box.settle()
     finer, covered = finest_light(box)

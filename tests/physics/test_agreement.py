@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from solver_scenes import EVERY_WAY, UNIT_SQUARE, grey, quads_scene, room, solve, table_room
+from solver_scenes import EVERY_LIGHTMAP, EVERY_WAY, UNIT_SQUARE, grey, quads_scene, room, solve, table_room
 
 from app.gpu import Gpu
 from app.reference.dense import DenseSolution, irradiance_at, solve_dense
 from app.reference.form_factors import point_to_polygon
 from app.reference.metrics import relative_rms
 from app.scene.model import F64, Material, Scene
-from app.solvers import SOLVERS
 
 pytestmark = pytest.mark.long
 
@@ -22,15 +21,15 @@ def object_means(dense: DenseSolution, scene: Scene) -> F64:
     return np.stack([np.bincount(owner, area * h) / np.bincount(owner, area) for h in dense.H.T], -1)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_room_without_shadows(gpu: Gpu, solver: str) -> None:
+@EVERY_LIGHTMAP
+def test_room_without_shadows(gpu: Gpu, adaptive: bool) -> None:
     """A box of three albedos, its ceiling the lamp: mean irradiance of each wall, and of points on the floor.
 
     In a convex room the reference's rows sum to 1 exactly and its error is that of its grid: with 700 patches its means move
     towards the solver's by 0.9 %. The solver's shooters hand out all their light within 0.5 %."""
     materials = (grey(0.2), grey(0.0, 4.0), Material("red", (0.8, 0.3, 0.1)), grey(0.5))
     scene = quads_scene(room((2.0, 1.0, 1.5)), materials, [0, 1, 2, 3, 3, 2])
-    mine = solve(gpu, scene, texels=2500, residual=3e-4, resolution=128, solver=solver)
+    mine = solve(gpu, scene, texels=2500, residual=3e-4, resolution=128, adaptive=adaptive)
     dense = solve_dense(scene, 300, 2)
     np.testing.assert_allclose(mine.means(mine.H), object_means(dense, scene), rtol=0.015)
     floor = np.flatnonzero(mine.object == 0)[::7]
@@ -59,11 +58,11 @@ def table_dense() -> DenseSolution:
 
 
 @EVERY_WAY
-def test_room_with_a_table(gpu: Gpu, table_dense: DenseSolution, solver: str, projection: str) -> None:
+def test_room_with_a_table(gpu: Gpu, table_dense: DenseSolution, adaptive: bool, projection: str) -> None:
     """Shadow, both sides, colour: means within 3 % of TABLE_MEANS: 1 % is still unshot, and another is lost where patches of a
     quarter of a metre see from their middles past table and lamp."""
     mine = solve(
-        gpu, table_room(), density=8, level=1, residual=5e-3, resolution=128, solver=solver, projection=projection
+        gpu, table_room(), density=8, level=1, residual=5e-3, resolution=128, adaptive=adaptive, projection=projection
     )
     scene = mine.lightmap.scene
     np.testing.assert_allclose(mine.means(mine.H), TABLE_MEANS, rtol=0.03)

@@ -43,7 +43,7 @@ def test_a_patch_shoots_its_mean_and_keeps_what_is_uneven(gpu: Gpu) -> None:
     r[..., :3] *= np.linspace(1, 2, r.shape[1], dtype=np.float32)[None, :, None]
     texture.write(r.tobytes())
     before = flux_of(box)
-    box.solver.step(1)
+    box.step(1)
     box.solver.poll(wait=True)
     shot = box.solver.last_shot
     after = flux_of(box)
@@ -62,16 +62,16 @@ def test_light_that_will_come_back_is_shot_ahead(gpu: Gpu) -> None:
     with_it, without = (begin(gpu, lamp_room(0.7), texels=2000, residual=1e-3) for _ in range(2))
     lowest = 0.0
     for box in (with_it, without):
-        while not (box.solver.report.residual <= 1e-3 and box.solver.settled):
-            box.solver.step(8)
+        while not box.solver.poll().converged:
+            box.step(8)
             box.solver.poll()
             if box is without:
                 box.solver.buffers.ambient_target.clear()
-            elif box.solver.shots % 64 == 0:
+            elif box.solver.issued % 64 == 0:
                 lowest = min(lowest, flux_of(box).min())
         box.solver.poll(wait=True)
     assert lowest < 0
-    assert with_it.solver.shots < 0.8 * without.solver.shots
+    assert with_it.solver.issued < 0.8 * without.solver.issued
     assert abs(with_it.book.imbalance_share) < 5e-3  # form factors
     # each is off by what it left unshot, ten times its residual of what cancels within a tile
     assert np.sqrt(((with_it.H - without.H) ** 2).mean()) < 0.01 * with_it.H.mean()
@@ -83,10 +83,10 @@ def test_a_lamp_is_divided_and_fills_a_batch(gpu: Gpu) -> None:
     """Until a patch holds 2 % of the light, and several of one tile shoot at once."""
     box = begin(gpu, lamp_room(0.3), texels=2000, level=3, coarsen=False)
     emission = box.lightmap.emission().sum(-1) * box.lightmap.pool.surfaces.area
-    box.solver.step(8)
-    assert box.solver.poll(wait=True).shots == 8 > np.count_nonzero(emission.sum((1, 2)))
+    box.step(8)
+    assert box.solver.poll(wait=True).done == 8 > np.count_nonzero(emission.sum((1, 2)))
     for _ in range(20):
-        box.solver.step(1)
+        box.step(1)
         box.solver.poll(wait=True)
         shot = box.solver.last_shot
         sent = emission[patch_of(box, shot)].sum()
@@ -105,7 +105,7 @@ def test_what_is_partly_covered_shoots_from_its_finest_patches(gpu: Gpu, monkeyp
     largest, straddles = 0, 0
     for _ in range(300):
         lit = box.lightmap.irradiance().sum(-1)
-        box.solver.step(1)
+        box.step(1)
         box.solver.poll(wait=True)
         shot = box.solver.last_shot
         largest = max(largest, shot.size)
@@ -128,8 +128,8 @@ def test_a_patch_shoots_for_its_family_and_is_paid_back_evenly(gpu: Gpu, monkeyp
     box = begin(gpu, scene, **options)
     patches = np.count_nonzero(box.solver.buffers.finer_levels)
     received, owed = [], 0.0
-    while not (box.solver.report.residual <= 2e-3 and box.solver.settled):
-        box.solver.step(8)
+    while not box.solver.poll().converged:
+        box.step(8)
         box.solver.poll(wait=True)
         received.append((box.solver._phase, np.average(box.H.mean(1), weights=box.area)))
         if (

@@ -7,18 +7,27 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from solver_scenes import EVERY_WAY, UNIT_SQUARE, Solution, begin, grey, quads_scene, room, solve, table_room
+from solver_scenes import (
+    EVERY_LIGHTMAP,
+    EVERY_WAY,
+    UNIT_SQUARE,
+    Solution,
+    begin,
+    grey,
+    quads_scene,
+    room,
+    solve,
+    table_room,
+)
 
 from app.gpu import Gpu
 from app.reference.form_factors import point_to_polygon
 from app.scene.load import load_scene
 from app.scene.model import Scene
 from app.scene.shapes import icosphere
-from app.solvers import SOLVERS
 from app.solvers.shooting.options import FORM_FACTORS, VISIBILITIES
 from app.solvers.shooting.stages import BATCH
 
-EVERY_SOLVER = pytest.mark.parametrize("solver", SOLVERS)
 # The stereographic map draws edges straight, see app/visibility/occluders.py. Where the foot of a wall lies on the horizon, each
 # piece l of it at a distance d leaves a sliver of the rim open, h = (l/d)²/8 high: a parabola, in which the cosine is the height
 # above the rim, so 4/15 h² / π of the hemisphere per radian. Towards φ, l/d falls with cos²φ and h with cos⁴φ: 4/15 · 35/128 h²
@@ -39,10 +48,10 @@ def shares(solution: Solution) -> dict[str, float]:
 
 
 @EVERY_WAY
-def test_every_shooter_of_the_empty_box_hands_out_all_of_it(gpu: Gpu, solver: str, projection: str) -> None:
+def test_every_shooter_of_the_empty_box_hands_out_all_of_it(gpu: Gpu, adaptive: bool, projection: str) -> None:
     """Within 0.5 %: texels near a shooter are sampled at their centroid only, and an edge may take one map sample for the
     other wall's. Nothing leaves a closed box but what RIM says."""
-    box = begin(gpu, load_scene("furnace"), texels=2400, solver=solver, projection=projection)
+    box = begin(gpu, load_scene("furnace"), texels=2400, adaptive=adaptive, projection=projection)
     audits = box.audits()
     assert len(audits) == 150
     np.testing.assert_allclose([a.received for a in audits], 1.0, atol=0.005)
@@ -118,17 +127,17 @@ def test_book_counts_what_leaves_and_what_black_sides_take(gpu: Gpu, half_open: 
 
 
 @EVERY_WAY
-def test_furnace(gpu: Gpu, solver: str, projection: str) -> None:
-    furnace_glows_evenly(gpu, 0.5, solver, projection)
+def test_furnace(gpu: Gpu, adaptive: bool, projection: str) -> None:
+    furnace_glows_evenly(gpu, 0.5, adaptive, projection)
 
 
-@EVERY_SOLVER
+@EVERY_LIGHTMAP
 @pytest.mark.parametrize("rho", [0.3, 0.9])
-def test_furnace_of_other_albedo(gpu: Gpu, rho: float, solver: str) -> None:
-    furnace_glows_evenly(gpu, rho, solver, "hemicube")
+def test_furnace_of_other_albedo(gpu: Gpu, rho: float, adaptive: bool) -> None:
+    furnace_glows_evenly(gpu, rho, adaptive, "hemicube")
 
 
-def furnace_glows_evenly(gpu: Gpu, rho: float, solver: str, projection: str) -> None:
+def furnace_glows_evenly(gpu: Gpu, rho: float, adaptive: bool, projection: str) -> None:
     """In a closed box of one albedo and emission, B = E / (1 - ρ) everywhere.
 
     What is still unshot is missing, at most 1e-3 of the emitted power times the bounces it would still make, 1 / (1 - ρ), over
@@ -138,7 +147,7 @@ def furnace_glows_evenly(gpu: Gpu, rho: float, solver: str, projection: str) -> 
     bounces."""
     exitance = 2.0
     scene = quads_scene(room(), [grey(rho, exitance)])
-    furnace = solve(gpu, scene, texels=384, level=3, coarsen=False, solver=solver, projection=projection)
+    furnace = solve(gpu, scene, texels=384, level=3, coarsen=False, adaptive=adaptive, projection=projection)
     B = furnace.B[:, 1] * (1 - rho) / exitance
     assert np.average(B, weights=furnace.area) == pytest.approx(1, abs=0.01)
     assert np.abs(B - 1).max() < 0.01
@@ -147,11 +156,11 @@ def furnace_glows_evenly(gpu: Gpu, rho: float, solver: str, projection: str) -> 
     furnace.release()
 
 
-@EVERY_SOLVER
-def test_furnace_from_coarse_to_fine(gpu: Gpu, solver: str) -> None:
+@EVERY_LIGHTMAP
+def test_furnace_from_coarse_to_fine(gpu: Gpu, adaptive: bool) -> None:
     """The default. Patches of level 4 leave what is uneven to those of level 2, which end with 1 % of it: the mean is right, but
     close to an edge light may be off by several times that."""
-    furnace = solve(gpu, quads_scene(room(), [grey(0.5, 1.0)]), texels=860, solver=solver)
+    furnace = solve(gpu, quads_scene(room(), [grey(0.5, 1.0)]), texels=860, adaptive=adaptive)
     B = furnace.B[:, 1] * 0.5
     assert np.average(B, weights=furnace.area) == pytest.approx(1, abs=0.01)
     assert np.sqrt(np.average((B - 1) ** 2, weights=furnace.area)) < 0.01
@@ -161,7 +170,7 @@ def test_furnace_from_coarse_to_fine(gpu: Gpu, solver: str) -> None:
 
 
 @EVERY_WAY
-def test_furnace_with_a_ball(gpu: Gpu, solver: str, projection: str) -> None:
+def test_furnace_with_a_ball(gpu: Gpu, adaptive: bool, projection: str) -> None:
     """A ball of 1280 triangles in the room, under texels as large as 20 of them: they must neither hide in the ball nor look
     into it. Of the light, 1 % is still unshot, at most 2 % of B here; texels of several planes shoot and receive as if they were
     one, which loses another 1 %."""
@@ -175,7 +184,7 @@ def test_furnace_with_a_ball(gpu: Gpu, solver: str, projection: str) -> None:
         object_ids=np.concatenate([walls.object_ids, np.full(len(ball.triangles), 6)]).astype(np.int32),
         objects=(*walls.objects, "ball"),
     )
-    furnace = solve(gpu, scene, texels=1000, residual=0.01, solver=solver, projection=projection)
+    furnace = solve(gpu, scene, texels=1000, residual=0.01, adaptive=adaptive, projection=projection)
     B = furnace.means(furnace.B)[:, 0] / 2
     np.testing.assert_allclose(B, 1.0, atol=0.04)
     assert abs(shares(furnace)["imbalance"]) < 0.015
@@ -221,13 +230,13 @@ def test_a_lone_emitter_sends_everything_away(gpu: Gpu) -> None:
 
 
 @EVERY_WAY
-def test_cornell_box_with_an_audit_per_shot(gpu: Gpu, solver: str, projection: str) -> None:
+def test_cornell_box_with_an_audit_per_shot(gpu: Gpu, adaptive: bool, projection: str) -> None:
     """The open box with two blocks and a lamp 0.1 mm under the ceiling. What each shot hands out, shot by shot as the solve
     chooses them: within 1 % in the mean. A patch that a block stands on or cuts is off by more, and shoots less."""
-    box = begin(gpu, load_scene("cornell-box"), texels=4000, solver=solver, projection=projection, coarsen=False)
+    box = begin(gpu, load_scene("cornell-box"), texels=4000, adaptive=adaptive, projection=projection, coarsen=False)
     audits = []
     for _ in range(60):
-        box.solver.step(1)
+        box.step(1)
         box.solver.poll(wait=True)
         shot = box.solver.last_shot
         assert shot is not None
@@ -241,23 +250,23 @@ def test_cornell_box_with_an_audit_per_shot(gpu: Gpu, solver: str, projection: s
 
 
 @EVERY_WAY
-def test_cornell_box_book(gpu: Gpu, solver: str, projection: str) -> None:
+def test_cornell_box_book(gpu: Gpu, adaptive: bool, projection: str) -> None:
     """At 4000 texels a block's foot is a texel wide (2 cm), and a patch whose middle lies close to it sees too much or too
     little: the solve loses 1 % of the light, 1.5 % is allowed. The open front is a sixth of the box."""
-    box = solve(gpu, load_scene("cornell-box"), texels=4000, residual=5e-3, solver=solver, projection=projection)
+    box = solve(gpu, load_scene("cornell-box"), texels=4000, residual=5e-3, adaptive=adaptive, projection=projection)
     s = shares(box)
     assert abs(s["imbalance"]) < 0.015
     assert 0.2 < s["escaped"] < 0.4
     box.release()
 
 
-@EVERY_SOLVER
-def test_shots_of_a_batch_do_not_erase_each_other(gpu: Gpu, solver: str) -> None:
+@EVERY_LIGHTMAP
+def test_shots_of_a_batch_do_not_erase_each_other(gpu: Gpu, adaptive: bool) -> None:
     """One batch in a furnace: what its shooters give to each other must stay. If a residual were zeroed when its own turn
     comes, what the shots before had added to it would be gone: 1/8 of the shots' mutual light."""
     rho = 0.8
-    box = begin(gpu, quads_scene(room(), [grey(rho, 1.0)]), texels=1536, level=3, solver=solver)
-    box.solver.step(BATCH)
+    box = begin(gpu, quads_scene(room(), [grey(rho, 1.0)]), texels=1536, level=3, adaptive=adaptive)
+    box.step(BATCH)
     received = (box.H[:, 0] * box.area).sum()
     shooters = received / audit_area(box)
     assert shooters > 3  # not one shot
@@ -277,9 +286,9 @@ def audit_area(solution: Solution) -> float:
     return shot.area
 
 
-@EVERY_SOLVER
+@EVERY_LIGHTMAP
 @pytest.mark.parametrize("level", [2, 4])
-def test_small_charts_in_one_patch_are_not_taken_for_one_surface(gpu: Gpu, solver: str, level: int) -> None:
+def test_small_charts_in_one_patch_are_not_taken_for_one_surface(gpu: Gpu, adaptive: bool, level: int) -> None:
     """Two closed rooms, side by side and alike, of 4×4 texels a wall: at level 4 a patch holds walls of both. The light of one
     must stay in it, and reach those of its walls that share a tile with the lamp. Within 1 %: texels of a quarter of a metre.
     """
@@ -287,7 +296,7 @@ def test_small_charts_in_one_patch_are_not_taken_for_one_surface(gpu: Gpu, solve
     scene = quads_scene([*room(), *dark], [grey(0.3), grey(0.3, 1.0)], [0, 1] + [0] * 10)
     H = []
     for only in (scene, quads_scene(room(), scene.materials, [0, 1, 0, 0, 0, 0])):
-        lit = begin(gpu, only, density=4, level=level, solver=solver, residual=1e-4)
+        lit = begin(gpu, only, density=4, level=level, adaptive=adaptive, residual=1e-4)
         lit.solver._audits = False  # which strong shots only get
         lit.settle()
         H.append(lit.means(lit.H)[:, 0])
@@ -311,23 +320,23 @@ def coffered_room() -> Scene:
     return quads_scene([*quads, *shaft[1:]], [grey(0.5), grey(0.0, 10.0)], [0] * len(quads) + [1, 0, 0, 0, 0])
 
 
-@EVERY_SOLVER
+@EVERY_LIGHTMAP
 @pytest.mark.usefixtures("undivided")
-def test_a_lamp_in_a_shaft_shoots_from_finer_patches(gpu: Gpu, solver: str) -> None:
+def test_a_lamp_in_a_shaft_shoots_from_finer_patches(gpu: Gpu, adaptive: bool) -> None:
     """From the middle of the lamp more of the room is in sight than from its edges: in large patches it would make light. What
     is left after audits is what they let pass, 2 % of a shot, and what weak shots lose."""
     scene = coffered_room()
-    assert audited(gpu, scene, solver, audits=True) < 0.01
-    assert audited(gpu, scene, solver, audits=False) > 0.02
+    assert audited(gpu, scene, adaptive, audits=True) < 0.01
+    assert audited(gpu, scene, adaptive, audits=False) > 0.02
 
 
-def audited(gpu: Gpu, scene: Scene, solver: str, *, audits: bool) -> float:
+def audited(gpu: Gpu, scene: Scene, adaptive: bool, *, audits: bool) -> float:
     """The imbalance of a solve."""
-    lit = begin(gpu, scene, density=8, residual=0.05, level=3, solver=solver)
+    lit = begin(gpu, scene, density=8, residual=0.05, level=3, adaptive=adaptive)
     lit.solver._audits = audits
     lit.settle()
     finer, shot = lit.solver.buffers.finer_levels.max(), lit.solver.last_shot
-    assert lit.solver.settled and shot.size == lit.solver.patch_edge(
+    assert lit.solver.poll().converged and shot.size == lit.solver.patch_edge(
         shot.corner
     )  # host and shaders agree on what shoots
     share = abs(shares(lit)["imbalance"])
@@ -336,17 +345,17 @@ def audited(gpu: Gpu, scene: Scene, solver: str, *, audits: bool) -> float:
     return share
 
 
-@EVERY_SOLVER
-def test_patches_that_were_split_are_not_lost_at_another_level(gpu: Gpu, solver: str) -> None:
+@EVERY_LIGHTMAP
+def test_patches_that_were_split_are_not_lost_at_another_level(gpu: Gpu, adaptive: bool) -> None:
     """All residual is in some patch, once, whatever was split before patches grew or shrank: with residuals of one sign,
     Σ |Σ r A| over patches is Σ r A over texels."""
 
     def in_patches() -> float:
-        lit.solver.unshot_share()
+        lit.solver.settle()
         runs = np.frombuffer(lit.solver.buffers.runs.read(), np.float32).reshape(-1, 4)
         return float(runs[:, 3].sum(dtype=np.float64)) * lit.solver._watt
 
-    lit = begin(gpu, coffered_room(), density=8, solver=solver, level=2)
+    lit = begin(gpu, coffered_room(), density=8, adaptive=adaptive, level=2)
     lit.light_up()
     whole = lit.book.unshot.sum()
     assert in_patches() == pytest.approx(whole, rel=1e-4)

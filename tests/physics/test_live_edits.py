@@ -41,7 +41,7 @@ def test_an_edit_ends_where_a_fresh_solve_ends(gpu: Gpu, name: str) -> None:
     scene = table_room()
     materials = edited(scene, *EDITS[name])
     room = solve(gpu, scene, density=5, coarsen=False, residual=RESIDUAL, resolution=128)
-    before, unedited = room.solver.report.shots, room.B
+    before, unedited = room.solver.poll().done, room.B
     room.solver.set_materials(materials)
     room.shoot()
     fresh = solve(gpu, scene.with_materials(materials), density=5, coarsen=False, residual=RESIDUAL, resolution=128)
@@ -49,7 +49,7 @@ def test_an_edit_ends_where_a_fresh_solve_ends(gpu: Gpu, name: str) -> None:
     assert moved > 0.05, "the edit must change something, or nothing is tested"
     # both leave 1e-3 of the emitted power unshot, the edited one once more than the fresh one
     assert difference(room, fresh) < 5e-3
-    assert room.solver.report.shots - before < fresh.solver.report.shots
+    assert room.solver.poll().done - before < fresh.solver.poll().done
     book = room.book
     np.testing.assert_allclose(book.emitted, fresh.book.emitted, rtol=1e-6)
     # the books of both are off by the same form factors, as shares of the emitted power; the edited one
@@ -66,7 +66,7 @@ def test_a_dimmed_lamp_needs_no_shot(gpu: Gpu) -> None:
     room.solver.set_materials(edited(room.lightmap.scene, LAMP, {"emission": (20 / np.pi / 4,) * 3}))
     np.testing.assert_allclose(room.B, B / 4, rtol=1e-5, atol=1e-6 * B.max())
     np.testing.assert_allclose(room.book.escaped, escaped / 4, rtol=1e-5)
-    assert room.solver.unshot_share() < RESIDUAL
+    assert room.solver.settle().remaining < RESIDUAL
     room.release()
 
 
@@ -88,7 +88,7 @@ def test_one_of_two_lamps_switched_off(gpu: Gpu) -> None:
 def test_all_lamps_off_is_dark_at_once(gpu: Gpu) -> None:
     room = solve(gpu, table_room(), texels=1000, residual=0.01)
     room.solver.set_materials(edited(room.lightmap.scene, LAMP, {"emission": (0.0, 0.0, 0.0)}))
-    assert room.H.max() == 0 and room.r.max() == 0 and room.solver.unshot_share() == 0
+    assert room.H.max() == 0 and room.r.max() == 0 and room.solver.settle().remaining == 0
     room.release()
 
 
@@ -97,7 +97,7 @@ def test_fixed_point_begins_again(gpu: Gpu) -> None:
     room = begin(gpu, table_room(), texels=1000, storage="fixed8")
     room.shoot(50)
     room.solver.set_materials(edited(room.lightmap.scene, RED, {"albedo": (0.5, 0.5, 0.5)}))
-    assert room.solver.shots == 0 and room.H.max() == 0
+    assert room.solver.issued == 0 and room.H.max() == 0
     room.release()
 
 

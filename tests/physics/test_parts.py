@@ -7,6 +7,7 @@ import pytest
 from solver_scenes import begin, table_room
 
 from app.gpu import Gpu
+from app.util.parts import run_to_end
 
 SHOTS = 5
 
@@ -17,12 +18,11 @@ def test_parts_add_up_to_the_shot(gpu: Gpu, bands: int) -> None:
     whole, cut = (begin(gpu, table_room(), texels=3000) for _ in range(2))
     parts = 0
     for _ in range(SHOTS):
-        whole.solver.step(1)
+        whole.step(1)
         parts += 1
-        while not cut.solver.step_part(bands):
-            parts += 1
+        parts += sum(1 for _ in cut.solver.work(1, bands))
     assert parts == SHOTS * (2 * bands + 4)  # patches, audit, zero, see, receivers, the rest
-    assert cut.solver.shots == whole.solver.shots == SHOTS
+    assert cut.solver.issued == whole.solver.issued == SHOTS
     # bands share no texel: each gets the same numbers, added in the same order
     np.testing.assert_array_equal(cut.H, whole.H)
     np.testing.assert_array_equal(cut.r, whole.r)
@@ -34,20 +34,18 @@ def test_parts_add_up_to_the_shot(gpu: Gpu, bands: int) -> None:
 def test_so_do_the_parts_of_a_growing_tree(gpu: Gpu) -> None:
     """Leaves split, shots are made again into them, and leaves are judged: all in parts."""
     options = {"density": 4.0, "level": 1, "resolution": 64, "residual": 0.05, "depth": 2, "gradient": 0.3}
-    whole, cut = (begin(gpu, table_room(), solver="adaptive", **options) for _ in range(2))
+    whole, cut = (begin(gpu, table_room(), adaptive=True, **options) for _ in range(2))
     redone, most = 0, 0
     for _ in range(400):
-        whole.solver.step(1)
-        parts = 1
-        while not cut.solver.step_part(3):
-            parts += 1
+        whole.step(1)
+        parts = 1 + sum(1 for _ in cut.solver.work(1, 3))
         most = max(most, parts)
         redone += cut.solver._redo_under_way is not None  # type: ignore[attr-defined]
         whole.solver.poll(wait=True)
         cut.solver.poll(wait=True)
     assert redone > 3 and whole.lightmap.tiles > 20, "nothing grew"
     assert most > 2 * 3 + 4, "leaves were judged in one part with something else"
-    assert cut.solver.shots == whole.solver.shots
+    assert cut.solver.issued == whole.solver.issued
     np.testing.assert_array_equal(cut.H, whole.H)
     np.testing.assert_array_equal(cut.r, whole.r)
     whole.release()
@@ -57,17 +55,18 @@ def test_so_do_the_parts_of_a_growing_tree(gpu: Gpu) -> None:
 def test_what_needs_whole_shots_finishes_them(gpu: Gpu) -> None:
     """In the middle of a shot the shooter's residual is gone and not yet received: the book would be off by it."""
     room = begin(gpu, table_room(), texels=3000)
+    work = room.solver.work(1, 8)
     for _ in range(3):
-        assert not room.solver.step_part(8)
+        next(work)
     off = abs(room.solver._tile_sums()[0].sum() + room.solver._tile_sums()[1].sum() - room.solver._emitted.sum())
     assert off > 0.01 * room.solver._emitted.sum(), "nothing was under way"
     book = room.book
     assert abs(book.imbalance_share) < 5e-3  # form factors
-    assert room.solver.shots == 1
-    room.solver.step_part(8)
+    assert room.solver.issued == 1
+    assert next(work, None) is None, "it is over"
+    next(room.solver.work(1, 8))
     room.solver.reset()
-    assert room.solver.shots == 0 and room.H.max() == 0
-    while not room.solver.step_part(2):
-        pass
-    assert room.solver.shots == 1
+    assert room.solver.issued == 0 and room.H.max() == 0
+    assert run_to_end(room.solver.work(1, 2)) == 1
+    assert room.solver.issued == 1
     room.release()

@@ -70,7 +70,7 @@ def test_small_triangles_do_not_vanish(gpu: Gpu, projection: str) -> None:
         height = abs(audit.shot.centre[2] - 0.6)
         if audit.shot.area < 1e-3 or height < 0.05:  # of the speck itself, or edge-on
             continue
-        seen = np.frombuffer(solution.solver.inspect(audit.shot)["items"].read(), np.float32)
+        seen = np.frombuffer(solution.solver.sight(audit.shot)["items"].read(), np.float32)
         assert np.isin(seen, items).any()
         vanished.append(solution.solver.vanished(audit.shot))
     assert max(vanished) == 2 and np.mean(vanished) > 1.5  # of two triangles; a sample may hit one by chance

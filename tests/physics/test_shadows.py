@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from solver_scenes import UNIT_SQUARE, grey, quads_scene, room, solve
+from solver_scenes import EVERY_LIGHTMAP, UNIT_SQUARE, grey, quads_scene, room, solve
 
 from app.gpu import Gpu
-from app.solvers import SOLVERS
 from app.solvers.shooting.options import VISIBILITIES
 from app.visibility.projections import PROJECTIONS
 
@@ -17,18 +16,18 @@ LAMP = np.array(
 )  # beside the unit box, faces +x
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@EVERY_LIGHTMAP
 @pytest.mark.parametrize(
     ("visibility", "projection"), [*((v, "hemicube") for v in VISIBILITIES), *(("combined", p) for p in HEMISPHERES)]
 )
 @pytest.mark.parametrize("double_sided", [False, True], ids=["black outside", "white outside"])
 @pytest.mark.parametrize("shift", [0.0, 0.013], ids=["in line", "out of line"])
 def test_nothing_inside_a_closed_box_from_a_lamp_outside(
-    gpu: Gpu, solver: str, visibility: str, projection: str, double_sided: bool, shift: float
+    gpu: Gpu, adaptive: bool, visibility: str, projection: str, double_sided: bool, shift: float
 ) -> None:
     """The walls are as thin as can be, and patches of the lamp lie in the planes of floor and walls."""
     scene = quads_scene([*room(), LAMP + shift], [grey(0.5, double_sided=double_sided), grey(0.0, 1.0)], [0] * 6 + [1])
-    ways = {"visibility": visibility, "projection": projection, "solver": solver}
+    ways = {"visibility": visibility, "projection": projection, "adaptive": adaptive}
     box = solve(gpu, scene, texels=2000, residual=0.05, **ways)
     inside = (box.object < 6) & (((0.5 - box.position) * box.normal).sum(1) > 0)
     assert inside.sum() > 500

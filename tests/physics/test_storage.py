@@ -10,7 +10,7 @@ import pytest
 from solver_scenes import Solution, begin, grey, quads_scene, room, solve
 
 from app.gpu import Gpu
-from app.lightmap.lightmap import STORAGE
+from app.lightmap.options import STORAGE
 from app.scene.model import Material, Scene
 
 
@@ -50,7 +50,7 @@ def test_half_floats_are_close_shot_by_shot(gpu: Gpu) -> None:
     for storage in ("rgba32f", "rgba16f"):
         solution = solve(gpu, scene, texels=2000, residual=1e-6, coarsen=False, storage=storage)
         H.append(solution.H)
-        shots = solution.solver.shots
+        shots = solution.solver.issued
         solution.release()
     assert H[0].mean() > 0.3 and shots < 40
     np.testing.assert_allclose(
@@ -88,17 +88,17 @@ def test_unshot_light_falls_shot_by_shot(gpu: Gpu, coarsen: bool) -> None:
     is shot ahead as with other. The report is what the texels say, tile by tile."""
     box = begin(gpu, two_coloured_room(), texels=2000, coarsen=coarsen)
     unshot = [box.book.unshot.sum()]
-    while box.solver.report.residual > 0.05:
-        box.solver.step(8)
+    while box.solver.poll().remaining > 0.05:
+        box.step(8)
         box.solver.poll(wait=True)
         unshot.append(box.book.unshot.sum())
     assert all(later < earlier for earlier, later in itertools.pairwise(unshot))
     area = box.lightmap.pool.surfaces.area[..., None]
     flux = (box.lightmap.residual().astype(np.float64) * area).sum((1, 2))
-    said = box.solver.unshot_share() * box.book.emitted.sum()
+    said = box.solver.settle().remaining * box.book.emitted.sum()
     assert said == pytest.approx(np.abs(flux).sum(), rel=1e-4)  # f32 sums
-    box.solver.step(1)  # a report is of the state before its step
-    assert box.solver.poll(wait=True).residual * box.book.emitted.sum() == pytest.approx(said, rel=1e-4)
+    box.step(1)  # a report is of the state before its step
+    assert box.solver.poll(wait=True).remaining * box.book.emitted.sum() == pytest.approx(said, rel=1e-4)
     box.release()
 
 
@@ -108,7 +108,7 @@ def test_the_same_solve_again_is_identical(gpu: Gpu) -> None:
     first.shoot(200)
     H = first.H
     first.solver.reset()
-    assert first.H.max() == 0 and first.solver.shots == 0 and first.book.absorbed.sum() == 0
+    assert first.H.max() == 0 and first.solver.issued == 0 and first.book.absorbed.sum() == 0
     first.shoot(200)
     second = begin(gpu, two_coloured_room(), texels=1500, resolution=128)
     second.shoot(200)
@@ -120,10 +120,10 @@ def test_the_same_solve_again_is_identical(gpu: Gpu) -> None:
 
 def test_a_scene_without_light_stays_dark(gpu: Gpu) -> None:
     dark = begin(gpu, quads_scene(room(), [grey(0.5)]), texels=400)
-    assert dark.solver.report.residual == 0
-    dark.solver.step(8)
+    assert dark.solver.poll().remaining == 0
+    dark.step(8)
     dark.solver.poll(wait=True)
-    assert dark.solver.report.residual == 0
+    assert dark.solver.poll().remaining == 0
     assert dark.H.max() == 0 and dark.book.imbalance_share == 0
     dark.release()
 

@@ -36,7 +36,7 @@ from app.scene.model import Scene
 from app.solvers import ShootingOptions
 from app.util.console import Console, Tell
 from app.util.json_text import json_text
-from app.util.parts import whole
+from app.util.parts import run_to_end
 from app.util.tables import FLIP, Column, Row, csv_text, markdown_table, missing
 
 TITLE = "Error against time"
@@ -239,7 +239,7 @@ def _curve(gpu: Gpu, one: SceneCurves, truth: Truth, name: str, plan: Plan) -> l
         expectation, looks = Expectation(gpu, lightmap, MAPS), itertools.count()
 
         def expected() -> Row:
-            error = whole(expectation.parts(solver.books().returned, SECONDS))
+            error = run_to_end(expectation.parts(solver.books().returned, SECONDS))
             return {} if error is None else {"expected": error.rms}
 
         def look() -> Row:

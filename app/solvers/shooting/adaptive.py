@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from app.gpu import Gpu, Pass, ReadBack
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import FIRST_ROOM, Change, Quadtree, Tile
+from app.lightmap.refinement import Refinement
 from app.lightmap.transfer import Regrowth
 from app.scene.model import Material
-from app.solvers.shooting.options import TREE, ShootingOptions
+from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.reshooting import Reshooting
 from app.solvers.shooting.shot import rows_of
 from app.solvers.shooting.stages import ROOT_LEVEL
@@ -36,8 +37,6 @@ PER_SHOT = 8  # leaves that split or families that merge, for each shot of a ste
 class AdaptiveShooting(Reshooting):
     """Shoots a lightmap whose tile pool has room for more leaves than it holds. Whoever makes it releases it."""
 
-    adaptive = True
-
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
         self.tree = Quadtree(lightmap.pool)
         self._regrowth = Regrowth(gpu, lightmap)
@@ -45,27 +44,45 @@ class AdaptiveShooting(Reshooting):
         self._judged: tuple[int, ReadBack] | None = None  # on its way, and the version of the leaves that it is of
         self._look_at = 0
         self._split_at: dict[Tile, int] = {}  # shots in the log when a leaf was split
-        self._calm = False  # whether the last look at the leaves found nothing to do
         self._calm_at = 0  # shots in the log then
         super().__init__(gpu, lightmap, options)
-        self._roughness, self._roughness_target = self._texels(per_slot=True)
+        if self.adaptive:
+            self._roughness, self._roughness_target = self._texels(per_slot=True)
 
     # -- the solver's interface ----------------------------------------------------------------------------------------
 
     def reset(self) -> None:
         """Forget all light. The leaves stay: those that are not needed merge."""
+        if self.refinement is not None:
+            self.refinement.changed = False
         self._look_anew()
         super().reset()
 
-    def set_options(self, options: ShootingOptions) -> None:
-        self._calm = False
-        rest = options.replace(**{name: getattr(self.options, name) for name in TREE})  # but for the tree as it is
-        if rest != options:
+    @property
+    def refinement(self) -> Refinement | None:
+        return self.lightmap.refinement
+
+    @property
+    def _calm(self) -> bool:
+        """Whether the last look at the leaves found nothing to do."""
+        return self.refinement is None or self.refinement.stable
+
+    @_calm.setter
+    def _calm(self, calm: bool) -> None:
+        if self.refinement is not None:
+            self.refinement.stable = calm
+
+    def _heed_refinement(self) -> None:
+        """Take in that the user asked for other leaves."""
+        if self.refinement is not None and self.refinement.changed:
+            self.refinement.changed = False
             self._all_again = bool(self._log.count)
             self._split_at.clear()
-        if rest != self.options:
+
+    def set_options(self, options: ShootingOptions) -> None:
+        self._calm = False
+        if options != self.options:
             super().set_options(options)
-        self.options = options
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         self.finish()
@@ -80,6 +97,8 @@ class AdaptiveShooting(Reshooting):
     @property
     def grown(self) -> bool:
         """Whether the tree has stopped growing and all its leaves hold what the shots gave them."""
+        if not self.adaptive:
+            return True
         judged = self._calm and not (self._done and self._calm_at < self._log.count)  # once more at the end
         return judged and not self._fresh and self._redo_under_way is None
 
@@ -91,6 +110,9 @@ class AdaptiveShooting(Reshooting):
     def _parts(self, shots: int, bands: int) -> Generator[None, None, int]:
         """First what there is to do for fresh leaves, a batch of earlier shots at a time, then shots while light is left; not
         until the leaves have followed a slider that was moved."""
+        if not self.adaptive:
+            return (yield from super()._parts(shots, bands))
+        self._heed_refinement()
         made = 0
         done = bool(self._log.count) and self._done
         if self._redo_under_way is not None:
@@ -112,10 +134,14 @@ class AdaptiveShooting(Reshooting):
 
     def _levels_above(self, slots: NDArray[np.int64]) -> NDArray[np.int64]:
         """Patches are about as large in the scene in leaves of every level."""
+        if not self.adaptive:
+            return super()._levels_above(slots)
         return ROOT_LEVEL - self.lightmap.pool.leaves.level[slots].astype(np.int64)
 
-    def passes(self, shots: int) -> dict[str, Callable[[], None]]:
-        return super().passes(shots) | {
+    def passes(self, amount: int) -> dict[str, Callable[[], None]]:
+        if not self.adaptive:
+            return super().passes(amount)
+        return super().passes(amount) | {
             "judge": self._weigh_leaves,
             "grow": self._grow_and_back,
             "redo": self._redo_one,
@@ -123,7 +149,8 @@ class AdaptiveShooting(Reshooting):
 
     def release(self) -> None:
         self._drop_judged()
-        self.gpu.release_all(self._roughness_target, self._roughness)
+        if self.adaptive:
+            self.gpu.release_all(self._roughness_target, self._roughness)
         super().release()
 
     # -- judging and growing -------------------------------------------------------------------------------------------
@@ -166,7 +193,7 @@ class AdaptiveShooting(Reshooting):
 
     def _grow(self, judged: NDArray[np.float64], most: int) -> bool:
         """Split and merge where the judgement (slots, 4), see judge.frag.glsl, says so. Whether anything changed."""
-        pool, options = self.lightmap.pool, self.options
+        pool, options = self.lightmap.pool, self.lightmap.options
         level = pool.leaves.level
         rough, smooth = self._opinion(judged)
         grows = np.flatnonzero(pool.used & (level < options.depth) & rough)
@@ -194,7 +221,7 @@ class AdaptiveShooting(Reshooting):
         when many more shots have been made since."""
         level, x, y = self.tree.tile(family[0])
         since = self._split_at.get((level - 1, x >> 1, y >> 1))
-        return level > self.options.depth or since is None or self._log.count >= MERGE_AFTER * since
+        return level > self.lightmap.options.depth or since is None or self._log.count >= MERGE_AFTER * since
 
     def _make_room(self, slots: int) -> None:
         """Have so many free slots, if the budget allows."""
@@ -202,7 +229,7 @@ class AdaptiveShooting(Reshooting):
         if self.tree.room >= slots:
             return
         longest = self.gpu.limits.max_texture // (pool.tile + 4)  # slots in a column of display texels and borders
-        most = min(self.options.budget // pool.tile**2, pool.columns * longest)
+        most = min(self.lightmap.options.budget // pool.tile**2, pool.columns * longest)
         wanted = min(max(pool.tiles * 3 // 2, pool.tiles + slots), most)
         if wanted > pool.tiles:
             self._resize(wanted)
@@ -228,7 +255,7 @@ class AdaptiveShooting(Reshooting):
 
     def _opinion(self, judged: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which leaves should split, and which need not be as fine as they are."""
-        options = self.options
+        options = self.lightmap.options
         if options.criterion == "shadow":
             share = judged[:, 3]
             mixed = (share > options.shadow) & (share < 1 - options.shadow)

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.lightmap.lightmap import STORAGE
-from app.lightmap.quadtree import MAX_DEPTH
 from app.options import Options, option
 from app.visibility.projections import PROJECTIONS
 
 MAX_LEVEL = 4  # of the patches that shoot: 16×16 texels
 FORM_FACTORS = ("polygon", "disc")
-CRITERIA = ("gradient", "shadow")
-TREE = ("depth", "criterion", "gradient", "shadow", "budget")  # options of quadtrees only
 VISIBILITIES = ("item-id", "depth", "combined")  # in the order of VISIBILITY in shooting/visible.glsl
 
 
@@ -23,7 +19,7 @@ def highest_level(tile: int) -> int:
 
 @dataclass(frozen=True)
 class ShootingOptions(Options):
-    """Only ``storage`` restarts the solution when it changes; ``ambient`` acts on what is shown, the rest on the next shot."""
+    """``ambient`` acts on what is shown, the rest on the next shot: none restarts the solution."""
 
     level: int | None = option(
         None,
@@ -57,23 +53,3 @@ class ShootingOptions(Options):
         maximum=2048,
         multiple=64,
     )
-    depth: int = option(
-        3, "finest level of quadtree leaves, each half the texel of the one above", minimum=0, maximum=MAX_DEPTH
-    )
-    criterion: str = option(
-        "gradient", "a leaf splits where the light's gradient jumps, or where light and shadow mix", choices=CRITERIA
-    )
-    gradient: float = option(
-        0.5,
-        "jump of irradiance between texels that splits a leaf, over the scene's mean",
-        minimum=1e-4,
-        maximum=10,
-        logarithmic=True,
-    )
-    shadow: float = option(
-        0.02, "share of a leaf's texels in shadow, or in light, that splits it", minimum=0, maximum=0.5
-    )
-    budget: int = option(
-        2_000_000, "texels that quadtree leaves may hold in all", minimum=65_536, maximum=16_000_000, logarithmic=True
-    )
-    storage: str = option("rgba32f", "format that holds irradiance and residual", choices=tuple(STORAGE))

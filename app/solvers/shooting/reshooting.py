@@ -51,7 +51,8 @@ class Reshooting(UniformShooting):
             vertex="common/rects",
         )
         self._copy = Pass(gpu, "common/copy")
-        self._correction, self._correction_target = self._texels()
+        if self.adaptive:
+            self._correction, self._correction_target = self._texels()
         self._strong: tuple[Texture, Framebuffer] | None = None  # S
         self._strong_shots = 0  # in the log, whose light S is
         self._weak = False  # whether only weak shots are left
@@ -92,7 +93,8 @@ class Reshooting(UniformShooting):
         self._end_redo()
         self._forget_strong()
         self._log.release()
-        self.gpu.release_all(self._correction_target, self._correction)
+        if self.adaptive:
+            self.gpu.release_all(self._correction_target, self._correction)
         super().release()
 
     def _scale_light(self, factor: F64) -> None:
@@ -102,7 +104,7 @@ class Reshooting(UniformShooting):
     def _choose(self, shots: int, bands: int) -> Iterator[None]:
         """The batch; once only weak ones are left, H is kept as S."""
         yield from super()._choose(shots, bands)
-        if self._weak and self._strong is None and self.lightmap.storage != "fixed8":
+        if self.adaptive and self._weak and self._strong is None and self.lightmap.storage != "fixed8":
             self._strong, self._strong_shots = self._texels(), self._log.count
             H = self.lightmap.texture("t_irradiance")
             self._copy.draw(self._strong[1], textures={"t_source": H}, uniforms={"u_offset_px": (0, 0)})
@@ -122,7 +124,8 @@ class Reshooting(UniformShooting):
 
     def _book(self, shots: int) -> None:
         super()._book(shots)
-        self._log.add(self.buffers, shots)
+        if self.adaptive:
+            self._log.add(self.buffers, shots)
 
     # -- leaves that come and go ---------------------------------------------------------------------------------------
 

@@ -280,7 +280,8 @@ class ShotStages:
 
         resolution = {"RESOLUTION": self.resolution}
         reads = {"projection": self.projection.glsl}
-        keeps = {"KEEPS": options.storage != "fixed8"}
+        self.storage = lightmap.storage
+        keeps = {"KEEPS": self.storage != "fixed8"}
         self.zero = Pass(
             gpu, "solvers/shooting/zero", defines=keeps | lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE")
         )

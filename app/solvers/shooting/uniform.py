@@ -14,9 +14,11 @@ Works badly where the middle of a patch sees something else than the rest of it 
 
 from __future__ import annotations
 
+import inspect
 from collections import deque
-from collections.abc import Callable, Generator, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +26,7 @@ from numpy.typing import NDArray
 from app.gpu import Gpu, ReadBack, Texture
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64, Material
-from app.solvers.base import EnergyBalance, StepReport
+from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.shooting.options import ShootingOptions, highest_level
 from app.solvers.shooting.shot import Audit, AuditTargets, Shot, ShotPasses, powers_of
 from app.solvers.shooting.stages import (
@@ -37,7 +39,8 @@ from app.solvers.shooting.stages import (
     ShotBuffers,
     ShotStages,
 )
-from app.util.parts import whole
+from app.util.parts import run_to_end
+from app.visibility.item_image import ItemImage
 
 # Large patches shoot first, and finer ones what those leave once so little of the emitted power is unshot. What is left then is
 # more here and less there: light that hardly leaves its corner. So they end once they hold so many times the residual asked for.
@@ -46,26 +49,38 @@ MOST = 0.02  # of the emitted power: emitters of more are divided, one lamp into
 PAID = 1 / 16  # of that: families that owe no more may pay when others shoot as much
 FAMILY = 4  # patches, two along each edge, see family.glsl
 FEET = 2  # 1 + by how many levels patches at the foot of what stands on them are finer than the finest: they light it from near
-WHOLE = object()  # no part is left
 REPORT_LAG = 2  # read-backs in flight before the oldest is looked at
+
+
+@dataclass(frozen=True)
+class Report:
+    """What the GPU said last: shots made; residual: unshot share of the emitted power [-], 1 before the first shot; escaped:
+    power that left the scene, RGB [W]."""
+
+    shots: int
+    residual: float
+    escaped: F64
 
 
 class UniformShooting(ShotPasses):
     """Shoots ``lightmap`` to convergence. Whoever makes it releases it."""
 
-    adaptive = False  # whether leaves come and go
     note: str | None = None
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions) -> None:
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
-        if lightmap.storage != options.storage:
-            lightmap.set_storage(options.storage)
         self.buffers = ShotBuffers(gpu, lightmap)
         self.stages = self._make_stages(options)
         self.last_shot: Shot | None = None
         self._under_way: Generator[None, None, int] | None = None
+        self._items = ItemImage(gpu)
         self._reports: deque[tuple[ChoiceStages, ReadBack]] = deque()
         self.reset()
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether leaves come and go."""
+        return self.lightmap.refinement is not None
 
     def _make_stages(self, options: ShootingOptions) -> ShotStages:
         return ShotStages(self.gpu, self.lightmap, options, adaptive=self.adaptive)
@@ -74,46 +89,47 @@ class UniformShooting(ShotPasses):
 
     def reset(self) -> None:
         """Forget all light: H = 0, r = E."""
-        self._under_way = None
+        if self.stages.storage != self.lightmap.storage:
+            self.stages.release()
+            self.stages = self._make_stages(self.options)
+        if self._under_way is not None:
+            self._under_way.close()
+            self._under_way = None
         self.lightmap.clear()
         self.buffers.ledger_target.clear()
         self._drop_reports()
         self.buffers.all_alike()
         self._phase, self._audits, self._even = 0, True, False
-        self.shots, self.last_shot = 0, None
+        self.issued, self.last_shot = 0, None
         self.buffers.ambient_target.clear()
         self._weigh_scene()
         self._divide_emitters()
         if self.lightmap.storage != "fixed8":  # 8 bits do not hold what a small one gives
             self.buffers.divide_at(self.lightmap.pool.surfaces.cut, FEET)
-        self.report = StepReport(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
+        self.report = Report(0, 1.0 if self._emitted.sum() > 0 else 0.0, np.zeros(3))
 
     def set_options(self, options: ShootingOptions) -> None:
-        """Use other knobs from the next shot on. Another storage format starts again."""
+        """Use other knobs from the next shot on."""
         self.finish()
         if options.replace(ambient=self.options.ambient) == self.options:
             self.options = options
             self._expect_anew()
             return
-        restart = options.storage != self.options.storage
         self._remake_stages(options)
-        if restart:
-            self.lightmap.set_storage(options.storage)
-            self.reset()
 
     def _remake_stages(self, options: ShootingOptions) -> None:
-        fresh, finest = self._make_stages(options), self.level
+        fresh, finest = self._make_stages(options), self._finest_level
         self.stages.release()
         self.stages, self.options = fresh, options
         self._phase, self._audits, self._even = min(self._phase, len(fresh.choices) - 1), True, False
-        self.buffers.finest_is(self.level - finest)
+        self.buffers.finest_is(self._finest_level - finest)
         self._divide_emitters()
         self._expect_anew()
 
     def _expect_anew(self) -> None:
         """What is still to come, of all that is unshot now."""
         self.lightmap.ambient_target.clear()
-        if self.shots:
+        if self.issued:
             self.unshot_share()
             self._expect()
 
@@ -194,37 +210,40 @@ class UniformShooting(ShotPasses):
         emitted = self._emitted.sum()
         return float(runs.sum()) * self._watt / emitted if emitted > 0 else 0.0
 
-    def step(self, shots: int) -> int:
-        """Make up to ``shots`` shots (at most BATCH), the strongest patches first. Returns how many were issued: of a batch,
-        those too weak beside its best are left for later, and not counted once ``poll`` has heard of it."""
+    def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
+        """Up to ``amount`` shots (at most BATCH), the strongest patches first, in parts. Returns how many were issued: of a
+        batch, those too weak beside its best are left for later, and not counted once ``poll`` has heard of it."""
         self.finish()
-        return whole(self._parts(min(shots, BATCH), 1))
-
-    def step_part(self, bands: int) -> bool:
-        """A part of one shot, its receivers in so many bands; whether the shot is whole now. What needs whole shots finishes it
-        first."""
-        parts, self._under_way = self._under_way or self._parts(1, bands), None  # a part may itself need what is whole
-        if next(parts, WHOLE) is not WHOLE:
-            self._under_way = parts
-        return self._under_way is None
+        self._under_way = self._parts(min(amount, BATCH), bands)
+        return self._under_way
 
     def finish(self) -> None:
-        """Make the shot whole that is under way, if any."""
-        while self._under_way is not None:
-            self.step_part(1)
+        """End the work that is under way, if any; of its own parts this asks nothing."""
+        if self._under_way is not None and inspect.getgeneratorstate(self._under_way) != inspect.GEN_RUNNING:
+            for _ in self._under_way:
+                pass
+            self._under_way = None
 
-    def poll(self, *, wait: bool = False) -> StepReport:
-        """The newest report that has arrived: the state before the step that sent it; with ``wait`` that of the last step."""
+    def poll(self, *, wait: bool = False) -> Progress:
+        """The newest progress that has arrived: the state before the work that sent it; with ``wait`` that of the last."""
         if wait:
             self.finish()
         while self._reports and (wait or len(self._reports) > REPORT_LAG):
             choice, readback = self._reports.popleft()
             self._hear(choice, np.frombuffer(readback.take(), np.float32).reshape(-1, 4).astype(np.float64))
         if not self._reports:
-            self.shots = self.report.shots
-        return self.report
+            self.issued = self.report.shots
+        report = self.report
+        converged = report.residual <= self.options.residual and self.settled
+        return Progress(report.shots, report.residual, report.escaped, converged, not self.grown, self.note)
 
-    def books(self) -> EnergyBalance:
+    def settle(self) -> Progress:
+        """End the work under way, and measure what is unshot."""
+        self.poll(wait=True)
+        self.report = replace(self.report, residual=self.unshot_share())
+        return self.poll()
+
+    def energy(self) -> EnergyBalance:
         """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
         self.finish()
         absorbed, unshot, reflectance = self._tile_sums()
@@ -255,11 +274,11 @@ class UniformShooting(ShotPasses):
             shares = self._hand_out(targets, 0, float(powers_of(row)[0]))
         return Audit(*shares, self._shot_from_rows(row[0]))
 
-    def passes(self, shots: int) -> dict[str, Callable[[], None]]:
+    def passes(self, amount: int) -> dict[str, Callable[[], None]]:
         """Each part of a step by itself, to be timed. They leave the light wrong: reset afterwards."""
-        shots = min(shots, BATCH)
+        shots = min(amount, BATCH)
         return {
-            "choose": lambda: whole(self._pick(shots)),
+            "choose": lambda: run_to_end(self._pick(shots)),
             "zero": lambda: self._zero(shots),
             "see": lambda: self._for_groups(self._see, shots),
             "receive": lambda: self._for_groups(self._light, shots),
@@ -267,15 +286,15 @@ class UniformShooting(ShotPasses):
             "book": lambda: self._book(shots),
         }
 
-    def warm_up(self, shots: int) -> Iterator[None]:
+    def warm_up(self) -> Iterator[None]:
         """Every pass, and how finer patches are chosen."""
-        for run in self.passes(shots).values():
+        for run in self.passes(1).values():
             run()
             self.gpu.ctx.finish()
             yield
         for phase in range(1, len(self.stages.choices)):
             self._phase = phase
-            whole(self._pick(1))
+            run_to_end(self._pick(1))
             self.gpu.ctx.finish()
             yield
 
@@ -306,16 +325,32 @@ class UniformShooting(ShotPasses):
         return *shot.corner, shot.size, self._level_of(self._slot_at(shot.corner), self.stages.choices[-1])
 
     @property
-    def level(self) -> int:
-        return self.stages.choices[-1].level
+    def resolved(self) -> Mapping[str, Any]:
+        """The level that shoots in the end, and the edge of a full face of the visibility map [px]."""
+        return {"level": self._finest_level, "resolution": self.stages.resolution}
 
     @property
-    def resolution(self) -> int:
-        return self.stages.resolution
+    def _finest_level(self) -> int:
+        return self.stages.choices[-1].level
 
-    def inspect(self, shot: Shot | None = None) -> dict[str, Texture]:
-        """What ``last_shot`` or another one sees. Drawn for this: the maps of a step are those of whatever it did last, and in
-        use while it is under way."""
+    def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
+        """What ``last_shot`` saw, its patch, and the patch of a texel."""
+        shot, facts, pictures = self.last_shot, {"Projection": self.options.projection}, {}
+        if images:
+            seen = self.sight()
+            pictures["What the last shooter saw"] = self._items.draw(seen["items"], seen["depth"], self.stages.map_size)
+            if count := self.vanished():
+                facts["Smaller than a sample"] = f"{count:,} triangles"
+        rectangles = {} if shot is None else {"last shooter": shot.rect}
+        return Inspection(pictures, rectangles, facts, {} if texel is None else self._facts_of(texel))
+
+    def _facts_of(self, texel: tuple[int, int]) -> dict[str, str]:
+        edge = self.patch_edge(texel)
+        return {"Patch": f"{texel[0] // edge}, {texel[1] // edge} of {edge}×{edge} texels"}
+
+    def sight(self, shot: Shot | None = None) -> dict[str, Texture]:
+        """What ``last_shot`` or another one sees: ``items`` and ``depth``, nothing before the first. Drawn for this: the maps of
+        a step are those of whatever it did last, and in use while it is under way."""
         maps, shot = self.stages.inspected, shot or self.last_shot
         if shot is None:
             maps.target.clear(OPEN, depth=1.0)
@@ -331,6 +366,7 @@ class UniformShooting(ShotPasses):
 
     def release(self) -> None:
         self._drop_reports()
+        self._items.release()
         self.stages.release()
         self.buffers.release()
 
@@ -352,7 +388,7 @@ class UniformShooting(ShotPasses):
                 yield
             self._look_out(first, some)
         self._book(shots)
-        self.shots += shots
+        self.issued += shots
         self._tell()
         return shots
 
@@ -380,7 +416,7 @@ class UniformShooting(ShotPasses):
             self._even = finest and left <= FINE_LEAVE * self.options.residual * float(emitted)
             if not finest:
                 self._next_phase()
-        self.report = StepReport(int(report[1, 3]), float(residual), report[1, :3] * self._watt)
+        self.report = Report(int(report[1, 3]), float(residual), report[1, :3] * self._watt)
         if report[REPORT_HEAD + 5, 3] != 0:
             self.last_shot = self._shot_from_rows(report[REPORT_HEAD:])
 
