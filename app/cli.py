@@ -1,55 +1,48 @@
 """The command line: glowtree view | shot | bake | info | bench | doctor.
 
-Flags are the declared options of scene cutting, shooting and display; nothing is listed twice. Bad input is one line on stderr
-and exit code 2; Ctrl-C ends early, keeps what is there, and exits with 130.
+Flags are the declared options of how scenes are cut, of the solver that ``--solver`` names, of how light is held and of the
+display; nothing is listed twice. Bad input is one line on stderr and exit code 2; Ctrl-C ends early, keeps what is there, and
+exits with 130.
 """
 
 from __future__ import annotations
 
 import argparse
-import difflib
+import itertools
 import os
-import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import NamedTuple
 
 from app import __version__
 from app.atlas.options import AtlasOptions
+from app.commands.flags import (
+    DEFAULT_SCENE,
+    Parser,
+    json_flag,
+    output_flag,
+    positive,
+    reference_flag,
+    scene_flags,
+    size_flag,
+    solver_flags,
+    stop_flags,
+)
 from app.errors import UserError
-from app.lightmap.options import STORAGE
+from app.lightmap.options import LightmapOptions
 from app.options import add_flags
 from app.render.options import DisplayOptions
-from app.solvers import ShootingOptions
+from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
 
-DEFAULT_SCENE = "cornell-box"
 ERROR_SCENES = ("furnace", "cornell-box")
 HARD_SIZES = ("small", "large")
-ALIKE = 0.75  # share of letters in common that makes a flag a likely slip for another; all begin with the same dashes
-
-
-class Parser(argparse.ArgumentParser):
-    """argparse, with errors on one line. A flag must be written out, and one that is unknown is named with the nearest."""
-
-    def __init__(self, **keywords: Any) -> None:
-        super().__init__(**keywords, allow_abbrev=False)
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        flags, unknown = super().parse_known_args(args, namespace)
-        if unknown:
-            known = re.findall(r"--[\w-]+", self.format_usage())
-            close = difflib.get_close_matches(unknown[0].split("=")[0], known, n=1, cutoff=ALIKE)
-            self.error(f"unknown argument {unknown[0]}" + (f"; did you mean {close[0]}?" if close else ""))
-        return flags, unknown
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 
 def run(arguments: list[str]) -> int:
     """Run one command. Returns the exit code."""
-    flags = build_parser().parse_args(arguments or ["view"])
+    arguments = arguments or ["view"]
+    flags = build_parser(solver_named(arguments)).parse_args(arguments)
     command: Callable[[argparse.Namespace], int] = flags.command
     try:
         code = command(flags)
@@ -70,15 +63,23 @@ def run(arguments: list[str]) -> int:
 
 
 class Command(NamedTuple):
-    """What a word after ``glowtree`` does. flags: adds its own to a parser. run: with them, returns the exit code; none where
-    another word follows."""
+    """What a word after ``glowtree`` does. flags: adds its own, and those of a solver, to a parser. run: with them, returns the
+    exit code; none where another word follows."""
 
     help: str
-    flags: Callable[[Parser], None]
+    flags: Callable[[Parser, Family], None]
     run: Callable[[argparse.Namespace], int] | None = None
 
 
-def build_parser() -> Parser:
+def solver_named(arguments: Sequence[str]) -> str:
+    """The solver that is asked for, whose flags are then known; the default one where none is, or none of that name."""
+    words = [word for argument in arguments for word in argument.split("=", 1)]
+    named = [value for flag, value in itertools.pairwise(words) if flag == "--solver" and value in SOLVERS]
+    return named[-1] if named else DEFAULT_SOLVER
+
+
+def build_parser(solver: str = DEFAULT_SOLVER) -> Parser:
+    """solver: whose options are flags."""
     parser = Parser(prog="glowtree", description="Interactive radiosity: watch light being shot until it converges.")
     parser.add_argument("--version", action="version", version=f"glowtree {__version__}")
     commands = {
@@ -87,13 +88,13 @@ def build_parser() -> Parser:
         "bake": Command("solve and write scene.glb, irradiance.exr and report.json", _bake_flags, _bake),
         "info": Command("what a scene would take, before any work", _info_flags, _info),
         "bench": Command("measure on this machine", _bench_flags),
-        "doctor": Command("what this machine has, and what is missing", _json_flag, _doctor),
+        "doctor": Command("what this machine has, and what is missing", _doctor_flags, _doctor),
     }
-    _add_commands(parser, "command", commands)
+    _add_commands(parser, "command", commands, SOLVERS[solver])
     return parser
 
 
-def _bench_flags(parser: Parser) -> None:
+def _bench_flags(parser: Parser, family: Family) -> None:
     benches = {
         "shots": Command("milliseconds per shot, by pass, at the papers' sizes", _shots_flags, _bench_shots),
         "frames": Command("milliseconds per frame of the viewer, by part", _frames_flags, _bench_frames),
@@ -103,14 +104,14 @@ def _bench_flags(parser: Parser) -> None:
             "scenes that are hard on a light solver, against the answers they must give", _hard_flags, _bench_hard
         ),
     }
-    _add_commands(parser, "what", benches)
+    _add_commands(parser, "what", benches, family)
 
 
-def _add_commands(parser: Parser, what: str, commands: Mapping[str, Command]) -> None:
+def _add_commands(parser: Parser, what: str, commands: Mapping[str, Command], family: Family) -> None:
     words = parser.add_subparsers(required=True, metavar=what, parser_class=Parser)
     for word, command in commands.items():
         own = words.add_parser(word, help=command.help, description=command.help[0].upper() + command.help[1:] + ".")
-        command.flags(own)
+        command.flags(own, family)
         if command.run:
             own.set_defaults(command=command.run)
 
@@ -118,58 +119,58 @@ def _add_commands(parser: Parser, what: str, commands: Mapping[str, Command]) ->
 # -- flags -------------------------------------------------------------------------------------------------------------
 
 
-def _view_flags(view: Parser) -> None:
-    _scene_flags(view, optional=True)
-    add_flags(view, ShootingOptions)
-    _size_flag(view, "window")
-    _reference_flag(view)
-    view.add_argument("--frames", type=_positive(int), metavar="N", help="close after N frames (for tests)")
+def _view_flags(view: Parser, family: Family) -> None:
+    scene_flags(view, optional=True)
+    solver_flags(view, family)
+    size_flag(view, "window")
+    reference_flag(view)
+    view.add_argument("--frames", type=positive(int), metavar="N", help="close after N frames (for tests)")
     add_flags(view, DisplayOptions)
 
 
-def _shot_flags(shot: Parser) -> None:
-    _scene_flags(shot)
-    _output_flag(shot, "PNG", "the picture to write")
-    _size_flag(shot, "picture")
+def _shot_flags(shot: Parser, family: Family) -> None:
+    scene_flags(shot)
+    output_flag(shot, "PNG", "the picture to write")
+    size_flag(shot, "picture")
     shot.add_argument("--camera", metavar="NAME", help="a camera of the scene (default: its first)")
-    _reference_flag(shot)
+    reference_flag(shot)
     shot.add_argument("--ui", action="store_true", help="draw the viewer's panels too")
-    _json_flag(shot)
-    add_flags(shot, ShootingOptions)
-    _stop_flags(shot)
+    json_flag(shot)
+    solver_flags(shot, family)
+    stop_flags(shot, family)
     add_flags(shot, DisplayOptions)
 
 
-def _bake_flags(bake: Parser) -> None:
-    _scene_flags(bake)
-    _output_flag(bake, "DIR", "the folder to write")
-    _json_flag(bake)
-    add_flags(bake, ShootingOptions)
-    _stop_flags(bake)
+def _bake_flags(bake: Parser, family: Family) -> None:
+    scene_flags(bake)
+    output_flag(bake, "DIR", "the folder to write")
+    json_flag(bake)
+    solver_flags(bake, family)
+    stop_flags(bake, family)
 
 
-def _info_flags(info: Parser) -> None:
-    _scene_flags(info)
-    _json_flag(info)
-    default = ShootingOptions().storage
-    info.add_argument("--storage", choices=tuple(STORAGE), default=default, help="as for shot and bake")
+def _info_flags(info: Parser, family: Family) -> None:
+    scene_flags(info)
+    add_flags(info, LightmapOptions, only=("adaptive", "storage", "depth"))
+    json_flag(info)
 
 
-def _shots_flags(shots: Parser) -> None:
-    _json_flag(shots)
-    add_flags(shots, ShootingOptions)
+def _shots_flags(shots: Parser, family: Family) -> None:
+    json_flag(shots)
+    add_flags(shots, SOLVERS["shooting"].options)
+    add_flags(shots, LightmapOptions, only=("storage",))
 
 
-def _frames_flags(frames: Parser) -> None:
+def _frames_flags(frames: Parser, family: Family) -> None:
     frames.add_argument("scene", nargs="?", default=DEFAULT_SCENE, help=f"a file or a name (default {DEFAULT_SCENE})")
     frames.add_argument("--drag", action="store_true", help="drag the sliders of the quadtrees (with --adaptive)")
-    _json_flag(frames)
+    json_flag(frames)
     add_flags(frames, AtlasOptions)
-    add_flags(frames, ShootingOptions)
+    solver_flags(frames, family)
 
 
-def _tables_flags(tables: Parser) -> None:
-    _output_flag(tables, "DIR", "the folder to write")
+def _tables_flags(tables: Parser, family: Family) -> None:
+    output_flag(tables, "DIR", "the folder to write")
     tables.add_argument(
         "--only",
         type=_table_names,
@@ -178,22 +179,22 @@ def _tables_flags(tables: Parser) -> None:
     )
     tables.add_argument(
         "--seconds",
-        type=_positive(float),
+        type=positive(float),
         default=2.0,
         metavar="S",
         help="of each measurement, of a solve ten times as long; loading comes on top (default 2)",
     )
     tables.add_argument("--plots", action="store_true", help="draw PNGs too (needs matplotlib)")
-    _json_flag(tables)
+    json_flag(tables)
 
 
-def _hard_flags(hard: Parser) -> None:
+def _hard_flags(hard: Parser, family: Family) -> None:
     hard.add_argument("--only", nargs="+", metavar="NAME", help="only these cases (default all)")
     hard.add_argument("--size", choices=HARD_SIZES, default=HARD_SIZES[0], help="of scenes and texels (default small)")
-    _json_flag(hard)
+    json_flag(hard)
 
 
-def _error_flags(error: Parser) -> None:
+def _error_flags(error: Parser, family: Family) -> None:
     error.add_argument(
         "scenes",
         nargs="*",
@@ -220,14 +221,14 @@ def _error_flags(error: Parser) -> None:
     )
     error.add_argument(
         "--seconds",
-        type=_positive(float),
+        type=positive(float),
         default=30.0,
         metavar="S",
         help="of solving, for each curve at most (default 30)",
     )
     error.add_argument(
         "--texels",
-        type=_positive(int),
+        type=positive(int),
         metavar="N",
         help="uniform ones; quadtrees begin with a sixteenth (default: chosen from the scene)",
     )
@@ -238,72 +239,17 @@ def _error_flags(error: Parser) -> None:
     )
     error.add_argument(
         "--paths",
-        type=_positive(int),
+        type=positive(int),
         default=16384,
         metavar="N",
         help="from each point of a path-traced reference (default 16384)",
     )
-    _json_flag(error)
-    add_flags(error, ShootingOptions)
+    json_flag(error)
+    solver_flags(error, family)
 
 
-def _scene_flags(parser: Parser, *, optional: bool = False) -> None:
-    help = "a file (.glb .gltf .obj .ply .stl .toml) or the name of a scene"
-    if optional:
-        parser.add_argument("scene", nargs="?", default=DEFAULT_SCENE, help=f"{help} (default {DEFAULT_SCENE})")
-    else:
-        parser.add_argument("scene", help=help)
-    parser.add_argument("--light", action="store_true", help="add a ceiling light")
-    add_flags(parser, AtlasOptions)
-
-
-def _output_flag(parser: Parser, what: str, help: str) -> None:
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar=what, help=help)
-
-
-def _reference_flag(parser: Parser) -> None:
-    help = "a bake of the same scene, to compare with: the error, and --layer error and --show"
-    parser.add_argument("--reference", type=Path, metavar="DIR", help=help)
-
-
-def _size_flag(parser: Parser, what: str) -> None:
-    default = (1280, 720)
-    help = f"{what} size (default {default[0]}x{default[1]})"
-    parser.add_argument("--size", type=_size, default=default, metavar="WxH", help=help)
-
-
-def _json_flag(parser: Parser) -> None:
-    parser.add_argument("--json", action="store_true", help="print JSON instead of text")
-
-
-def _stop_flags(parser: Parser) -> None:
-    stop = parser.add_argument_group("stop (whichever comes first; --residual is always on)")
-    stop.add_argument("--shots", type=_positive(int), metavar="N", help="after N shots")
-    stop.add_argument("--time", type=_positive(float), metavar="S", help="after S seconds of shooting")
-
-
-# -- values ------------------------------------------------------------------------------------------------------------
-
-
-def _positive(kind: type[int] | type[float]) -> Callable[[str], float]:
-    def read(text: str) -> float:
-        try:
-            value = kind(text)
-        except ValueError:
-            value = kind(0)
-        if not 0 < value < 1e12:
-            raise argparse.ArgumentTypeError(f"{text}: must be a {'whole ' if kind is int else ''}number above 0")
-        return value
-
-    return read
-
-
-def _size(text: str) -> tuple[int, int]:
-    sides = re.fullmatch(r"(\d{1,6})x(\d{1,6})", text.lower(), re.ASCII)
-    width, height = map(int, sides.groups()) if sides else (0, 0)
-    if not (16 <= width <= 16384 and 16 <= height <= 16384):
-        raise argparse.ArgumentTypeError(f"{text}: must be WIDTHxHEIGHT, each 16 to 16384")
-    return width, height
+def _doctor_flags(doctor: Parser, family: Family) -> None:
+    json_flag(doctor)
 
 
 def _table_names(text: str) -> tuple[str, ...]:
@@ -328,19 +274,19 @@ def _peer_names(text: str) -> tuple[str, ...]:
 
 
 def _view(flags: argparse.Namespace) -> int:
-    from app.commands.headless import view_or_shot
+    from app.commands.view import view_or_shot
 
     return view_or_shot(flags)
 
 
 def _shot(flags: argparse.Namespace) -> int:
-    from app.commands.headless import shot
+    from app.commands.shot import shot
 
     return shot(flags)
 
 
 def _bake(flags: argparse.Namespace) -> int:
-    from app.commands.headless import bake
+    from app.commands.bake import bake
 
     return bake(flags)
 

@@ -15,6 +15,7 @@ import functools
 import math
 import types
 import typing
+from collections.abc import Container
 from dataclasses import dataclass
 from typing import Any, Self, TypeVar
 
@@ -140,10 +141,12 @@ def _specs(options: Any) -> list[Spec]:
     return out
 
 
-def add_flags(parser: argparse.ArgumentParser, options: type[Options]) -> None:
-    """Give ``parser`` one flag per declared option; booleans become ``--name`` / ``--no-name``."""
+def add_flags(parser: argparse.ArgumentParser, options: type[Options], *, only: Container[str] | None = None) -> None:
+    """Give ``parser`` one flag per declared option, or for some ``only``; booleans become ``--name`` / ``--no-name``."""
     group = parser.add_argument_group(options.__name__.removesuffix("Options").lower())
     for spec in specs(options):
+        if only is not None and spec.name not in only:
+            continue
         unit = f" [{spec.unit}]" if spec.unit else ""
         default = "" if spec.default is None else f" (default {spec.default})"
         text = (spec.help + unit + default).replace("%", "%%")

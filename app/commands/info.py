@@ -9,13 +9,12 @@ from typing import Any
 from app.atlas.charts import Charts
 from app.atlas.options import AtlasOptions
 from app.atlas.texels import texel_count, uniform_leaves
-from app.lightmap.options import STORAGE
+from app.lightmap.options import STORAGE, LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import TABLE_WIDTH
 from app.options import from_flags
 from app.scene.model import Scene
 from app.session.loading import read_and_unfold
-from app.solvers import ShootingOptions
 from app.util.console import Console
 
 SURFACE_BYTES = 24  # per texel: position and area, normal and ids
@@ -28,10 +27,10 @@ def info(flags: argparse.Namespace) -> int:
     """Print triangles, charts, texels and memory."""
     console = Console(quiet=flags.json)
     with console.progress("reading") as tell:
-        atlas = from_flags(AtlasOptions, flags)
-        scene, charts, _ = read_and_unfold(flags.scene, atlas, flags.light, tell)
+        atlas, light = from_flags(AtlasOptions, flags), from_flags(LightmapOptions, flags)
+        scene, charts, _ = read_and_unfold(flags.scene, atlas, flags.light, tell, roots=light.adaptive)
         leaves, slots, depth = uniform_leaves(charts), 0, 0
-        if atlas.adaptive:
+        if light.adaptive:
             tell("planting quadtrees", 0.6)
             pool = quadtree_pool(scene, charts)
             leaves, slots, depth = pool.leaves.only(pool.used), pool.tiles, pool.depth
@@ -50,12 +49,12 @@ def info(flags: argparse.Namespace) -> int:
         "charts": charts.chart_count,
         "unfolded_by": charts.method,
         "texels_per_metre": charts.density,
-        "texels": pool.texel_count if atlas.adaptive else texel_count(charts),
+        "texels": pool.texel_count if light.adaptive else texel_count(charts),
         "tiles": tiles,
         "tile_edge": charts.tile,
         "atlas": list(charts.size),
-        "memory_mib": _memory(scene, charts, max(tiles, slots), depth, flags.storage) / 2**20,
-        **({"texels_if_uniform": pool.uniform_texels(ShootingOptions().depth)} if atlas.adaptive else {}),
+        "memory_mib": _memory(scene, charts, max(tiles, slots), depth, light.storage) / 2**20,
+        **({"texels_if_uniform": pool.uniform_texels(light.depth)} if light.adaptive else {}),
         "warnings": [*scene.warnings, *charts.warnings],
     }
     rows = [(name, value) for name, value in values.items() if name != "warnings"]

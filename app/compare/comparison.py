@@ -83,7 +83,7 @@ class Comparison:
 
     def begin(self) -> None:
         """All light is unshot again: another curve begins."""
-        self.errors = Rows(("shots", "seconds", "rms", "median"))
+        self.errors = Rows(("work", "seconds", "rms", "median"))
         self._measured: object = None
 
     def measure(self, shots: int, seconds: float, state: object, *, wait: bool = False) -> bool:

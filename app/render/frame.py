@@ -94,7 +94,7 @@ class FrameRenderer:
 
     def atlas(self, lightmap: Lightmap, size: tuple[int, int], *, turned: bool) -> Texture | None:
         """The virtual atlas with what the last frame showed, see AtlasImage; None before the first frame of that lightmap."""
-        if self._surfaces is None or self._surfaces.lightmap is not lightmap or not self._surfaces.visible_mesh:
+        if self._surfaces is None or self._surfaces.lightmap is not lightmap or not self._surfaces.drawn:
             return None
         return self._atlas.draw(self._surfaces, size, turned=turned)
 

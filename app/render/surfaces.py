@@ -106,7 +106,7 @@ class Surfaces:
         )
 
     @property
-    def visible_mesh(self) -> bool:
+    def drawn(self) -> bool:
         """Whether there is something to be seen in an atlas."""
         return bool(self._shown)
 

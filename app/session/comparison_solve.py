@@ -1,6 +1,6 @@
 """A finer solve of a scene, in a process of its own: the window goes on, and it can be stopped at any time.
 
-Its answer is cached by what went in. See app/reference_worker.py for the other end.
+Its answer is cached by what went in. See comparison_worker.py for the other end.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from app import __version__
 from app.atlas.options import AtlasOptions
 from app.compare.light import ReferenceLight
 from app.errors import UserError
-from app.options import Options
 from app.scene.arrays import arrays_of
 from app.scene.model import Scene
 from app.util import cache
@@ -33,15 +32,16 @@ FORMAT = b"glowtree reference 1"  # changes when the worker's answer does
 ANSWER = {"image", "triangle", "back", "uv", "texels", "unshot"}
 
 
-def solved_light(scene: Scene, atlas: AtlasOptions, shooting: Options, tell: Progress) -> ReferenceLight:
-    """From the cache or from a worker; ``tell`` may raise to stop it. Raises UserError."""
-    knobs = repr((__version__, atlas, shooting)).encode()
+def solved_light(scene: Scene, atlas: AtlasOptions, residual: float, tell: Progress) -> ReferenceLight:
+    """From the cache or from a worker, which solves with closed forms and full storage until so little of the emitted power is
+    unshot; ``tell`` may raise to stop it. Raises UserError."""
+    knobs = repr((__version__, atlas, residual)).encode()
     path = cache.entry("reference", cache.digest(FORMAT + knobs, arrays_of(scene)))
     found = cache.read(path)
     if found is None or not found.keys() >= ANSWER:
         with tempfile.TemporaryDirectory(prefix="glowtree-") as folder:
             source, target = Path(folder) / "in.pickle", Path(folder) / "out.npz"
-            source.write_bytes(pickle.dumps({"scene": scene, "atlas": atlas, "shooting": shooting}))
+            source.write_bytes(pickle.dumps({"scene": scene, "atlas": atlas, "residual": residual}))
             _run_worker(source, target, tell)
             found = cache.read(target)
             if found is None:

@@ -1,6 +1,6 @@
 """A reference solved in a process of its own: ``python -m app.session.comparison_worker in.pickle out.npz``.
 
-in.pickle: ``scene``, ``atlas`` and ``shooting`` (AtlasOptions, ShootingOptions), written by app/compare/solving.py. Standard
+in.pickle: ``scene``, ``atlas`` (AtlasOptions) and ``residual``, written by comparison_solve.py. Standard
 output gets lines of the share done and what is being done. out.npz: image (h, w, 3) f32, irradiance [W/m²], gutters filled; of
 each side triangle, back, and uv (f, 3, 2) [texels of the image]; texels; unshot, of the emitted power.
 """
@@ -20,8 +20,10 @@ from app.errors import UserError
 from app.gpu import gpu_context
 from app.lightmap.collapse import collapse
 from app.lightmap.gutter import fill_gutter
-from app.session.session import Session, Stats, Stop
-from app.session.solve import share_done
+from app.session.run import Stop
+from app.session.session import Session
+from app.session.stats import Stats
+from app.solvers import ShootingOptions
 
 LOADING = 0.1  # of the bar, which is then for shooting
 NICENESS = 5  # the window goes first
@@ -32,18 +34,16 @@ def solve(source: Path, target: Path) -> int:
     """The exit code: an interrupted solve is no answer, and not written. Raises UserError."""
     given = pickle.loads(source.read_bytes())
     with gpu_context() as gpu:
-        session = Session(gpu, shooting=given["shooting"], atlas=given["atlas"])
+        session = Session(gpu, options=ShootingOptions(residual=given["residual"]), atlas=given["atlas"])
         session.open_now(given["scene"], lambda stage, share: say(stage, LOADING * share))
         stop = Stop()
 
         def tell(stats: Stats) -> None:
-            say(
-                f"{stats.shots:,} shots, {stats.residual:.3%} unshot",
-                LOADING + (1 - LOADING) * share_done(session, stop),
-            )
+            done = f"{stats.done:,} {stats.unit}, {stats.remaining:.3%} {stats.remains}"
+            say(done, LOADING + (1 - LOADING) * session.run.share_done(stop))
 
         session.solve(stop, tell)
-        if session.interrupted:
+        if session.run.interrupted:
             return INTERRUPTED
         lightmap, charts = session.lightmap, session.charts
         image = fill_gutter(*collapse(lightmap.pool, lightmap.irradiance(ambient=True)))
@@ -53,7 +53,7 @@ def solve(source: Path, target: Path) -> int:
             "back": charts.face_back,
             "uv": charts.face_uv * (image.shape[0] // charts.size[1]),
             "texels": np.array(lightmap.texel_count),
-            "unshot": np.array(session.stats.residual),
+            "unshot": np.array(session.run.progress.remaining),
         }
         session.release()
     np.savez(target, **answer)

@@ -1,4 +1,4 @@
-"""The error that is expected of the light as it is: some points per frame, while nothing else is to be done."""
+"""The error estimate of the light as it is: some points per frame, while nothing else is to be done."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ MAPS = 4  # hemicubes per part: 30 ms of a Cornell box in software
 MANY = 20_000  # triangles from which on it is one
 
 
-class Expecting:
-    """Whoever makes it calls ``forget`` before the lightmap is released.
+class RunningEstimate:
+    """The error estimate of the open scene's light, worked out in parts. Whoever makes it calls ``release`` before the lightmap
+    is released.
 
     error: None as long as it is not known, or where nothing is lit; share: of the points that have been looked from.
     """
@@ -53,7 +54,7 @@ class Expecting:
             self._parts.close()
         self._of, self._parts, self.error, self.share = None, None, None, 0.0
 
-    def forget(self) -> None:
+    def release(self) -> None:
         """The lightmap is going."""
         self.changed()
         if self._expectation is not None:

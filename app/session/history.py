@@ -1,24 +1,24 @@
-"""How a solve went: one row per report, thinned so that it never grows without bound."""
+"""How a solve went: one row for each progress that was heard of."""
 
 from __future__ import annotations
 
 from app.util.rows import Rows
 
-COLUMNS = ("shots", "seconds", "residual", "absorbed", "escaped")
+COLUMNS = ("work", "seconds", "remaining", "absorbed", "escaped")
 
 
 class History(Rows):
-    """Shots, seconds, residual [-], absorbed and escaped (shares of the emitted power)."""
+    """Work in the solver's unit, seconds, what remains [-], absorbed and escaped (shares of the emitted power)."""
 
     def __init__(self) -> None:
         super().__init__(COLUMNS)
 
-    def add(self, shots: int, seconds: float, residual: float, escaped: float) -> None:
-        """Append a row; what is neither unshot nor escaped was absorbed."""
-        self.append(shots, seconds, residual, 1.0 - residual - escaped, escaped)
+    def add(self, work: int, seconds: float, remaining: float, escaped: float) -> None:
+        """Append a row; what neither remains nor escaped was absorbed."""
+        self.append(work, seconds, remaining, 1.0 - remaining - escaped, escaped)
 
     @property
-    def shots_per_second(self) -> float:
+    def work_per_second(self) -> float:
         """Over the last second of solving, or all of it."""
         rows = self._rows[: self._count]
         if len(rows) < 2:

@@ -9,6 +9,7 @@ from pathlib import Path
 from app.atlas.charts import Charts
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
+from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import Array, TilePool
 from app.render.exposure import first_exposure
@@ -19,20 +20,22 @@ from app.util.background import BackgroundTask, Progress
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A tile pool and what of it is uploaded, how it was cut, the exposure to open it with [EV] if that was asked for, and how
-    long each stage took [s]."""
+    """A tile pool and what of it is uploaded, how it was cut and is held, the exposure to open it with [EV] if that was asked
+    for, and how long each stage took [s]."""
 
     pool: TilePool
     arrays: dict[str, Array]
     atlas: AtlasOptions
+    options: LightmapOptions
     exposure: float | None
     seconds: dict[str, float]
 
 
 def read_and_unfold(
-    source: str | Path | Scene, atlas: AtlasOptions, default_light: bool, tell: Progress
+    source: str | Path | Scene, atlas: AtlasOptions, default_light: bool, tell: Progress, *, roots: bool = False
 ) -> tuple[Scene, Charts, dict[str, float]]:
-    """The scene, its charts, and the seconds of both stages. Raises UserError (SceneError)."""
+    """The scene, its charts, and the seconds of both stages. roots: whether texels are the coarsest of quadtrees. Raises
+    UserError (SceneError)."""
     start = time.perf_counter()
     tell("reading", 0.0)
     scene = source if isinstance(source, Scene) else load_scene(source, default_light=default_light)
@@ -43,7 +46,7 @@ def read_and_unfold(
         density=atlas.density,
         texels=atlas.texels,
         tile=atlas.tile,
-        roots=atlas.adaptive,
+        roots=roots,
         progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share),
     )
     return scene, charts, {"read": middle - start, "unfold": time.perf_counter() - middle}
@@ -52,6 +55,7 @@ def read_and_unfold(
 def load(
     source: str | Path | Scene,
     atlas: AtlasOptions,
+    options: LightmapOptions | None = None,
     *,
     default_light: bool = False,
     expose: bool = False,
@@ -60,26 +64,33 @@ def load(
     """Read a scene, or take one as it is; unfold it, cut it into texels, and with ``expose`` find its exposure. Raises UserError
     (SceneError)."""
     tell: Progress = progress or (lambda stage, share: None)
-    scene, charts, seconds = read_and_unfold(source, atlas, default_light, tell)
+    options = options or LightmapOptions()
+    scene, charts, seconds = read_and_unfold(source, atlas, default_light, tell, roots=options.adaptive)
     start = time.perf_counter()
     tell("cutting into texels", 0.6)
-    pool = quadtree_pool(scene, charts) if atlas.adaptive else TilePool(scene, charts)
+    pool = quadtree_pool(scene, charts) if options.adaptive else TilePool(scene, charts)
     exposure, arrays = first_exposure(pool) if expose else None, pool.arrays
     _ = pool.emission_weights, pool.visible_mesh  # cached here: the window, which reads them next, does not wait
     tell("done", 1.0)
-    return Loaded(pool, arrays, atlas, exposure, seconds | {"texels": time.perf_counter() - start})
+    return Loaded(pool, arrays, atlas, options, exposure, seconds | {"texels": time.perf_counter() - start})
 
 
 class Loading(BackgroundTask[Loaded]):
     """A scene on its way, see ``load``."""
 
     def __init__(
-        self, source: str | Path | Scene, atlas: AtlasOptions, *, default_light: bool = False, expose: bool = False
+        self,
+        source: str | Path | Scene,
+        atlas: AtlasOptions,
+        options: LightmapOptions,
+        *,
+        default_light: bool = False,
+        expose: bool = False,
     ) -> None:
         self.source = source
         super().__init__(
             "this scene",
-            lambda tell: load(source, atlas, default_light=default_light, expose=expose, progress=tell),
+            lambda tell: load(source, atlas, options, default_light=default_light, expose=expose, progress=tell),
         )
 
     @property

@@ -4,34 +4,44 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from typing import Any
 
 from app.errors import UserError
 from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap, upload
-from app.render.frame import FrameRenderer
+from app.options import Options
 from app.session.loading import Loaded, Loading
-from app.solvers import DEFAULT_SOLVER, SOLVERS, ShootingOptions, Solver
+from app.solvers import Family, Solver
 from app.util.parts import run_to_end
+
+Prepare = Callable[
+    [Lightmap], Callable[[], None]
+]  # what else a lightmap needs before it is shown; returns what undoes it
 
 
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """What can take the place of what is open: its light is as before the first shot. began: when its upload did [s], of
-    ``time.perf_counter``."""
+    """What can take the place of what is open: its light is as before any work. family: of its solver. began: when its upload did
+    [s], of ``time.perf_counter``."""
 
     loaded: Loaded
     lightmap: Lightmap
-    solver: Solver[ShootingOptions]
+    solver: Solver[Any]
+    family: Family
     began: float
 
 
 class Opening:
-    """At most one scene on its way, ``loading``. What is open stays as it is until the other is Ready."""
+    """The scene that is on its way, ``loading``; at most one. What is open stays as it is until the other is Ready.
 
-    def __init__(self, gpu: Gpu, renderer: FrameRenderer) -> None:
-        self._gpu, self._renderer = gpu, renderer
+    prepare: done with every new lightmap before it is Ready.
+    """
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self.prepare: Prepare | None = None
         self.loading: Loading | None = None
         self._parts: Generator[None, None, Ready] | None = None
 
@@ -48,12 +58,12 @@ class Opening:
             self._parts.close()
         self.loading = self._parts = None
 
-    def part(self, options: ShootingOptions, interpolation: str) -> Ready | None:
+    def part(self, family: Family, options: Options) -> Ready | None:
         """The next part of what was loaded; all of it after the last. Raises UserError, and ends then."""
         assert self.loading is not None
         try:
             if self._parts is None:
-                self._parts = self._upload(self.loading.result, options, interpolation)
+                self._parts = self._upload(self.loading.result, family, options)
             next(self._parts)
         except StopIteration as last:
             self.loading = self._parts = None
@@ -64,14 +74,13 @@ class Opening:
             raise
         return None
 
-    def at_once(self, loaded: Loaded, options: ShootingOptions, interpolation: str) -> Ready:
+    def at_once(self, loaded: Loaded, family: Family, options: Options) -> Ready:
         """All of what was loaded elsewhere. Raises UserError."""
-        return run_to_end(self._upload(loaded, options, interpolation))
+        return run_to_end(self._upload(loaded, family, options))
 
-    def _upload(self, loaded: Loaded, options: ShootingOptions, interpolation: str) -> Generator[None, None, Ready]:
-        """Upload what was loaded, and draw once with each program, since drivers compile it then; yields after each part.
-        interpolation: that pictures will be drawn with. Raises UserError; then, and when given up between two parts, nothing
-        stays on the GPU."""
+    def _upload(self, loaded: Loaded, family: Family, options: Options) -> Generator[None, None, Ready]:
+        """Upload what was loaded, and draw once with each program, since drivers compile it then; yields after each part. Raises
+        UserError; then, and when given up between two parts, nothing stays on the GPU."""
         began, gpu = time.perf_counter(), self._gpu
         with contextlib.ExitStack() as undo:
             textures: dict[str, Texture] = {}
@@ -80,20 +89,20 @@ class Opening:
                 textures[name] = upload(gpu, array)
                 uploads.callback(gpu.release_all, textures[name])
                 yield
-            lightmap = Lightmap(gpu, loaded.pool, storage=options.storage, textures=textures)
+            lightmap = Lightmap(gpu, loaded.pool, loaded.options, textures=textures)
             uploads.pop_all()
             undo.callback(lightmap.release)
             gpu.ctx.finish()
             yield
-            solver = SOLVERS["adaptive" if loaded.atlas.adaptive else DEFAULT_SOLVER](gpu, lightmap, options)
+            solver = family.make(gpu, lightmap, options)
             undo.callback(solver.release)
             yield
-            yield from solver.warm_up(1)
+            yield from solver.warm_up()
             solver.reset()
             yield
-            self._renderer.prepare(lightmap, interpolation)
-            undo.callback(self._renderer.give_up)
-            gpu.ctx.finish()
-            yield
+            if self.prepare is not None:
+                undo.callback(self.prepare(lightmap))
+                gpu.ctx.finish()
+                yield
             undo.pop_all()
-        return Ready(loaded, lightmap, solver, began)
+        return Ready(loaded, lightmap, solver, family, began)

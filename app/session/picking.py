@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from app.lightmap.lightmap import Lightmap
-from app.render.pick import PickHit, with_texel
+from app.render.pick import PickHit
 from app.scene.model import RGB
-
-if TYPE_CHECKING:
-    from app.session.session import Session
+from app.solvers import Solver
 
 
 @dataclass(frozen=True)
 class Picked:
-    """A picked point. Indices are the scene's and its charts'; texel (column, row) in the tile pool; patch (column, row) that it
-    shoots from, counted in patches of its size, ``patch_edge`` texels along each edge; position [m], area [m²]; B, E, H, r are
+    """A picked point. Indices are the scene's and its charts'; texel (column, row) in the tile pool; facts: what the
+    solver says of it, name and value; position [m], area [m²]; B, E, H, r are
     RGB [W/m²]. A side without texels has chart and facet -1 and area 0: it only emits. hit: with which it can be read again."""
 
     triangle: int
@@ -29,8 +27,7 @@ class Picked:
     chart: int
     facet: int
     texel: tuple[int, int]
-    patch: tuple[int, int]
-    patch_edge: int
+    facts: Mapping[str, str]
     position: RGB
     normal: RGB
     area: float
@@ -42,19 +39,19 @@ class Picked:
     hit: PickHit
 
 
-def picked_from_hit(lightmap: Lightmap, hit: PickHit, patch_edge: Callable[[tuple[int, int]], int]) -> Picked:
-    """Look up the texel that was hit; ``patch_edge`` tells how many texels along its edge the patch of a texel has. Waits for the
-    GPU."""
+def picked_from_hit(lightmap: Lightmap, hit: PickHit, solver: Solver[Any]) -> Picked:
+    """Look up the texel that was hit. Waits for the GPU."""
     scene, charts = lightmap.scene, lightmap.charts
     material = scene.materials[hit.material]
     normal = scene.normals_areas[0][hit.triangle] * (-1.0 if hit.back else 1.0)
     albedo, E = np.array(material.albedo), np.pi * np.array(material.emission)
     if hit.back and not material.double_sided:
         albedo, E = np.zeros(3), np.zeros(3)
-    H, r, area, texel, chart, edge = np.zeros(3), np.zeros(3), 0.0, (0, 0), -1, 1
+    H, r, area, texel, chart = np.zeros(3), np.zeros(3), 0.0, (0, 0), -1
+    facts: Mapping[str, str] = {}
     if hit.tile is not None and hit.tile_texel is not None and hit.texel is not None:
         texel, (column, row) = hit.texel, hit.tile_texel
-        at, edge = (hit.tile, row, column), patch_edge(texel)
+        at, facts = (hit.tile, row, column), solver.inspect(texel).texel_facts
         H, r = lightmap.light_at(texel)
         area = float(lightmap.pool.surfaces.area[at])
         face = int(lightmap.pool.surfaces.face[at])
@@ -71,8 +68,7 @@ def picked_from_hit(lightmap: Lightmap, hit: PickHit, patch_edge: Callable[[tupl
         chart=chart,
         facet=-1 if hit.facet is None else hit.facet,
         texel=texel,
-        patch=(texel[0] // edge, texel[1] // edge),
-        patch_edge=edge,
+        facts=facts,
         position=hit.position,
         normal=_rgb(normal),
         area=area,
@@ -83,12 +79,6 @@ def picked_from_hit(lightmap: Lightmap, hit: PickHit, patch_edge: Callable[[tupl
         albedo=_rgb(albedo),
         hit=hit,
     )
-
-
-def read_again(session: Session, picked: Picked) -> Picked:
-    """The same point with its texel and light as they are now."""
-    lightmap = session.lightmap
-    return picked_from_hit(lightmap, with_texel(picked.hit, lightmap), session.solver.patch_edge)
 
 
 @dataclass(frozen=True)

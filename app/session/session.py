@@ -1,70 +1,83 @@
 """One open scene and its solution: what window, headless shot, bake and bench all step.
 
-A session owns scene, charts, lightmap and solver. It knows no window and no imgui; whoever draws reads ``lightmap``.
+A session has a scene on its way (opening), a solve (run), a comparison with a reference (compared) and an error estimate. It
+knows no window, no picture and no imgui; whoever draws reads ``lightmap``.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import Any, Protocol
 
 from app.atlas.charts import Charts
 from app.atlas.options import AtlasOptions
 from app.errors import UserError
 from app.estimate.error import ExpectedError
 from app.gpu import Gpu
-from app.render.options import DisplayOptions
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.options import LightmapOptions
+from app.options import Options
 from app.scene.model import Material, Scene
-from app.session.comparing import Comparing
-from app.session.energy import Books, Effort
-from app.session.error_estimate import Expecting
-from app.session.history import History
+from app.session.compared import Compared
+from app.session.error_estimate import RunningEstimate
 from app.session.loading import Loading, load
-from app.session.opening import Opening, Ready
-from app.session.pacing import Pacer
-from app.session.solve import not_finite, solve
-from app.session.stats import Stats, Stop, stats_of
-from app.solvers import EnergyBalance, ShootingOptions
+from app.session.opening import Opening, Prepare, Ready
+from app.session.run import Run, Stop
+from app.session.stats import Stats, stats_of
+from app.solvers import DEFAULT_SOLVER, SOLVERS, Family, Solver
 
 
-class Session(Comparing):
-    """Raises UserError (SceneError, GpuError) from ``open_now``; ``open`` reports through ``message`` instead.
+class Opened(Protocol):
+    """Called when another lightmap is open, of the same scene cut anew or of another one."""
 
-    expose_on_open: whether a scene that opens sets the exposure.
+    def __call__(self, exposure: float | None, *, same_scene: bool, reference_gone: bool) -> None: ...
+
+
+class Session:
+    """The open scene with its lightmap and solver. Raises UserError (SceneError, GpuError) from ``open_now``; ``open`` reports
+    through ``message`` instead. Whoever makes it releases it.
+
+    options: of the solver that is chosen. atlas, light: how scenes are cut, and how their light is held. expose_on_open:
+    whether the exposure is forecast of a scene that opens. unedited: the open scene as it was read, the same through edits and
+    however it is cut. load_seconds: of each stage of opening. message: what the user should know.
     """
 
     def __init__(
         self,
         gpu: Gpu,
         *,
-        shooting: ShootingOptions | None = None,
+        solver: str = DEFAULT_SOLVER,
+        options: Options | None = None,
         atlas: AtlasOptions | None = None,
-        display: DisplayOptions | None = None,
+        light: LightmapOptions | None = None,
         default_light: bool = False,
         expose_on_open: bool = False,
     ) -> None:
-        super().__init__(gpu, display or DisplayOptions())
-        self.shooting = shooting or ShootingOptions()
-        self.atlas = atlas or AtlasOptions()
-        self.default_light = default_light
-        self.expose_on_open = expose_on_open
-        self.running = True
+        """options: of that solver, its defaults if None; default_light: give scenes a ceiling light."""
+        self.gpu = gpu
+        self.solver_name = solver
+        self._options = {name: family.options() for name, family in SOLVERS.items()}
+        if options is not None:
+            self._options[solver] = options
+        self.atlas, self.light = atlas or AtlasOptions(), light or LightmapOptions()
+        self.default_light, self.expose_on_open = default_light, expose_on_open
         self.message: str | None = None
         self.load_seconds: dict[str, float] = {}
-        self.history = History()
-        self.interrupted, self.effort = False, Effort()
-        self.seconds, self._pace = 0.0, Pacer(gpu)
-        self._books = Books()
-        self._settled, self._busy, self._opened = True, False, False
-        self._opening = Opening(gpu, self.renderer)
-        self.expecting = Expecting(gpu)
+        self.run, self.compared, self.estimate = Run(gpu), Compared(gpu), RunningEstimate(gpu)
+        self.lightmap: Lightmap
+        self.solver: Solver[Any]
+        self.unedited: Scene
+        self.source: str | Path
+        self._opening = Opening(gpu)
+        self._on_open: Opened | None = None
+        self._opened = self._busy = False
         self._then_reference: Path | None = None
-        self.unedited: Scene  # the open one as it was read: the same through edits, and however it is cut
+
+    def follow(self, prepare: Prepare, opened: Opened) -> None:
+        """Let a view prepare for each lightmap before it is shown, and hear when it is open."""
+        self._opening.prepare, self._on_open = prepare, opened
 
     # -- opening -------------------------------------------------------------------------------------------------------
 
@@ -72,34 +85,34 @@ class Session(Comparing):
         """Start to load in the background; ``poll`` swaps the scene when it is there. reference: a bake to open then."""
         self._then_reference = reference
         light, expose = self.default_light, self.expose_on_open
-        self._opening.begin(Loading(source, self.atlas, default_light=light, expose=expose))
+        self._opening.begin(Loading(source, self.atlas, self.light, default_light=light, expose=expose))
 
     def open_now(self, source: str | Path | Scene, progress: Callable[[str, float], None] | None = None) -> None:
         """Load and wait."""
         light, expose = self.default_light, self.expose_on_open
-        loaded = load(source, self.atlas, default_light=light, expose=expose, progress=progress)
-        self._take_over(self._opening.at_once(loaded, self.shooting, self.display.interpolation))
+        loaded = load(source, self.atlas, self.light, default_light=light, expose=expose, progress=progress)
+        self._take_over(self._opening.at_once(loaded, self.family, self.options))
 
-    def set_atlas(self, atlas: AtlasOptions) -> None:
-        """Cut the open scene anew, in the background; its materials as edited, exposure and camera stay. Raises UserError
-        while another scene is on its way."""
+    def cut_anew(self, atlas: AtlasOptions, light: LightmapOptions | None = None) -> None:
+        """Cut the open scene anew, in the background; its materials as edited, exposure and camera stay. light: how its light is
+        held then. Raises UserError while another scene is on its way."""
         if self.loading is not None and self.loading.source is not self.unedited:
             raise UserError(f"{self.loading.name} is loading: cut {self.name} anew before or after that")
-        self._opening.begin(Loading(self.unedited, atlas))
+        self._opening.begin(Loading(self.unedited, atlas, light or self.light))
 
-    def poll(self, *, brisk: bool = False) -> None:
-        """Once per frame: hear from the GPU, and swap in a scene that has finished loading, a part of it per frame. brisk: a hand
-        is at the controls, what can wait does."""
+    def poll(self, *, interactive: bool = False) -> None:
+        """Once per frame: take in what the GPU reports, and swap in a scene that has finished loading, a part of it per frame.
+        interactive: a hand is at the controls, what can wait does."""
         self._busy = False
         if self.loading is not None and (self.loading.ended or self.loading.cancelled):
             self._busy = True
             self._open_part(self.loading)
         elif self._opened:
-            self.hear()
+            self._busy = self.run.poll()
         if self._opened:
-            self._compare()
-            if self._quiet and not self._busy and not brisk:
-                self._expect()
+            self.compare()
+            if self._idle and not self._busy and not interactive:
+                self._estimate_part()
 
     def _open_part(self, loading: Loading) -> None:
         """The next part of opening what was loaded; the scene that is open stays until the last."""
@@ -108,7 +121,7 @@ class Session(Comparing):
             self.message = f"{loading.name}: stopped" + (f"; {self.name} stays as it is" if self._opened else "")
             return
         try:
-            ready = self._opening.part(self.shooting, self.display.interpolation)
+            ready = self._opening.part(self.family, self.options)
             if ready is not None:
                 self._take_over(ready)
         except UserError as error:
@@ -118,33 +131,34 @@ class Session(Comparing):
         """In place of what is open."""
         loaded, lightmap, solver = ready.loaded, ready.lightmap, ready.solver
         scene = loaded.pool.scene
-        if solver.options != self.shooting:  # changed between two parts
-            solver.set_options(self.shooting)
-        cut_anew = self._opened and scene is self.unedited
-        if cut_anew and self.scene is not scene:
+        if ready.family is not self.family:  # chosen between two parts
+            solver.release()
+            solver = self.family.make(self.gpu, lightmap, self.options)
+        elif solver.options != self.options:
+            solver.set_options(self.options)
+        same_scene = self._opened and scene is self.unedited
+        if same_scene and self.scene is not scene:
             lightmap.set_materials(self.scene.materials)
             solver.reset()
         self.close()
-        self.lightmap, self.solver, self.unedited, self.atlas = lightmap, solver, scene, loaded.atlas
+        self.lightmap, self.solver, self.unedited = lightmap, solver, scene
+        self.atlas, self.light = loaded.atlas, loaded.options
         self.load_seconds = loaded.seconds | {"upload": time.perf_counter() - ready.began}
         self.source = self.scene.source or self.scene.name
-        if not cut_anew:
-            self.look_through(self.scene.cameras[0])
-        if loaded.exposure is not None:
-            self.display = self.display.replace(exposure=loaded.exposure)
         self.message = None if self.scene.emits else f"{self.scene.name} has no light: try --light for a ceiling light"
         self._opened = True
-        self._books.begin(self.solver.books())
-        self._compare_anew()
-        if self._then_reference is not None:
-            self.open_reference(self._then_reference)
-            self._then_reference = None
+        reference_gone = self.compared.begin(lightmap, scene)
         self._begin()
+        if self._on_open is not None:
+            self._on_open(loaded.exposure, same_scene=same_scene, reference_gone=reference_gone)
+        if self._then_reference is not None:
+            self.compared.open(self._then_reference)
+            self._then_reference = None
 
     def close(self) -> None:
         """Release the open scene; the session can open another."""
         if self._opened:
-            self.expecting.forget()
+            self.estimate.release()
             self.solver.release()
             self.lightmap.release()
             self._opened = False
@@ -152,7 +166,7 @@ class Session(Comparing):
     def release(self) -> None:
         self._opening.stop()
         self.close()
-        super().release()
+        self.compared.release()
 
     # -- what is open --------------------------------------------------------------------------------------------------
 
@@ -180,165 +194,153 @@ class Session(Comparing):
     # -- solving -------------------------------------------------------------------------------------------------------
 
     @property
-    def converged(self) -> bool:
-        return bool(self.solver.report.residual <= self.shooting.residual) and self.solver.settled
-
-    @property
-    def shooting_goes_on(self) -> bool:
-        """Whether ``advance`` has something to do."""
-        return self._opened and self.running and not self.converged
-
-    @property
     def at_rest(self) -> bool:
         """Whether nothing changes by itself: neither light nor numbers, and no scene is on its way."""
-        known = not self._can_expect or self.expecting.knows(self._light)
-        return self._quiet and known and not self.comparing
+        known = not self._can_estimate or self.estimate.knows(self._state)
+        return self._idle and known and not self.compared.busy
 
     @property
-    def _quiet(self) -> bool:
+    def solving(self) -> bool:
+        """Whether ``advance`` has something to do."""
+        return self._opened and self.run.goes_on
+
+    @property
+    def _idle(self) -> bool:
         """Whether the light stays as it is by itself, and no other scene is on its way."""
-        return self.loading is None and not self.shooting_goes_on and self._settled
+        return self.loading is None and not self.solving and self.run.settled
 
-    def advance(self, *, budget_ms: float, shots: int = 1, brisk: bool = False) -> int:
-        """Make up to ``shots`` shots within ``budget_ms``; returns how many. None when paused or converged, nor in a frame that
-        has already done something long. brisk: a hand is at the controls, see ``Pacer.advance``."""
-        if not self._opened or self._busy or not self.shooting_goes_on:
+    def advance(self, *, budget_ms: float, amount: int = 1, interactive: bool = False) -> int:
+        """Do up to ``amount`` of work within ``budget_ms``; how much was issued. None when paused or converged, nor in a frame
+        that has already done something long. interactive: a hand is at the controls, see ``Pacer.advance``."""
+        if self._busy or not self.solving:
             return 0
-        self._settled = False
-        self.expecting.changed()
-        made = self._pace.advance(self.solver, budget_ms, shots, brisk=brisk)
-        self.seconds += self._pace.lap()
-        return made
+        self.estimate.changed()
+        return self.run.advance(budget_ms, amount, interactive=interactive)
 
-    def shoot(self, shots: int = 1) -> int:
-        """Up to ``shots`` shots, of one batch at most, also when paused or converged; how many."""
-        self._settled = False
-        self.expecting.changed()
-        return self.solver.step(shots)
+    def work(self, amount: int = 1) -> int:
+        """Up to so much work, of one batch at most, also when paused or converged; how much was issued."""
+        self.estimate.changed()
+        return self.run.work(amount)
 
-    def solve(self, stop: Stop, progress: Callable[[Stats], None] | None = None) -> None:
-        """Shoot until ``stop``, or until converged, see ``solving.solve``. Raises NotFiniteError."""
-        solve(self, stop, progress)
-
-    def settle(self) -> None:
-        """Wait for the GPU and bring report, book and history up to the last shot. Raises NotFiniteError, once."""
-        known = np.isfinite(self.solver.report.residual)
-        self.solver.poll(wait=True)
-        self._books.make(self.solver)
-        self._settled = True
-        if self.books.emitted.sum() > 0:
-            unshot = self.solver.unshot_share()
-            self.solver.report = replace(self.solver.report, residual=unshot)
-            self.history.add(self.solver.shots, self.seconds, unshot, self._escaped_share)
-            if known and not np.isfinite(unshot + float(self.books.absorbed.sum())):
-                raise not_finite(self)
+    def solve(self, stop: Stop, tell: Callable[[Stats], None] | None = None) -> None:
+        """Work until ``stop``, or until converged, see ``Run.solve``. Raises NotFiniteError."""
+        self.estimate.changed()
+        self.run.solve(stop, None if tell is None else lambda: tell(self.stats))
 
     def restart(self) -> None:
         """Forget all light and begin again."""
-        self.solver.reset()
-        self._begin_again()
+        self.run.restart()
+        self._light_begins()
 
-    def set_shooting(self, options: ShootingOptions) -> None:
-        """Other knobs, from the next shot on; only another storage format begins again."""
-        begins = options.storage != self.shooting.storage
-        self.shooting = options
-        self.effort.turned()
+    # -- edits ---------------------------------------------------------------------------------------------------------
+
+    @property
+    def family(self) -> Family:
+        """The row of the table of solvers that is chosen."""
+        return SOLVERS[self.solver_name]
+
+    @property
+    def options(self) -> Any:
+        """Of the solver that is chosen."""
+        return self._options[self.solver_name]
+
+    def set_options(self, options: Options) -> None:
+        """Other options of the solver, from its next piece of work on."""
+        self._options[self.solver_name] = options
         if self._opened:
             self.solver.set_options(options)
-            if begins:
-                self._books.begin(self.solver.books())
+            self.run.options_changed()
+
+    def set_solver(self, name: str) -> None:
+        """Another solver, live. It begins with the light that is there if its method can, else from nothing. Raises UserError."""
+        if name not in SOLVERS:
+            raise UserError(f"--solver {name}: must be one of {', '.join(SOLVERS)}")
+        if name != self.solver_name:
+            self.solver_name = name
+            if self._opened:
+                self._make_solver()
+
+    def set_light(self, light: LightmapOptions) -> None:
+        """Other ways to hold the light: thresholds of quadtrees act on the next work, another format begins again, and quadtrees
+        instead of uniform texels, or the reverse, cut the scene anew in the background. Raises UserError as ``cut_anew``."""
+        if not self._opened:
+            self.light = light
+        elif light.adaptive != self.light.adaptive:
+            self.cut_anew(self.atlas, light)
+        else:
+            storage, self.light = self.light.storage, light
+            self.lightmap.set_options(light)
+            if light.storage != storage:
+                self.solver.reset()
                 self._begin()
+            else:
+                self.run.options_changed()
+
+    def _make_solver(self) -> None:
+        """In place of the one that is there."""
+        self.solver.release()
+        self.solver = self.family.make(self.gpu, self.lightmap, self.options)
+        self._begin()
 
     def set_material(self, index: int, material: Material) -> None:
-        """Another albedo or emission: charts, texels and light stay, and the difference is shot."""
+        """Another albedo or emission: charts and texels stay, and the light where the solver can solve for the difference."""
         materials = list(self.scene.materials)
         materials[index] = material
-        rested = self.converged
-        self.solver.set_materials(tuple(materials))
-        if self.solver.shots == 0:
-            self._begin_again()
-        else:
-            self.effort.edited(self.solver.shots, rested=rested)
-        self.history.add(self.solver.shots, self.seconds, self.solver.report.residual, self._escaped_share)
-        self._books.edited()
-        self._settled = False
+        self.run.set_materials(tuple(materials))
+        if self.solver.issued == 0:
+            self._light_begins()
 
-    def measure(self) -> None:
-        """Wait for the GPU and bring ``comparison`` up to the last shot."""
-        self._compare(wait=True)
+    def _begin(self) -> None:
+        """With a solver that has done no work."""
+        self.run.begin(self.solver, self.family, self._not_finite)
+        self._light_begins()
+
+    def _light_begins(self) -> None:
+        self.estimate.changed()
+        self.compared.restart()
+
+    def _not_finite(self, work: str) -> str:
+        return f"{self.name}: the light is not finite after {work}; parameters {self.parameters}"
+
+    # -- how good it is ------------------------------------------------------------------------------------------------
+
+    def compare(self, *, wait: bool = False) -> None:
+        """Bring the comparison with a reference up to date, with ``wait`` to the last work."""
+        trouble = self.compared.poll(self.solver.issued, self.run.seconds, self._state, wait=wait)
+        self.message = trouble or self.message
 
     @property
     def expected(self) -> ExpectedError | None:
-        """How far off the light is expected to be: None as long as it is not known, see ``expecting``, or nothing is lit."""
-        return self.expecting.error if self._opened and self.expecting.knows(self._light) else None
+        """How far off the light is expected to be: None as long as it is not known, or nothing is lit."""
+        return self.estimate.error if self._opened and self.estimate.knows(self._state) else None
 
-    def expect(self, progress: Callable[[float], None]) -> None:
-        """Work out ``expected`` whole, of settled light."""
-        while self._can_expect and not self.expecting.knows(self._light):
-            self._expect()
-            progress(self.expecting.share)
+    def estimate_now(self, tell: Callable[[float], None]) -> None:
+        """Work out ``expected`` whole, of settled light; ``tell`` is given the share done."""
+        while self._can_estimate and not self.estimate.knows(self._state):
+            self._estimate_part()
+            tell(self.estimate.share)
 
     @property
-    def _can_expect(self) -> bool:
+    def _can_estimate(self) -> bool:
         """Whether there is light to judge."""
-        return self._opened and self.solver.shots > 0 and self.scene.emits
+        return self._opened and self.solver.issued > 0 and self.scene.emits
 
-    def _expect(self) -> None:
+    def _estimate_part(self) -> None:
         """Some of the points, or none where there is nothing to do."""
-        if self._can_expect and not self.expecting.knows(self._light):
-            self.expecting.part(self.lightmap, self.books.returned, self._light)
-
-    def _begin_again(self) -> None:
-        self._books.begin_again()
-        self._begin()
-
-    def _begin(self) -> None:
-        self.seconds, self._settled = 0.0, True
-        self.effort.begin()
-        self.expecting.changed()
-        self._pace.begin()
-        self.gpu.timers.reset()
-        self.history = History()
-        if self.comparison is not None:
-            self.comparison.begin()
-        self.history.add(0, 0.0, self.solver.report.residual, 0.0)
-
-    def hear(self, *, books: bool = True, wait: bool = False) -> None:
-        """Take in what the solver reports, with ``wait`` up to its last step; the energy book now and then, and once when
-        shooting has stopped. Raises NotFiniteError and pauses."""
-        before = self.solver.report.shots
-        report = self.solver.poll(wait=wait)
-        if self.running and not np.isfinite(report.residual):
-            self.running = False
-            raise not_finite(self)
-        if not self.shooting_goes_on:
-            self._pace.pause()
-            if books and self._books.quiet and not self._settled:
-                self._busy = True
-                self.settle()
-        elif books and self._books.due:
-            self._busy = True
-            self._books.make(self.solver)
-        if self.converged:
-            self.effort.converged(self.solver.report.shots)
-        if report.shots != before and not self._settled:
-            self.history.add(report.shots, self.seconds, report.residual, self._escaped_share)
+        if self._can_estimate and not self.estimate.knows(self._state):
+            self.estimate.part(self.lightmap, self.run.energy.returned, self._state)
 
     @property
-    def _escaped_share(self) -> float:
-        return float(self.solver.report.escaped.sum()) / max(float(self.books.emitted.sum()), 1e-300)
+    def _state(self) -> object:
+        """All that the light depends on: another one where the light is another."""
+        return self.solver.issued, self.lightmap.version, self.lightmap.scene, self.solver.options
 
     # -- what is known -------------------------------------------------------------------------------------------------
 
     @property
-    def books(self) -> EnergyBalance:
-        """The last energy book that was made."""
-        return self._books.book
-
-    @property
     def stats(self) -> Stats:
         """Where the solution stands."""
-        return stats_of(self)
+        return stats_of(self.run, self.lightmap)
 
     @property
     def timings(self) -> dict[str, float]:
@@ -348,9 +350,11 @@ class Session(Comparing):
     @property
     def parameters(self) -> dict[str, Any]:
         """Every knob that shaped the solution."""
-        chosen = {"level": self.solver.level, "resolution": self.solver.resolution}
-        shooting = self.shooting.as_dict() | chosen
-        return {"shooting": shooting, "atlas": self.atlas.as_dict(), "light": self.default_light}
-
-
-__all__ = ["Session", "Stats", "Stop"]
+        solver = self.options.as_dict() | dict(self.solver.resolved)
+        return {
+            "solver": self.solver_name,
+            self.solver_name: solver,
+            "lightmap": self.light.as_dict(),
+            "atlas": self.atlas.as_dict(),
+            "light": self.default_light,
+        }

@@ -1,72 +1,71 @@
-"""When a solve ends, and where it stands."""
+"""Where a solution stands, in numbers that panels and reports show."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
-if TYPE_CHECKING:
-    from app.session.session import Session
-
-
-@dataclass(frozen=True)
-class Stop:
-    """When a solve ends, besides when it has converged; whichever comes first."""
-
-    shots: int | None = None
-    seconds: float | None = None
+from app.lightmap.lightmap import Lightmap
+from app.session.run import Run
 
 
 @dataclass(frozen=True)
 class Stats:
-    """Where the solution stands. residual: unshot share of the emitted power [-]; energies summed over RGB [W];
-    shots_per_second: of late, and of the whole solve once it has converged."""
+    """done: work in the solver's ``unit``, of which ``remains`` says what is left. remaining: see Progress. Energies are summed
+    over RGB [W]. per_second: work of late, and of the whole solve once it has converged. resolved: what options that were left
+    unset have come to."""
 
-    shots: int
+    unit: str
+    remains: str
+    done: int
     seconds: float
-    residual: float
+    remaining: float
     emitted: float
     absorbed: float
     escaped: float
     unshot: float
     imbalance: float
-    shots_per_second: float
+    per_second: float
     converged: bool
-    edit_shots: int | None  # since the materials were last edited
-    fresh_shots: int | None  # that it took from nothing until converged
+    refining: bool  # whether leaves come and go
+    note: str | None
+    edit_work: int | None  # since the materials were last edited
+    fresh_work: int | None  # that it took from nothing until converged
     texels: int
     tiles: int
     uniform_texels: int  # if all leaves of a quadtree were of its finest level
     triangles: int
     charts: int
     memory_mib: float
-    level: int  # of the patches that shoot in the end
-    resolution: int  # of a full face of the visibility map [px]
+    resolved: Mapping[str, Any]
 
 
-def stats_of(session: Session) -> Stats:
-    """Where the solution of an open session stands."""
-    book, lightmap = session.books, session.lightmap
-    shots, seconds, done = session.solver.report.shots, session.seconds, session.converged
+def stats_of(run: Run, lightmap: Lightmap) -> Stats:
+    """Where the solution of an open scene stands."""
+    balance, progress, done = run.energy, run.progress, run.converged
     return Stats(
-        shots=shots,
-        seconds=seconds,
-        residual=session.solver.report.residual,
-        emitted=float(book.emitted.sum()),
-        absorbed=float(book.absorbed.sum()),
-        escaped=float(book.escaped.sum()),
-        unshot=float(book.unshot.sum()),
-        imbalance=book.imbalance_share,
-        shots_per_second=shots / seconds if done and seconds > 0 else session.history.shots_per_second,
+        unit=run.family.unit,
+        remains=run.family.remains,
+        done=progress.done,
+        seconds=run.seconds,
+        remaining=progress.remaining,
+        emitted=float(balance.emitted.sum()),
+        absorbed=float(balance.absorbed.sum()),
+        escaped=float(balance.escaped.sum()),
+        unshot=float(balance.unshot.sum()),
+        imbalance=balance.imbalance_share,
+        per_second=progress.done / run.seconds if done and run.seconds > 0 else run.history.work_per_second,
         converged=done,
-        edit_shots=session.effort.edit_shots(shots),
-        fresh_shots=session.effort.fresh_shots,
+        refining=progress.refining,
+        note=progress.note,
+        edit_work=run.effort.edit_work(progress.done),
+        fresh_work=run.effort.fresh_work,
         texels=lightmap.texel_count,
         tiles=lightmap.tiles,
-        uniform_texels=lightmap.pool.uniform_texels(session.shooting.depth),
-        triangles=len(session.scene.triangles),
-        charts=session.charts.chart_count,
+        uniform_texels=lightmap.pool.uniform_texels(lightmap.options.depth),
+        triangles=len(lightmap.scene.triangles),
+        charts=lightmap.charts.chart_count,
         memory_mib=sum(lightmap.memory.values()) / 2**20,
-        level=session.solver.level,
-        resolution=session.solver.resolution,
+        resolved=run.solver.resolved,
     )

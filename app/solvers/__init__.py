@@ -23,6 +23,7 @@ class Family:
     unit: of its work, in the plural, as in ``--shots``. remains: what is left of what it has to do, as in "0.1 % unshot".
     batch: work that it does at once when nothing waits for it. keeps_light: whether it can begin with light that another solver
     has left in the lightmap; else it begins anew. threshold: the option that says how little may remain when it has converged.
+    pictures: captions of the images of its Inspection.
     """
 
     title: str
@@ -34,6 +35,7 @@ class Family:
     batch: int
     threshold: str
     keeps_light: bool = False
+    pictures: tuple[str, ...] = ()
 
 
 SOLVERS: dict[str, Family] = {
@@ -46,6 +48,7 @@ SOLVERS: dict[str, Family] = {
         remains="unshot",
         batch=BATCH,
         threshold="residual",
+        pictures=("What the last shooter saw",),
     ),
 }
 DEFAULT_SOLVER = "shooting"

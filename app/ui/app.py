@@ -13,7 +13,7 @@ from app.ui.file_dialog import FileDialog
 from app.ui.state import Legend, Request, State
 
 if TYPE_CHECKING:
-    from app.session.session import Session
+    from app.session.view import View
 
 SMALLEST_STEP = 1e-4  # s: Dear ImGui wants time to pass between frames
 IRRADIANCE = ".exr"
@@ -65,7 +65,7 @@ class Ui:
 
     def frame(
         self,
-        session: Session,
+        view: View,
         *,
         size: tuple[float, float],
         ratio: float,
@@ -86,12 +86,12 @@ class Ui:
         io.display_framebuffer_scale = imgui.ImVec2(ratio, ratio)
         io.delta_time = max(seconds, SMALLEST_STEP)
         state.texture_id, state.legend, state.ratio = texture_id, legend, ratio
-        state.stats = session.stats if session.opened else None
+        state.stats = view.session.stats if view.session.opened else None
         state.fps = FPS_MEMORY * state.fps + (1 - FPS_MEMORY) / io.delta_time if state.fps else 1 / io.delta_time
-        if session.opened:
-            state.remember(session.unedited, session.lightmap)
+        if view.session.opened:
+            state.remember(view.session.unedited, view.session.lightmap)
         imgui.new_frame()
-        self._build(session, io.delta_time)
+        self._build(view, io.delta_time)
         imgui.render()
         state.run_actions()
         return imgui.get_draw_data()
@@ -136,43 +136,43 @@ class Ui:
         implot.destroy_context(self._plots)
         imgui.destroy_context(self._context)
 
-    def _build(self, session: Session, seconds: float) -> None:
+    def _build(self, view: View, seconds: float) -> None:
         state = self.state
-        keys.dispatch(session, state)
+        keys.dispatch(view, state)
         if state.show_ui:
             with theme.see_through():
-                overlays.menu_bar(session, state)
-                overlays.status_bar(session, state)
+                overlays.menu_bar(view, state)
+                overlays.status_bar(view, state)
             layout.docks(state)
-            layout.panels(session, state)
+            layout.panels(view, state)
         else:
             state.view_px = (0.0, 0.0, self.io.display_size.x, self.io.display_size.y)
-        if session.opened:
-            navigation.navigate(session, state, seconds)
-        overlays.invitation(session, state)
-        self._open_files(session)
+        if view.session.opened:
+            navigation.navigate(view, state, seconds)
+        overlays.invitation(view, state)
+        self._open_files(view)
         overlays.legend_overlay(state.legend, state)
-        overlays.loading_overlay(session.loading)
-        overlays.toasts(session, state, seconds)
+        overlays.loading_overlay(view.session.loading)
+        overlays.toasts(view, state, seconds)
         overlays.help_overlay(state)
 
-    def _open_files(self, session: Session) -> None:
+    def _open_files(self, view: View) -> None:
         if self.state.ask_for_file:
             self.state.ask_for_file = False
             self._dialog.open()
         chosen = self._dialog.poll()
         if chosen is not None:
-            self.state.act(lambda: session.open(chosen))
+            self.state.act(lambda: view.session.open(chosen))
         if self.state.ask_for_reference:
             self.state.ask_for_reference = False
             self._bakes.open()
         bake = self._bakes.poll()
         if bake is not None:
-            self.state.act(lambda: session.open_reference(bake))
+            self.state.act(lambda: view.session.compared.open(bake))
 
-    def drop(self, session: Session, file: Path) -> None:
+    def drop(self, view: View, file: Path) -> None:
         """A file was dropped on the window: a scene, or the light of a bake of the one that is open."""
-        if file.suffix.lower() == IRRADIANCE and session.opened:
-            self.state.act(lambda: session.open_reference(file))
+        if file.suffix.lower() == IRRADIANCE and view.session.opened:
+            self.state.act(lambda: view.session.compared.open(file))
         else:
-            self.state.act(lambda: session.open(file))
+            self.state.act(lambda: view.session.open(file))

@@ -10,29 +10,29 @@ from app.ui import theme
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.session.session import Session
+    from app.session.view import View
 
 NEAR_EM = 0.35  # from the line, that takes hold of it
 NAME_EM = 0.6  # between the line and its names
 GRIP_EM = 0.35
 
 
-def divider(session: Session, state: State) -> bool:
+def divider(view: View, state: State) -> bool:
     """Draw the line, and move it with the mouse; whether the mouse is at it."""
     state.split_held = state.split_held and imgui.is_mouse_down(0)
-    if session.shown.show != "split" or session.shown.layer == "error":
+    if view.shown.show != "split" or view.shown.layer == "error":
         state.split_held = False
         return False
     io, em = imgui.get_io(), imgui.get_font_size()
     left, top, width, height = state.view_px
-    x = left + session.display.split * width
+    x = left + view.display.split * width
     over = abs(io.mouse_pos.x - x) <= NEAR_EM * em and top <= io.mouse_pos.y < top + height
     near = over and not io.want_capture_mouse and state.drag_button < 0
     if near and imgui.is_mouse_clicked(0):
         state.split_held = True
     if state.split_held:
         share = min(max((io.mouse_pos.x - left) / max(width, 1.0), 0.0), 1.0)
-        session.display = session.display.replace(split=share)
+        view.display = view.display.replace(split=share)
         x = left + share * width
     if near or state.split_held:
         imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)

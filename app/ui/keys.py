@@ -14,7 +14,7 @@ from app.ui.panels.solver import toggle
 from app.ui.state import Request, State
 
 if TYPE_CHECKING:
-    from app.session.session import Session
+    from app.session.view import View
 
 Key = imgui.Key
 ANY_POPUP = int(imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level)
@@ -27,65 +27,65 @@ class Shortcut:
     label: str
     help: str
     key: imgui.Key
-    action: Callable[[Session, State], None]
+    action: Callable[[View, State], None]
     control: bool = False
     while_typing: bool = False
     needs_scene: bool = False
 
 
-def _help(session: Session, state: State) -> None:
+def _help(view: View, state: State) -> None:
     state.show_help = not state.show_help
 
 
-def _ui(session: Session, state: State) -> None:
+def _ui(view: View, state: State) -> None:
     state.show_ui = not state.show_ui
 
 
-def _reload(session: Session, state: State) -> None:
+def _reload(view: View, state: State) -> None:
     state.requests.append(Request.RELOAD_SHADERS)
 
 
-def _screenshot(session: Session, state: State) -> None:
+def _screenshot(view: View, state: State) -> None:
     state.requests.append(Request.SCREENSHOT)
 
 
-def _pause(session: Session, state: State) -> None:
-    toggle(session)
+def _pause(view: View, state: State) -> None:
+    toggle(view)
 
 
-def _one_shot(session: Session, state: State) -> None:
-    session.running = False
-    state.act(session.shoot)
+def _one_step(view: View, state: State) -> None:
+    view.session.run.running = False
+    state.act(view.session.work)
 
 
-def _restart(session: Session, state: State) -> None:
-    state.act(session.restart)
+def _restart(view: View, state: State) -> None:
+    state.act(view.session.restart)
 
 
-def _flip(session: Session, state: State) -> None:
-    show(session, state, "solution" if shown(session) == "reference" else "reference")
+def _flip(view: View, state: State) -> None:
+    show(view, state, "solution" if shown(view) == "reference" else "reference")
 
 
-def _split(session: Session, state: State) -> None:
-    show(session, state, "solution" if shown(session) == "split" else "split")
+def _split(view: View, state: State) -> None:
+    show(view, state, "solution" if shown(view) == "split" else "split")
 
 
-def _error(session: Session, state: State) -> None:
-    show(session, state, session.display.show if shown(session) == "error" else "error")
+def _error(view: View, state: State) -> None:
+    show(view, state, view.display.show if shown(view) == "error" else "error")
 
 
-def _open(session: Session, state: State) -> None:
+def _open(view: View, state: State) -> None:
     state.ask_for_file = True
 
 
-def _escape(session: Session, state: State) -> None:
+def _escape(view: View, state: State) -> None:
     """Close what is open above the view, or stop a scene on its way; with nothing left, quit."""
     if state.show_help:
         state.show_help = False
         return
-    if session.loading is not None:
-        session.loading.cancel()
-        if session.opened:
+    if view.session.loading is not None:
+        view.session.loading.cancel()
+        if view.session.opened:
             return
     state.requests.append(Request.QUIT)
 
@@ -96,7 +96,7 @@ SHORTCUTS = (
     Shortcut("F5", "reload shaders; a broken one keeps the last good program", Key.f5, _reload, while_typing=True),
     Shortcut("F12", "screenshot into the current folder", Key.f12, _screenshot, while_typing=True),
     Shortcut("Space", "run or pause", Key.space, _pause, needs_scene=True),
-    Shortcut(".", "one shot", Key.period, _one_shot, needs_scene=True),
+    Shortcut(".", "one step: a shot, or what else the solver counts", Key.period, _one_step, needs_scene=True),
     Shortcut("R", "restart", Key.r, _restart, needs_scene=True),
     Shortcut("F", "look at the picked point, or at the whole scene", Key.f, focus, needs_scene=True),
     Shortcut("C", "flip between solution and reference", Key.c, _flip, needs_scene=True),
@@ -116,7 +116,7 @@ POINTER = (
 )
 
 
-def dispatch(session: Session, state: State) -> None:
+def dispatch(view: View, state: State) -> None:
     """Do what the keys pressed since the last frame ask for."""
     io = imgui.get_io()
     if imgui.is_popup_open("", ANY_POPUP):
@@ -126,6 +126,6 @@ def dispatch(session: Session, state: State) -> None:
         return
     for shortcut in SHORTCUTS:
         held = io.key_ctrl or io.key_super
-        ready = (session.opened or not shortcut.needs_scene) and (not io.want_text_input or shortcut.while_typing)
+        ready = (view.session.opened or not shortcut.needs_scene) and (not io.want_text_input or shortcut.while_typing)
         if ready and held == shortcut.control and imgui.is_key_pressed(shortcut.key, False):
-            shortcut.action(session, state)
+            shortcut.action(view, state)

@@ -13,7 +13,7 @@ from app.ui.panels import compare, convergence, display, inspect, scene, solver
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.session.session import Session
+    from app.session.view import View
 
 SIDE_EM = 20.5  # width of the side docks, in font heights: the widest fact fits
 BOTTOM_SHARE = 0.27  # height of the lower dock, of the window
@@ -29,7 +29,7 @@ class Panel:
 
     title: str
     dock: str
-    draw: Callable[[Session, State], None]
+    draw: Callable[[View, State], None]
 
 
 PANELS = (
@@ -54,9 +54,9 @@ def docks(state: State) -> None:
     state.view_px = (node.pos.x, node.pos.y, max(node.size.x, 1.0), max(node.size.y, 1.0))
 
 
-def panels(session: Session, state: State) -> None:
+def panels(view: View, state: State) -> None:
     """Every panel that is not hidden. A reference that has come brings its panel to the front."""
-    compared = session.opened and session.comparison is not None
+    compared = view.session.opened and view.session.compared.comparison is not None
     if compared and not state.compared:
         imgui.set_window_focus("Compare")
     state.compared = compared
@@ -67,8 +67,8 @@ def panels(session: Session, state: State) -> None:
             visible, open_ = imgui.begin(panel.title, True, imgui.WindowFlags_.no_collapse)
         (state.docked.add if imgui.is_window_docked() else state.docked.discard)(panel.title)
         if visible:
-            if session.opened:
-                panel.draw(session, state)
+            if view.session.opened:
+                panel.draw(view, state)
             else:
                 widgets.dim("no scene")
         imgui.end()

@@ -16,7 +16,7 @@ from app.ui.navigation import look_through
 from app.ui.state import TOAST_SECONDS, Legend, Request, State
 
 if TYPE_CHECKING:
-    from app.session.session import Session
+    from app.session.view import View
 
 ICONS = theme.ICONS
 FLOATING = int(
@@ -34,7 +34,7 @@ LEGEND_EM = (1.2, 13.0)  # width and height of the colour bar
 LEGEND_MARGIN_EM = 1.0
 
 
-def menu_bar(session: Session, state: State) -> None:
+def menu_bar(view: View, state: State) -> None:
     """File, View, Help."""
     if not imgui.begin_main_menu_bar():
         return
@@ -44,7 +44,7 @@ def menu_bar(session: Session, state: State) -> None:
         if imgui.begin_menu(f"{ICONS.ICON_FA_CUBES}  Scenes", bool(state.scenes)):
             for source in state.scenes:
                 if imgui.menu_item(Path(source).stem, "", False)[0]:
-                    state.act(partial(session.open, source))
+                    state.act(partial(view.session.open, source))
             imgui.end_menu()
         if imgui.menu_item(f"{ICONS.ICON_FA_CAMERA}  Screenshot", "F12", False)[0]:
             state.requests.append(Request.SCREENSHOT)
@@ -53,7 +53,7 @@ def menu_bar(session: Session, state: State) -> None:
             state.requests.append(Request.QUIT)
         imgui.end_menu()
     if imgui.begin_menu("View"):
-        _view_menu(session, state)
+        _view_menu(view, state)
         imgui.end_menu()
     if imgui.begin_menu("Help"):
         if imgui.menu_item("Keys", "F1", state.show_help)[0]:
@@ -62,16 +62,16 @@ def menu_bar(session: Session, state: State) -> None:
     imgui.end_main_menu_bar()
 
 
-def _view_menu(session: Session, state: State) -> None:
+def _view_menu(view: View, state: State) -> None:
     for panel in PANELS:
         clicked, shown = imgui.menu_item(panel.title, "", panel.title not in state.hidden_panels)
         if clicked:
             (state.hidden_panels.discard if shown else state.hidden_panels.add)(panel.title)
     imgui.separator()
-    if imgui.begin_menu("Camera", session.opened):
-        for camera in session.scene.cameras:
+    if imgui.begin_menu("Camera", view.session.opened):
+        for camera in view.session.scene.cameras:
             if imgui.menu_item(camera.name, "", False)[0]:
-                look_through(session, state, camera)
+                look_through(view, state, camera)
         imgui.end_menu()
     if imgui.menu_item("Reset layout", "", False)[0]:
         state.hidden_panels.clear()
@@ -80,7 +80,7 @@ def _view_menu(session: Session, state: State) -> None:
         state.show_ui = False
 
 
-def status_bar(session: Session, state: State) -> None:
+def status_bar(view: View, state: State) -> None:
     """One line at the bottom of the window."""
     flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.menu_bar
     height = imgui.get_frame_height()
@@ -89,16 +89,16 @@ def status_bar(session: Session, state: State) -> None:
         imgui.internal.begin_viewport_side_bar("##status", viewport, imgui.Dir.down, height, int(flags))
         and imgui.begin_menu_bar()
     ):
-        for text, colour in _status(session, state):
+        for text, colour in _status(view, state):
             imgui.text_colored(imgui.ImVec4(*colour), text)
             imgui.separator()
-        if session.message:
-            imgui.text_unformatted(session.message)
+        if view.session.message:
+            imgui.text_unformatted(view.session.message)
         imgui.end_menu_bar()
     imgui.end()
 
 
-def _status(session: Session, state: State) -> list[tuple[str, theme.RGBA]]:
+def _status(view: View, state: State) -> list[tuple[str, theme.RGBA]]:
     stats = state.stats
     if stats is None:
         return [("no scene", theme.DIM)]
@@ -106,15 +106,15 @@ def _status(session: Session, state: State) -> list[tuple[str, theme.RGBA]]:
         ("converged", theme.GOOD)
         if stats.converged
         else ("running", theme.AMBER)
-        if session.running
+        if view.session.run.running
         else ("paused", theme.TEXT)
     )
-    parts = [f"{widgets.percent(stats.residual)} unshot", f"{stats.shots:,} shots"]
+    parts = [f"{widgets.percent(stats.remaining)} {stats.remains}", f"{stats.done:,} {stats.unit}"]
     if state.measured:
-        parts += [f"{widgets.number(stats.shots_per_second, 3)} shots/s"]
+        parts += [f"{widgets.number(stats.per_second, 3)} {stats.unit}/s"]
     if state.measured and state.live:
         parts += [f"{state.fps:.0f} fps"]
-    return [(session.name, theme.TEXT), (word, colour), *((part, theme.DIM) for part in parts)]
+    return [(view.session.name, theme.TEXT), (word, colour), *((part, theme.DIM) for part in parts)]
 
 
 def help_overlay(state: State) -> None:
@@ -136,9 +136,9 @@ def help_overlay(state: State) -> None:
     imgui.end()
 
 
-def invitation(session: Session, state: State) -> None:
+def invitation(view: View, state: State) -> None:
     """What to do while no scene is open."""
-    if session.opened or session.loading is not None:
+    if view.session.opened or view.session.loading is not None:
         return
     text = "Drop a scene here, or press Ctrl+O"
     left, top, width, height = state.view_px
@@ -161,12 +161,12 @@ def loading_overlay(loading: Any) -> None:
     imgui.end()
 
 
-def toasts(session: Session, state: State, seconds: float) -> None:
+def toasts(view: View, state: State, seconds: float) -> None:
     """Short lines over the lower edge of the view, for a few seconds or until clicked."""
-    if session.message != state.last_message:
-        state.last_message = session.message
-        if session.message:
-            state.notify(session.message, error=False)
+    if view.session.message != state.last_message:
+        state.last_message = view.session.message
+        if view.session.message:
+            state.notify(view.session.message, error=False)
     for toast in state.toasts:
         toast.seconds += seconds
     state.toasts = [t for t in state.toasts if t.seconds < TOAST_SECONDS]

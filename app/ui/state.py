@@ -14,8 +14,7 @@ from app.options import Options, option
 if TYPE_CHECKING:
     from app.atlas.options import AtlasOptions
     from app.session.picking import Picked
-    from app.session.session import Stats
-    from app.ui.navigation import Flight
+    from app.session.stats import Stats
 
 RGB = tuple[float, float, float]
 TOAST_SECONDS = 6.0
@@ -31,11 +30,13 @@ class Request(Enum):
 
 @dataclass(frozen=True)
 class Pace(Options):
-    """How much is shot between two pictures."""
+    """How much is solved between two pictures."""
 
-    shots_per_frame: int = option(1, "shots between two pictures", minimum=1, maximum=256, logarithmic=True)
+    work_per_frame: int = option(
+        1, "shots, or what else the solver counts, between two pictures", minimum=1, maximum=256, logarithmic=True
+    )
     frame_budget: float = option(
-        20.0, "time per picture after which no further shot starts", unit="ms", minimum=1, maximum=90
+        20.0, "time per picture after which no further work starts", unit="ms", minimum=1, maximum=90
     )
 
 
@@ -61,14 +62,24 @@ class Toast:
 
 
 @dataclass
+class Flight:
+    """The eye on its way to a focus: from one place and distance to another."""
+
+    start: tuple[Any, float]  # eye (3,) [m], distance [m]
+    end: tuple[Any, float]
+    seconds: float = 0.0
+
+
+@dataclass
 class State:
     """Everything that belongs to the interface and not to the session.
 
     measured: whether numbers that depend on the machine's speed are shown (off for pictures that are compared).
     live: whether frames follow each other, so that there is a rate of them.
     texture_id: makes a texture of the host drawable; legend: the scale of what is shown now; stats: of the session,
-    asked once per frame (None without a scene). atlas: edited, not yet applied. view_px: the 3-D view (left, top,
-    width, height) [display units]. reference: of a solve in the background; layer: to go back to from the error.
+    asked once per frame (None without a scene). atlas, adaptive: edited, not yet applied. view_px: the 3-D view (left, top,
+    width, height) [display units]. inspected: what the solver showed last, and of which light. reference: of a solve in the
+    background; layer: to go back to from the error.
     """
 
     measured: bool = True
@@ -90,8 +101,8 @@ class State:
     fps: float = 0.0
     picked: Picked | None = None
     picked_age: float = 0.0
-    hemicube: tuple[object, Any, int] | None = None
-    hemicube_age: float = 0.0
+    inspected: tuple[object, Any] | None = None
+    inspected_age: float = 0.0
     inset: tuple[object, Any] | None = None
     inset_age: float = 0.0
     drag_button: int = -1
@@ -101,8 +112,9 @@ class State:
     flight: Flight | None = None
     material: int = 0
     atlas: AtlasOptions | None = None
+    adaptive: bool | None = None
     emission_colours: dict[int, RGB] = field(default_factory=dict)
-    plot: str = "shots"
+    plot: str = "work"
     reference: ReferenceOptions = field(default_factory=ReferenceOptions)
     layer: str = "combined"
     toasts: list[Toast] = field(default_factory=list)
@@ -133,7 +145,7 @@ class State:
         """What is open now, told every frame: nothing of another scene stays picked or selected, nor of another cut of it.
         Two scenes may have the same name, so that only which objects they are tells them apart."""
         if lightmap is not self._known[1]:
-            self.picked, self.atlas = None, None
+            self.picked = self.atlas = self.adaptive = None
         if scene is not self._known[0]:
             self.flight, self.material = None, 0
             self.emission_colours.clear()

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
-from app.lightmap.lightmap import STORAGE, Lightmap
+from app.lightmap.options import STORAGE, LightmapOptions
 from app.scene.model import F32, F64, Scene
-from app.session.loading import load
+from app.session.batch import opened, solve_until
 from app.solvers import DEFAULT_SOLVER, SOLVERS, EnergyBalance, ShootingOptions
 from app.solvers.shooting.options import MAX_LEVEL
-from app.solvers.shooting.stages import BATCH, LEVEL, ROOT_LEVEL
+from app.solvers.shooting.stages import LEVEL, ROOT_LEVEL
 from app.visibility.projections import PROJECTIONS
 
 SIZES = ("small", "large")
@@ -41,18 +41,22 @@ class Way:
     """One way to solve."""
 
     solver: str = DEFAULT_SOLVER
+    adaptive: bool = False
     projection: str = "hemicube"
     storage: str = FULL
 
     @property
     def name(self) -> str:
-        return f"{self.solver} {self.projection}" + ("" if self.storage == FULL else f" {self.storage}")
+        return f"{self.solver} {'adaptive' if self.adaptive else 'uniform'} {self.projection}" + (
+            "" if self.storage == FULL else f" {self.storage}"
+        )
 
 
-WAYS = tuple(Way(s, p) for s in SOLVERS for p in PROJECTIONS) + tuple(
+WAYS = tuple(Way(s, a, p) for s in SOLVERS for a in (False, True) for p in PROJECTIONS) + tuple(
     Way(storage=storage) for storage in STORAGE if storage != FULL
 )
-SOLVERS_ONLY = tuple(Way(s) for s in SOLVERS)  # where how a shooter sees, and how light is stored, plays no part
+# Where how a shooter sees, and how light is stored, plays no part
+SOLVERS_ONLY = tuple(Way(s, a) for s in SOLVERS for a in (False, True))
 
 
 @dataclass(frozen=True)
@@ -193,30 +197,22 @@ class HardCase:
     def solve(self, gpu: Gpu, scene: Scene, way: Way, size: str, scale: float) -> Light:
         """Shoot until converged and settled, or so many shots."""
         i = SIZES.index(size)
-        adaptive = way.solver == "adaptive"
         last, least = (self.shots[i], 0.0) if self.shots else (ENOUGH, self.residual[i])
         options = ShootingOptions(
-            depth=1,
             projection=way.projection,
-            storage=way.storage,
             resolution=self.map[i],
             residual=max(least, LEAST),  # quadtrees shoot no further
         )
-        if adaptive:  # levels count from the root, whose texels are those of a uniform lightmap
+        if way.adaptive:  # levels count from the root, whose texels are those of a uniform lightmap
             options = options.replace(level=min(LEVEL + ROOT_LEVEL, MAX_LEVEL))
         start = time.perf_counter()
-        pool = load(scene, AtlasOptions(density=self.density[i] / scale, adaptive=adaptive)).pool
-        lightmap = Lightmap(gpu, pool, storage=way.storage)
-        try:
-            solver = SOLVERS[way.solver](gpu, lightmap, options)
-            try:
-                while solver.report.shots < last and not (solver.report.residual <= least and solver.settled):
-                    solver.step(BATCH)
-                    solver.poll()
-                shots, book = solver.poll(wait=True).shots, solver.books()
-            finally:
-                solver.release()
-            surfaces = pool.surfaces
+        atlas = AtlasOptions(density=self.density[i] / scale)
+        light = LightmapOptions(adaptive=way.adaptive, depth=1, storage=way.storage)
+        with opened(gpu, scene, atlas, light, options, way.solver) as (lightmap, solver):
+            batch = SOLVERS[way.solver].batch
+            solve_until(solver, batch, lambda now: now.done >= last or (now.remaining <= least and now.converged))
+            shots, book = solver.poll(wait=True).done, solver.energy()
+            surfaces = lightmap.pool.surfaces
             covered = surfaces.area > 0
             return Light(
                 scene=scene,
@@ -232,5 +228,3 @@ class HardCase:
                 shots=shots,
                 seconds=time.perf_counter() - start,
             )
-        finally:
-            lightmap.release()

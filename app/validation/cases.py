@@ -8,7 +8,6 @@ import numpy as np
 
 from app.scene.model import Scene
 from app.scene.shapes import transform
-from app.solvers import DEFAULT_SOLVER
 from app.validation import scenes
 from app.validation.case import LEAST, SOLVERS_ONLY, WAYS, HardCase, Way
 from app.validation.checks import (
@@ -100,7 +99,7 @@ CASES: tuple[HardCase, ...] = (
         density=(4, 16),
         map=(256, 256),
         residual=(1e-18, 1e-18),
-        ways=tuple(way for way in WAYS if way.solver == DEFAULT_SOLVER),
+        ways=tuple(way for way in WAYS if not way.adaptive),
     ),
     HardCase(
         "bright-and-dim",
@@ -110,7 +109,7 @@ CASES: tuple[HardCase, ...] = (
         density=(4, 16),
         map=(256, 256),
         residual=(LEAST, LEAST),
-        ways=tuple(way for way in WAYS if way.solver != DEFAULT_SOLVER),
+        ways=tuple(way for way in WAYS if way.adaptive),
     ),
     HardCase(
         "small-lamp",

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +18,10 @@ from app.gpu import Framebuffer, Gpu, Pass, ShaderError, Texture
 from app.gpu.imgui import ImguiRenderer
 from app.render.false_colour import Scale, colour_map, false_colour_scale, measured
 from app.render.resolve import BORDER, TEXELS_PER_FRAME, display_size
+from app.session.view import View
 from app.ui import theme
 from app.ui.app import Ui
 from app.ui.state import Legend, Request
-
-if TYPE_CHECKING:
-    from app.session.session import Session
 
 LEGEND_COLOURS = 48
 SCALE_SHARE = 0.05  # of the time may go into finding the false-colour scale
@@ -55,7 +52,7 @@ class UiFrame:
 
     def draw(
         self,
-        session: Session,
+        view: View,
         target: Framebuffer,
         *,
         size: tuple[float, float],
@@ -68,18 +65,18 @@ class UiFrame:
         size: of the window [display units]; ratio: pixels per unit, so that the target has size·ratio pixels;
         seconds: since the last frame. look: draw the view anew, or show it as it was drawn last. Reloads shaders itself.
         """
-        scale = self._false_colour(session)
-        legend = None if scale is None else _legend(measured(session.shown), scale)
+        scale = self._false_colour(view)
+        legend = None if scale is None else _legend(measured(view.shown), scale)
         data = self._ui.frame(
-            session, size=size, ratio=ratio, seconds=seconds, texture_id=self._renderer.texture_id, legend=legend
+            view, size=size, ratio=ratio, seconds=seconds, texture_id=self._renderer.texture_id, legend=legend
         )
         left, bottom, width, height = self._ui.view_rect
         known = self._view
         texture, view_target = self._view_of(width, height)
-        if not session.opened:
+        if not view.session.opened:
             view_target.clear(*theme.PANEL)
         elif look or known is not self._view:
-            session.draw(view_target, (width, height), scale=scale, samples=self._samples, whole=self._whole)
+            view.draw(view_target, (width, height), scale=scale, samples=self._samples, whole=self._whole)
         target.use()
         target.clear(*theme.PANEL)
         self._present.draw(
@@ -94,12 +91,12 @@ class UiFrame:
             self._reload()
         return [r for r in requests if r is not Request.RELOAD_SHADERS]
 
-    def frames_to_show(self, session: Session) -> int:
+    def frames_to_show(self, view: View) -> int:
         """How many frames it takes until a change is seen everywhere."""
-        if self._whole or not session.opened:
+        if self._whole or not view.session.opened:
             return WARM_UP
-        border = BORDER[session.display.interpolation]
-        return WARM_UP + math.ceil(math.prod(display_size(session.lightmap, border)) / TEXELS_PER_FRAME)
+        border = BORDER[view.display.interpolation]
+        return WARM_UP + math.ceil(math.prod(display_size(view.session.lightmap, border)) / TEXELS_PER_FRAME)
 
     def release(self) -> None:
         """Give back the GL objects. The interface is still usable by another renderer, or can be released."""
@@ -119,18 +116,18 @@ class UiFrame:
             self._gpu.release_all(*self._view)
             self._view = None
 
-    def _false_colour(self, session: Session) -> Scale | None:
+    def _false_colour(self, view: View) -> Scale | None:
         """The scale of what is shown. Finding its top reads all light back, so that is done only now and then."""
-        if not session.opened:
+        if not view.session.opened:
             return None
-        display = session.shown
+        display, lightmap = view.shown, view.session.lightmap
         kind = measured(display)
         if kind == "off":
             return None
-        asked = (session.lightmap, kind, display.false_colour_log, display.false_colour_max)
+        asked = (lightmap, kind, display.false_colour_log, display.false_colour_max)
         now = time.perf_counter()
         if self._scale is None or asked != self._scale_of or (now >= self._scale_due and not display.false_colour_max):
-            self._scale = false_colour_scale(display, session.lightmap)
+            self._scale = false_colour_scale(display, lightmap)
             self._scale_of = asked
             cost = time.perf_counter() - now
             self._scale_due = now + max(SCALE_SECONDS, cost / SCALE_SHARE)
@@ -151,14 +148,13 @@ def _legend(kind: str, scale: Scale) -> Legend:
     return Legend(kind.capitalize(), scale.unit, max(scale.low, 0.0), scale.high, scale.low > 0, colours)
 
 
-def ui_image(
-    gpu: Gpu, session: Session, size: tuple[int, int], *, measured: bool = True, panels: bool = True
-) -> NDArray[np.uint8]:
+def ui_image(view: View, size: tuple[int, int], *, measured: bool = True, panels: bool = True) -> NDArray[np.uint8]:
     """The viewer's window as it would look, (height, width, 3) u8, top row first, for a ``size`` (width, height) [px].
 
     The session is not stepped. ``measured=False`` leaves out what depends on the machine's speed, so that pictures
     can be compared; ``panels=False`` all but the picture and the legend of its false colour.
     """
+    gpu = view.session.gpu
     limit = gpu.limits.max_texture
     if not (1 <= min(size) and max(size) <= limit):
         raise UserError(f"a picture of {size[0]}×{size[1]} pixels: each side must be 1 to {limit} on this GPU")
@@ -169,7 +165,7 @@ def ui_image(
     frame = UiFrame(gpu, ui, samples=SAMPLES)
     try:
         for _ in range(WARM_UP):
-            frame.draw(session, target, size=size)
+            frame.draw(view, target, size=size)
         return pixels(target, size)
     finally:
         frame.release()

@@ -1,4 +1,4 @@
-"""The window: moderngl-window over pyglet gives context, events and time; every frame is poll, shoot, draw.
+"""The window: moderngl-window over pyglet gives context, events and time; every frame is poll, solve, draw.
 
 Events go to Dear ImGui through its queue, so that a press shorter than a frame is seen; keys and mouse are answered by
 ``app.ui``, which knows no window.
@@ -11,7 +11,7 @@ import string
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from imgui_bundle import imgui
 from moderngl_window import activate_context
@@ -21,12 +21,10 @@ from moderngl_window.timers.clock import Timer
 from app.errors import GpuError, UserError
 from app.gpu import Gpu
 from app.session.pacing import Turns
+from app.session.view import View
 from app.ui.app import Ui
 from app.ui.state import Request
 from app.viewer.ui_frame import UiFrame, save_screenshot
-
-if TYPE_CHECKING:
-    from app.session.session import Session
 
 GL_VERSION = (4, 1)
 TITLE = "Glowtree"
@@ -80,7 +78,7 @@ CURSORS = {
 
 
 def run_window(
-    make_session: Callable[[Gpu], Session],
+    make_view: Callable[[Gpu], View],
     *,
     size: tuple[int, int] = (1280, 720),
     scenes: Sequence[str] = (),
@@ -91,17 +89,17 @@ def run_window(
 ) -> None:
     """Open the window, run until it is closed, release everything.
 
-    make_session: makes the session once there is a context. size: of the window [display units]. scenes: names for
+    make_view: makes a view of a session once there is a context. size: of the window [display units]. scenes: names for
     the menu. suffixes: of the files that can be opened. layout_file: keeps the places of the panels. frames: close
     after so many (for tests and measurements). Raises UserError where no window can be opened, and what
-    ``make_session`` raises.
+    ``make_view`` raises.
     """
     window = _open(size, vsync)
     gpu = Gpu(window.ctx)
     gpu.timers.enabled = True
     timer = Timer()
     try:
-        session = make_session(gpu)
+        view = make_view(gpu)
     except UserError:
         gpu.release()
         window.close()
@@ -109,11 +107,12 @@ def run_window(
     ui = Ui(scale=_text_scale(window), layout_file=layout_file, scenes=scenes, suffixes=suffixes)
     frame = UiFrame(gpu, ui, whole=False)
     try:
-        ViewerWindow(window, timer, session, frame, ui, frames).main_loop()
+        ViewerWindow(window, timer, view, frame, ui, frames).main_loop()
     finally:
         frame.release()
         ui.release()
-        session.release()
+        view.release()
+        view.session.release()
         gpu.release()
         window.close()  # last: it takes the context along
 
@@ -162,10 +161,10 @@ class ViewerWindow(WindowConfig):
     clear_color = None  # type: ignore[assignment]  # the frame clears; the base class allows None, its type does not
 
     def __init__(
-        self, window: Any, timer: Timer, session: Session, frame: UiFrame, ui: Ui, frames: int | None = None
+        self, window: Any, timer: Timer, view: View, frame: UiFrame, ui: Ui, frames: int | None = None
     ) -> None:
         super().__init__(ctx=window.ctx, wnd=window, timer=timer)
-        self._session, self._frame, self._ui, self._frames_left = session, frame, ui, frames
+        self._view, self._session, self._frame, self._ui, self._frames_left = view, view.session, frame, ui, frames
         self._keys = _keys()
         self._pyglet = window._window
         self._held: set[imgui.Key] = set()
@@ -202,13 +201,13 @@ class ViewerWindow(WindowConfig):
             self.wnd.render(now, min(elapsed, REST_SECONDS))
             if not self.wnd.is_closing:
                 self.wnd.swap_buffers()
-            waiting = self._session.loading is not None or self._session.fetching is not None
-            if waiting and not self._session.shooting_goes_on:
+            waiting = self._session.loading is not None or self._session.compared.fetching is not None
+            if waiting and not self._session.solving:
                 time.sleep(LOADING_PAUSE)
 
     def _wake(self, *_: object) -> None:
         self._awake_until = time.perf_counter() + AWAKE_SECONDS
-        self._frames_due = self._frame.frames_to_show(self._session)
+        self._frames_due = self._frame.frames_to_show(self._view)
 
     def _at_rest(self) -> bool:
         """Whether another frame would look like the last one."""
@@ -217,19 +216,19 @@ class ViewerWindow(WindowConfig):
         return time.perf_counter() > self._awake_until and self._frames_due <= 0
 
     def on_render(self, time: float, frame_time: float) -> None:
-        """Collect what is ready, shoot within the budget, draw, do what was asked for."""
+        """Collect what is ready, solve within the budget, draw, do what was asked for."""
         session, state, look = self._session, self._ui.state, True
         try:
-            session.poll(brisk=self._ui.held)
-            shoot, look = self._turns.next(frame_time) if session.shooting_goes_on else (False, True)
-            if shoot:
+            session.poll(interactive=self._ui.held)
+            solve, look = self._turns.next(frame_time) if session.solving else (False, True)
+            if solve:
                 pace = state.pace
-                session.advance(budget_ms=pace.frame_budget, shots=pace.shots_per_frame, brisk=self._ui.held)
+                session.advance(budget_ms=pace.frame_budget, amount=pace.work_per_frame, interactive=self._ui.held)
         except UserError as error:
-            session.running = False
+            session.run.running = False
             state.notify(str(error), error=True)
         target, ratio = self.wnd.fbo, self.wnd.pixel_ratio
-        requests = self._frame.draw(session, target, size=self.wnd.size, ratio=ratio, seconds=frame_time, look=look)
+        requests = self._frame.draw(self._view, target, size=self.wnd.size, ratio=ratio, seconds=frame_time, look=look)
         self._show_cursor()
         self._show_name()
         for request in requests:
@@ -307,7 +306,7 @@ class ViewerWindow(WindowConfig):
     def on_files_dropped_event(self, x: int, y: int, paths: list[str]) -> None:
         """Files were dropped: the first one is opened."""
         if paths:
-            self._ui.drop(self._session, Path(paths[0]))
+            self._ui.drop(self._view, Path(paths[0]))
 
     def _button(self, x: int, y: int, button: int, down: bool) -> None:
         self._ui.io.add_mouse_pos_event(x, y)

@@ -22,39 +22,20 @@ from imgui_bundle import imgui
 
 from app.gpu import Gpu
 from app.session.session import Session
+from app.session.view import View
 from app.ui import widgets
 from app.viewer.window import run_window
 
 EVERY = 3  # frames between two reports
 
 
-class ReportingSession(Session):
-    """Tells the test, every few frames, how it is."""
+class ReportingView(View):
+    """Remembers what was picked, and where widgets are."""
 
-    def __init__(self, gpu: Gpu, folder: Path) -> None:
-        super().__init__(gpu, expose_on_open=True)
-        self.folder, self.frame = folder, 0
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
         self.places: dict[str, tuple[float, float]] = {}
         self.picked: str | None = None
-
-    def poll(self, *, brisk: bool = False) -> None:
-        super().poll(brisk=brisk)
-        self.frame += 1
-        if self.frame % EVERY == 0:
-            state = {
-                "frame": self.frame,
-                "name": self.name,
-                "running": self.running,
-                "at_rest": self.at_rest,
-                "shots": self.solver.shots if self.opened else 0,
-                "exposure": self.display.exposure,
-                "message": self.message,
-                "picked": self.picked,
-                "places": self.places,
-            }
-            report = self.folder / "state.new"
-            report.write_text(json.dumps(state))
-            report.replace(self.folder / "state.json")
 
     def pick(self, x_px: int, y_px: int) -> Any:
         picked = super().pick(x_px, y_px)
@@ -73,6 +54,34 @@ class ReportingSession(Session):
         return noting
 
 
+class ReportingSession(Session):
+    """Tells the test, every few frames, how it is, and its view."""
+
+    def __init__(self, gpu: Gpu, folder: Path) -> None:
+        super().__init__(gpu, expose_on_open=True)
+        self.folder, self.frame = folder, 0
+        self.view = ReportingView(self)
+
+    def poll(self, *, brisk: bool = False) -> None:
+        super().poll(interactive=brisk)
+        self.frame += 1
+        if self.frame % EVERY == 0:
+            state = {
+                "frame": self.frame,
+                "name": self.name,
+                "running": self.run.running,
+                "at_rest": self.at_rest,
+                "shots": self.solver.issued if self.opened else 0,
+                "exposure": self.view.display.exposure,
+                "message": self.message,
+                "picked": self.view.picked,
+                "places": self.view.places,
+            }
+            report = self.folder / "state.new"
+            report.write_text(json.dumps(state))
+            report.replace(self.folder / "state.json")
+
+
 def drop_files(folder: Path) -> None:
     """Pass on what the test drops: also while the window waits for an event."""
     drop = folder / "drop"
@@ -88,15 +97,15 @@ def drop_files(folder: Path) -> None:
 def main() -> None:
     folder = Path(sys.argv[1])
 
-    def make_session(gpu: Gpu) -> Session:
+    def make_view(gpu: Gpu) -> View:
         session = ReportingSession(gpu, folder)
-        imgui.button = session.note(imgui.button, lambda label, *_: label.split("###")[-1])
-        widgets._editor = session.note(widgets._editor, lambda spec, _: spec.name)
+        imgui.button = session.view.note(imgui.button, lambda label, *_: label.split("###")[-1])
+        widgets._editor = session.view.note(widgets._editor, lambda spec, _: spec.name)
         session.open("cornell-box")
-        return session
+        return session.view
 
     threading.Thread(target=drop_files, args=(folder,), daemon=True).start()
-    run_window(make_session, size=(1280, 720), vsync=False)
+    run_window(make_view, size=(1280, 720), vsync=False)
     print("closed")
 
 

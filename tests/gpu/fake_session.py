@@ -10,10 +10,12 @@ import numpy as np
 
 from app.atlas.options import AtlasOptions
 from app.estimate.error import ExpectedError
+from app.gpu import Gpu
+from app.lightmap.options import LightmapOptions
 from app.render.camera import CameraView
 from app.render.options import DisplayOptions
 from app.scene.model import Material
-from app.solvers import ShootingOptions
+from app.solvers import DEFAULT_SOLVER, SOLVERS, Inspection, ShootingOptions
 
 EMITTED = 34.6  # W
 MATERIALS = (
@@ -36,15 +38,15 @@ class FakeSpace:
 class FakeHistory:
     """Sixty shots, each of which leaves 93 % of the residual."""
 
-    shots_per_second = 212.0
+    work_per_second = 212.0
 
     def column(self, name: str) -> np.ndarray:
         shots = np.arange(60.0)
         residual = 0.93**shots
         return {
-            "shots": shots,
+            "work": shots,
             "seconds": shots / 200,
-            "residual": residual,
+            "remaining": residual,
             "absorbed": 0.9 * (1 - residual),
             "escaped": 0.1 * (1 - residual),
         }[name]
@@ -55,27 +57,52 @@ class FakeErrors:
 
     def column(self, name: str) -> np.ndarray:
         shots = 2 * np.arange(30.0)
-        return {"shots": shots, "seconds": shots / 200, "rms": 0.9**shots, "median": 0.5 * 0.9**shots}[name]
+        return {"work": shots, "seconds": shots / 200, "rms": 0.9**shots, "median": 0.5 * 0.9**shots}[name]
+
+
+class FakeCompared:
+    """What the interface uses of a comparison."""
+
+    def __init__(self, calls: list[tuple[object, ...]]) -> None:
+        self.comparison: SimpleNamespace | None = None
+        self.fetching: SimpleNamespace | None = None
+        self.reference_texels = 124816
+        self._calls = calls
+
+    def irradiance_at(self, texel: tuple[int, int]) -> tuple[float, float, float] | None:
+        return None if self.comparison is None else (16.125, 11.0, 3.0)
+
+    def open(self, path: Path) -> None:
+        self._calls.append(("open_reference", str(path)))
+
+    def solve(self, options: object) -> None:
+        self._calls.append(("solve_reference", options))
+
+    def stop_fetching(self) -> None:
+        self._calls.append(("stop_fetching",))
 
 
 class FakeSession:
-    """What the interface uses of a session. ``calls`` lists what it was asked to do, ``insets`` the pictures of the atlas."""
+    """What the interface uses of a view, of its session and of the session's run, all in one. ``calls`` lists what it was asked
+    to do, ``insets`` the pictures of the atlas."""
 
-    def __init__(self, *, opened: bool = True) -> None:
-        self.opened, self.running, self.name, self.message = opened, True, "fake box", None
+    def __init__(self, *, opened: bool = True, gpu: Gpu | None = None) -> None:
+        self.gpu, self.opened, self.running, self.name, self.message = gpu, opened, True, "fake box", None
         self.loading: SimpleNamespace | None = None
-        self.fetching: SimpleNamespace | None = None
-        self.comparison: SimpleNamespace | None = None
-        self.reference_texels = 124816
+        self.calls: list[tuple[object, ...]] = []
+        self.session = self.run = self
+        self.compared = FakeCompared(self.calls)
+        self.solver_name, self.family = DEFAULT_SOLVER, SOLVERS[DEFAULT_SOLVER]
         self.expected = ExpectedError(0.016, -0.003, 0.006, 240)
-        self.expecting = SimpleNamespace(share=1.0)
+        self.estimate = SimpleNamespace(share=1.0)
         cameras = (SimpleNamespace(name="front", world_from_camera=np.eye(4), yfov=0.7),)
         self.scene = SimpleNamespace(materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras)
         self.unedited = self.scene
         self.charts = SimpleNamespace(density=40.0, tile=16, warnings=(), size=(160, 96))
         self.lightmap = SimpleNamespace(space=FakeSpace())
-        self.shooting, self.atlas, self.display = ShootingOptions(), AtlasOptions(), DisplayOptions()
-        self.view = CameraView(np.eye(4), 0.7, 2.0)
+        self.options, self.display = ShootingOptions(), DisplayOptions()
+        self.atlas, self.light = AtlasOptions(), LightmapOptions()
+        self.camera = CameraView(np.eye(4), 0.7, 2.0)
         self.history = FakeHistory()
         self.timings = {
             "shooting/visibility": 1.1,
@@ -85,7 +112,6 @@ class FakeSession:
         }
         self.image = None
         self.picked = None
-        self.calls: list[tuple[object, ...]] = []
         self.insets: list[tuple[tuple[int, int], bool]] = []
 
     @property
@@ -96,21 +122,9 @@ class FakeSession:
         """There is a reference."""
         light = SimpleNamespace(name="bake reference", texels=124816, unshot=1e-4)
         error = SimpleNamespace(rms=0.0412, median=0.0093, q90=0.0714, bias=-0.0031)
-        self.comparison = SimpleNamespace(
+        self.compared.comparison = SimpleNamespace(
             light=light, error=error, lit=4001, errors=FakeErrors(), notes=lambda lightmap: ["a note"]
         )
-
-    def reference_at(self, texel: tuple[int, int]) -> tuple[float, float, float] | None:
-        return None if self.comparison is None else (16.125, 11.0, 3.0)
-
-    def open_reference(self, path: Path) -> None:
-        self.calls.append(("open_reference", str(path)))
-
-    def solve_reference(self, options: object) -> None:
-        self.calls.append(("solve_reference", options))
-
-    def stop_fetching(self) -> None:
-        self.calls.append(("stop_fetching",))
 
     def drop_reference(self) -> None:
         self.calls.append(("drop_reference",))
@@ -124,40 +138,50 @@ class FakeSession:
             "triangles": 32,
             "charts": 18,
             "memory_mib": 7.3,
-            "shots": 60,
-            "level": 2,
-            "resolution": 256,
+            "unit": "shots",
+            "remains": "unshot",
+            "done": 60,
+            "refining": False,
+            "note": None,
+            "uniform_texels": 40000,
+            "resolved": {"level": 2, "resolution": 256},
         }
-        rates = {"residual": 0.0318, "seconds": 0.3, "shots_per_second": 212.0, "converged": False}
-        rates |= {"edit_shots": None, "fresh_shots": None}
+        rates = {"remaining": 0.0318, "seconds": 0.3, "per_second": 212.0, "converged": False}
+        rates |= {"edit_work": None, "fresh_work": None}
         return SimpleNamespace(**energies, **counts, **rates)
 
     def poll(self) -> None:
         pass
 
-    def advance(self, *, budget_ms: float, shots: int) -> int:
+    def advance(self, *, budget_ms: float, amount: int) -> int:
         self.calls.append(("advance",)) if self.running else None
-        return shots if self.running else 0
+        return amount if self.running else 0
 
     def draw(self, target, size, *, scale=None, samples=1, whole=True) -> None:
         target.clear(0.2, 0.3, 0.4, 1.0)
-
-    def hemicube_image(self):
-        return self.image
-
-    def vanished(self) -> int:
-        return 3
 
     def atlas_image(self, size, *, turned=False):
         self.insets.append((size, turned))
         return self.image
 
+    @property
+    def solver(self) -> SimpleNamespace:
+        caption = self.family.pictures[0]
+        shown = Inspection(
+            {} if self.image is None else {caption: self.image}, {}, {"Smaller than a sample": "3 triangles"}
+        )
+        return SimpleNamespace(inspect=lambda texel=None, *, images=False: shown)
+
+    def read_again(self, picked: object) -> object:
+        self.calls.append(("read_again",))
+        return picked
+
     def pick(self, x_px: int, y_px: int):
         self.calls.append(("pick", x_px, y_px))
         return self.picked
 
-    def shoot(self) -> None:
-        self.calls.append(("shoot",))
+    def work(self) -> None:
+        self.calls.append(("work",))
 
     def expose(self) -> None:
         self.calls.append(("expose",))
@@ -168,12 +192,19 @@ class FakeSession:
     def open(self, source: str | Path) -> None:
         self.calls.append(("open", str(source)))
 
-    def set_shooting(self, options: ShootingOptions) -> None:
+    def set_options(self, options: ShootingOptions) -> None:
         self.shooting = options
-        self.calls.append(("set_shooting",))
+        self.calls.append(("set_options",))
 
-    def set_atlas(self, options: AtlasOptions) -> None:
-        self.calls.append(("set_atlas",))
+    def set_light(self, light: LightmapOptions) -> None:
+        self.light = light
+        self.calls.append(("set_light",))
+
+    def set_solver(self, name: str) -> None:
+        self.calls.append(("set_solver", name))
+
+    def cut_anew(self, atlas: AtlasOptions, light: LightmapOptions) -> None:
+        self.calls.append(("cut_anew",))
 
     def set_material(self, index: int, material: Material) -> None:
         materials = list(self.scene.materials)

@@ -11,11 +11,11 @@ from app.bench.speed import drag as drags
 from app.bench.speed import frames
 from app.bench.speed.drag import DECADES, DEPTHS, DRAGGED, SWEEP, SWEEPS, drag
 from app.cli import run
-from app.solvers import ShootingOptions
+from app.lightmap.options import LightmapOptions
 
 
 def test_a_hand_goes_there_and_back_in_small_steps() -> None:
-    start = ShootingOptions(depth=6)
+    start = LightmapOptions(depth=6)
     gradients = np.log10([o.gradient for o in drag("gradient", start)])
     assert len(gradients) == SWEEP * SWEEPS
     assert np.isclose(gradients[-1], np.log10(start.gradient)), "back where it was"

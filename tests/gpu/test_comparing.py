@@ -25,7 +25,6 @@ from solver_scenes import table_room
 from app.atlas.options import AtlasOptions
 from app.atlas.points import random_points
 from app.bake import write_bake
-from app.commands.headless import picture as shot
 from app.compare.comparison import POINTS, POINTS_SEED, error_of
 from app.compare.light import ReferenceLight
 from app.compare.options import ReferenceOptions
@@ -36,6 +35,7 @@ from app.lightmap.at_points import irradiance_of
 from app.lightmap.collapse import collapse
 from app.lightmap.gutter import fill_gutter
 from app.lightmap.lightmap import Lightmap
+from app.lightmap.options import LightmapOptions
 from app.lightmap.probe import Probe
 from app.lightmap.tile_pool import TilePool
 from app.reference.metrics import lit_points
@@ -43,8 +43,11 @@ from app.render.false_colour import ERRORS, colour_map
 from app.render.resolve import Reference
 from app.scene.model import F32, F64, Scene
 from app.session.comparison_worker import INTERRUPTED
-from app.session.session import Session, Stop
+from app.session.run import Stop
+from app.session.session import Session
+from app.session.view import View
 from app.solvers import ShootingOptions
+from app.viewer.picture import picture as shot
 
 __all__ = ["box", "cornell", "forest", "forgotten"]
 
@@ -88,9 +91,9 @@ def test_the_probe_reads_what_is_drawn(gpu: Gpu, box: Lightmap, storage: str) ->
 
 def test_the_probe_reads_quadtrees(gpu: Gpu) -> None:
     """Light of leaves of several levels is what their texels hold, within what it changes by over the largest."""
-    session = Session(gpu, shooting=SHOOTING, atlas=AtlasOptions(adaptive=True, texels=900))
+    session = Session(gpu, options=SHOOTING, atlas=AtlasOptions(texels=900), light=LightmapOptions(adaptive=True))
     session.open_now("cornell-box")
-    session.solve(Stop(shots=60))
+    session.solve(Stop(work=60))
     lightmap = session.lightmap
     assert np.ptp(lightmap.pool.leaves.level[lightmap.pool.used]) > 0
     tiles = smooth(lightmap)
@@ -108,17 +111,24 @@ def test_the_probe_reads_quadtrees(gpu: Gpu) -> None:
 
 
 @pytest.fixture
-def session(gpu: Gpu) -> Iterator[Session]:
-    session = Session(gpu, shooting=SHOOTING, atlas=AtlasOptions(texels=900))
+def view(gpu: Gpu) -> Iterator[View]:
+    session = Session(gpu, options=SHOOTING, atlas=AtlasOptions(texels=900))
+    view = View(session)
     session.open_now("furnace")
-    yield session
+    yield view
+    view.release()
     session.release()
+
+
+@pytest.fixture
+def session(view: View) -> Session:
+    return view.session
 
 
 def baked(session: Session, folder: Path, factor: float = 1.0) -> Path:
     """The light of a session, times a factor."""
     irradiance, covered = collapse(session.lightmap.pool, session.lightmap.irradiance(ambient=True))
-    report = {"texels": session.lightmap.texel_count, "residual": session.stats.residual}
+    report = {"texels": session.lightmap.texel_count, "residual": session.stats.remaining}
     write_bake(folder, session.scene, session.charts, np.float32(factor) * irradiance, covered, report)
     return folder
 
@@ -129,49 +139,49 @@ def frames(session: Session, until: Callable[[], bool]) -> None:
     while not until():
         assert time.monotonic() < end
         session.poll()
-        session.advance(budget_ms=20, shots=4)
+        session.advance(budget_ms=20, amount=4)
 
 
 def test_the_error_against_a_bake_is_that_of_its_light(session: Session, tmp_path: Path) -> None:
     session.solve(Stop())
-    session.open_reference_now(baked(session, tmp_path, 2.0))
-    session.measure()
-    assert session.comparison is not None and session.comparison.error is not None
+    session.compared.open_now(baked(session, tmp_path, 2.0))
+    session.compare(wait=True)
+    assert session.compared.comparison is not None and session.compared.comparison.error is not None
     # in a furnace light is all but even: interpolated at gutters or not, it differs by less than 1 % of itself
-    assert session.comparison.error == pytest.approx((0.5, -0.5, 0.5, 0.5), abs=0.01)
+    assert session.compared.comparison.error == pytest.approx((0.5, -0.5, 0.5, 0.5), abs=0.01)
     points = random_points(session.scene, POINTS, POINTS_SEED)
-    reference = session.comparison.light.at(points)
+    reference = session.compared.comparison.light.at(points)
     lit = lit_points(reference)
     expected = error_of(irradiance_of(session.lightmap, points)[lit], reference[lit])
-    assert session.comparison.error == pytest.approx(expected, abs=1e-3)
+    assert session.compared.comparison.error == pytest.approx(expected, abs=1e-3)
 
 
 def test_the_error_falls_while_light_is_shot(session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.compare.comparison.SECONDS", 0.0)
     session.solve(Stop())
-    session.open_reference_now(baked(session, tmp_path))
+    session.compared.open_now(baked(session, tmp_path))
     session.restart()
-    comparison = session.comparison
+    comparison = session.compared.comparison
     assert comparison is not None and not session.at_rest
     frames(session, lambda: session.at_rest)
-    rms, shots = (comparison.errors.column(name) for name in ("rms", "shots"))
-    assert len(rms) > 3 and (np.diff(shots) > 0).all() and shots[-1] == session.solver.shots
+    rms, shots = (comparison.errors.column(name) for name in ("rms", "work"))
+    assert len(rms) > 3 and (np.diff(shots) > 0).all() and shots[-1] == session.solver.issued
     assert rms[0] > 0.5 and rms[-1] < 0.02 and (np.diff(rms) < 1e-3).all()
     session.restart()
     assert len(comparison.errors.column("rms")) == 0
 
 
 def test_a_texel_has_its_reference(session: Session, tmp_path: Path) -> None:
-    session.solve(Stop(shots=20))
-    assert session.reference_at((0, 0)) is None
-    session.open_reference_now(baked(session, tmp_path, 3.0))
+    session.solve(Stop(work=20))
+    assert session.compared.irradiance_at((0, 0)) is None
+    session.compared.open_now(baked(session, tmp_path, 3.0))
     lightmap = session.lightmap
     tile, row, column = (int(n[7]) for n in np.nonzero(lightmap.pool.surfaces.area > 0))
     corner = lightmap.pool.corner(tile)
     texel = corner[0] + column, corner[1] + row
     there = lightmap.irradiance(ambient=True)[tile, row, column]
-    assert session.reference_at(texel) == pytest.approx(3 * there, rel=1e-5)
-    comparison, pool = session.comparison, lightmap.pool
+    assert session.compared.irradiance_at(texel) == pytest.approx(3 * there, rel=1e-5)
+    comparison, pool = session.compared.comparison, lightmap.pool
     assert comparison is not None
     image = np.frombuffer(comparison.texels.texture.read(), np.float32).reshape(*pool.size[::-1], 4)
     all_of_them = comparison.light.on_tiles(pool, np.arange(pool.tiles))
@@ -180,9 +190,9 @@ def test_a_texel_has_its_reference(session: Session, tmp_path: Path) -> None:
 
 def test_an_edit_is_measured_and_said(session: Session, tmp_path: Path) -> None:
     session.solve(Stop())
-    session.open_reference_now(baked(session, tmp_path))
+    session.compared.open_now(baked(session, tmp_path))
     frames(session, lambda: session.at_rest)
-    comparison, material = session.comparison, session.scene.materials[0]
+    comparison, material = session.compared.comparison, session.scene.materials[0]
     assert comparison is not None and comparison.error is not None and comparison.error.rms < 0.01
     assert comparison.notes(session.lightmap) == []
     session.set_material(0, dataclasses.replace(material, emission=(2 * material.emission[0],) * 3))
@@ -265,14 +275,14 @@ def test_layers_without_received_light_have_no_other_side(gpu: Gpu, box: Lightma
 
 
 def test_the_reference_follows_the_leaves(gpu: Gpu, tmp_path: Path) -> None:
-    session = Session(gpu, shooting=SHOOTING, atlas=AtlasOptions(adaptive=True, texels=900))
+    session = Session(gpu, options=SHOOTING, atlas=AtlasOptions(texels=900), light=LightmapOptions(adaptive=True))
     session.open_now("cornell-box")
-    session.solve(Stop(shots=20))
+    session.solve(Stop(work=20))
     lightmap = session.lightmap
     light = light_of(lightmap, lightmap.irradiance())
     texels = ReferenceTexels(gpu, lightmap, light)
     for shots in (20, 60, 120):
-        session.solve(Stop(shots=shots))
+        session.solve(Stop(work=shots))
         version = lightmap.version
         texels.follow(whole=shots != 60)
         pool = lightmap.pool
@@ -326,66 +336,66 @@ def test_a_node_set_that_is_resized_is_not_looked_up_at_once(
     texels.release()
 
 
-def test_without_a_reference_the_solution_is_shown(session: Session) -> None:
-    session.solve(Stop(shots=8))
-    plain = shot(session, (64, 48))
+def test_without_a_reference_the_solution_is_shown(view: View, session: Session) -> None:
+    session.solve(Stop(work=8))
+    plain = shot(view, (64, 48))
     for change in ({"layer": "error"}, {"show": "reference"}, {"show": "split"}):
-        session.display = PLAIN.replace(**change)
-        session.display = session.display.replace(tone_map="agx")
-        assert (shot(session, (64, 48)) == plain).all()
+        view.display = PLAIN.replace(**change)
+        view.display = view.display.replace(tone_map="agx")
+        assert (shot(view, (64, 48)) == plain).all()
 
 
 # -- references come and go --------------------------------------------------------------------------------------------
 
 
-def test_a_reference_stays_with_its_scene(session: Session, tmp_path: Path) -> None:
+def test_a_reference_stays_with_its_scene(view: View, session: Session, tmp_path: Path) -> None:
     session.solve(Stop())
-    session.open_reference(baked(session, tmp_path))
-    frames(session, lambda: session.fetching is None)
-    first = session.comparison
+    session.compared.open(baked(session, tmp_path))
+    frames(session, lambda: session.compared.fetching is None)
+    first = session.compared.comparison
     assert first is not None and session.message is None
-    session.set_atlas(AtlasOptions(texels=2000))
+    session.cut_anew(AtlasOptions(texels=2000))
     frames(session, lambda: session.loading is None)
-    assert session.comparison is not None and session.comparison is not first
+    assert session.compared.comparison is not None and session.compared.comparison is not first
     frames(session, lambda: session.at_rest)
-    error = session.comparison.error
+    error = session.compared.comparison.error
     # a furnace that reflects half; both to a residual of 0.05, which is missing twice, or was shot ahead
     assert error is not None and error.rms < 0.1
-    session.display = session.display.replace(layer="error", show="split")
+    view.display = view.display.replace(layer="error", show="split")
     session.open_now("cornell-box")
-    assert session.comparison is None
-    assert (session.display.layer, session.display.show) == ("combined", "solution")
+    assert session.compared.comparison is None
+    assert (view.display.layer, view.display.show) == ("combined", "solution")
 
 
 def test_a_reference_of_another_scene_is_said(session: Session, tmp_path: Path) -> None:
-    session.solve(Stop(shots=4))
+    session.solve(Stop(work=4))
     folder = baked(session, tmp_path)
     session.open_now("cornell-box")
-    session.open_reference(folder)
-    frames(session, lambda: session.fetching is None)
-    assert session.comparison is None and "is of another scene" in str(session.message)
+    session.compared.open(folder)
+    frames(session, lambda: session.compared.fetching is None)
+    assert session.compared.comparison is None and "is of another scene" in str(session.message)
     with pytest.raises(UserError, match="is of another scene"):
-        session.open_reference_now(folder)
+        session.compared.open_now(folder)
 
 
 def test_a_black_reference_is_none(session: Session, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="holds no light"):
-        session.open_reference_now(baked(session, tmp_path))
+        session.compared.open_now(baked(session, tmp_path))
 
 
 def test_releasing_leaves_nothing_behind(
-    gpu: Gpu, session: Session, tmp_path: Path, forgotten: Callable[[], list[object]]
+    view: View, gpu: Gpu, session: Session, tmp_path: Path, forgotten: Callable[[], list[object]]
 ) -> None:
-    session.solve(Stop(shots=20))
+    session.solve(Stop(work=20))
     folder = baked(session, tmp_path)
     counts = []
     for _ in range(2):  # programs that were compiled once stay
-        session.open_reference_now(folder)
-        session.display = session.display.replace(show="split")
-        shot(session, (64, 48))
+        session.compared.open_now(folder)
+        view.display = view.display.replace(show="split")
+        shot(view, (64, 48))
         session.poll()  # a measurement stays on its way
-        session.drop_reference()
-        shot(session, (64, 48))
+        view.drop_reference()
+        shot(view, (64, 48))
         counts.append(held(gpu))
     assert counts[0] == counts[1] and not forgotten()
 
@@ -410,13 +420,13 @@ def workers() -> list[psutil.Process]:
 
 def test_a_finer_solve_is_a_reference(session: Session, own_cache: Path) -> None:
     """A furnace: its answer is known. What the worker wrote is there at once the next time."""
-    session.running = False
+    session.run.running = False
     options = ReferenceOptions(texels=1500, residual=1e-2)
-    session.solve_reference(options)
-    assert session.fetching is not None and not session.at_rest
-    frames(session, lambda: session.fetching is None)
+    session.compared.solve(options)
+    assert session.compared.fetching is not None and not session.at_rest
+    frames(session, lambda: session.compared.fetching is None)
     assert session.message is None and not workers()
-    comparison = session.comparison
+    comparison = session.compared.comparison
     assert comparison is not None and comparison.light.texels is not None and comparison.light.unshot is not None
     assert comparison.light.texels > session.lightmap.texel_count and comparison.light.unshot <= 1e-2
     material = session.scene.materials[0]
@@ -425,26 +435,25 @@ def test_a_finer_solve_is_a_reference(session: Session, own_cache: Path) -> None
     assert comparison.light.at(random_points(session.scene, 100, 1)) == pytest.approx(H, rel=1e-2 + 0.02)
     (kept,) = own_cache.glob("*.npz")
     written = kept.stat().st_mtime_ns
-    session.solve_reference(options)
-    frames(session, lambda: session.fetching is None)
-    assert session.comparison is not comparison and kept.stat().st_mtime_ns == written
-    session.solve_reference(options.replace(residual=1e-9))
+    session.compared.solve(options)
+    frames(session, lambda: session.compared.fetching is None)
+    assert session.compared.comparison is not comparison and kept.stat().st_mtime_ns == written
+    session.compared.solve(options.replace(residual=1e-9))
     frames(session, lambda: bool(workers()))
     if hasattr(os, "getsid"):
         assert all(os.getsid(worker.pid) == worker.pid for worker in workers()), "Ctrl-C would reach it"
-    session.stop_fetching()
+    session.compared.stop_fetching()
     gone = time.monotonic() + 10
     while workers():
         assert time.monotonic() < gone, "still there"
         time.sleep(0.05)
-    assert session.comparison is not None and session.fetching is None
+    assert session.compared.comparison is not None and session.compared.fetching is None
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 def test_an_interrupted_solve_is_no_answer(cornell: Scene, tmp_path: Path) -> None:
     source, target = tmp_path / "in.pickle", tmp_path / "out.npz"
-    shooting = SHOOTING.replace(residual=1e-9)
-    source.write_bytes(pickle.dumps({"scene": cornell, "atlas": AtlasOptions(texels=900), "shooting": shooting}))
+    source.write_bytes(pickle.dumps({"scene": cornell, "atlas": AtlasOptions(texels=900), "residual": 1e-9}))
     command = [sys.executable, "-m", "app.session.comparison_worker", str(source), str(target)]
     env = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     with subprocess.Popen(command, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as worker:

@@ -22,7 +22,8 @@ from app.lightmap.lightmap import Lightmap
 from app.reference.form_factors import point_to_polygon
 from app.reference.metrics import bias, lit_points, relative_rms
 from app.scene.model import F64
-from app.session.session import Session, Stop
+from app.session.run import Stop
+from app.session.session import Session
 from app.solvers import ShootingOptions
 from app.util.parts import run_to_end
 
@@ -218,7 +219,7 @@ def test_shadows_on_coarse_texels_are_expected_to_be_off(gpu: Gpu) -> None:
 
 @pytest.fixture
 def session(gpu: Gpu) -> Session:
-    return Session(gpu, shooting=ShootingOptions(resolution=64, residual=0.1), atlas=AtlasOptions(texels=800))
+    return Session(gpu, options=ShootingOptions(resolution=64, residual=0.1), atlas=AtlasOptions(texels=800))
 
 
 def test_a_session_at_rest_says_what_it_expects(gpu: Gpu, session: Session) -> None:
@@ -229,16 +230,16 @@ def test_a_session_at_rest_says_what_it_expects(gpu: Gpu, session: Session) -> N
     frames, shares = 0, [0.0]
     while not session.at_rest:
         session.poll()
-        shares.append(session.expecting.share)
+        shares.append(session.estimate.share)
         frames += 1
     assert frames > 64 and np.diff(shares).min() >= 0
     first = session.expected
     assert first is not None and 0.005 < first.rms < 0.5
     session.set_material(1, session.scene.materials[1])
-    session.shoot(1)
+    session.work(1)
     assert session.expected is None
     session.solve(Stop())
-    session.expect(lambda share: None)
+    session.estimate_now(lambda share: None)
     second = session.expected
     assert second is not None and second != first and second.rms == pytest.approx(first.rms, rel=0.5)
     session.release()
@@ -246,42 +247,42 @@ def test_a_session_at_rest_says_what_it_expects(gpu: Gpu, session: Session) -> N
 
 def test_as_many_other_shots_are_other_light(gpu: Gpu, session: Session) -> None:
     session.open_now("cornell-box")
-    session.solve(Stop(shots=8))
-    session.expect(lambda share: None)
+    session.solve(Stop(work=8))
+    session.estimate_now(lambda share: None)
     assert session.expected is not None
     session.restart()
-    session.set_shooting(session.shooting.replace(visibility="depth"))
-    session.solve(Stop(shots=8))
+    session.set_options(session.options.replace(visibility="depth"))
+    session.solve(Stop(work=8))
     assert session.expected is None
     session.release()
 
 
 def test_a_hand_comes_first(gpu: Gpu, session: Session) -> None:
     session.open_now("cornell-box")
-    session.solve(Stop(shots=8))
-    session.running = False
+    session.solve(Stop(work=8))
+    session.run.running = False
     for _ in range(3):
-        session.poll(brisk=True)
-    assert session.expecting.share == 0.0 and not session.at_rest
+        session.poll(interactive=True)
+    assert session.estimate.share == 0.0 and not session.at_rest
     for _ in range(3):
         session.poll()
-    assert session.expecting.share > 0.0
+    assert session.estimate.share > 0.0
     session.release()
 
 
 def test_nothing_of_it_stays(gpu: Gpu, session: Session, forgotten: Callable[[], list[object]]) -> None:
     session.open_now("cornell-box")
-    session.solve(Stop(shots=8))
-    session.expect(lambda share: None)
+    session.solve(Stop(work=8))
+    session.estimate_now(lambda share: None)
     session.open_now("cornell-box")
     before = held(gpu)
     for _ in range(2):
-        session.solve(Stop(shots=8))
-        session.running = False
+        session.solve(Stop(work=8))
+        session.run.running = False
         for _ in range(4):
             session.poll()
-        assert session.expecting.share > 0.0, "on its way"
-        session.running = True
+        assert session.estimate.share > 0.0, "on its way"
+        session.run.running = True
         session.open_now("cornell-box")
     assert held(gpu) == before and not forgotten()
     session.release()

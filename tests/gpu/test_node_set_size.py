@@ -11,20 +11,21 @@ from numpy.typing import NDArray
 from solver_scenes import Solution, begin, table_room
 
 from app.atlas.options import AtlasOptions
-from app.commands.headless import picture
 from app.gpu import Gpu, Texture
 from app.lightmap.collapse import collapse
 from app.lightmap.lightmap import LIGHT, Lightmap
-from app.lightmap.options import STORAGE
+from app.lightmap.options import STORAGE, LightmapOptions
 from app.lightmap.quadtree import Quadtree, Tile, quadtree_pool
 from app.render import resolve
 from app.render.ages import LeafAges
 from app.render.options import DisplayOptions
 from app.render.resolve import BORDER, DisplayTexels
 from app.session.session import Session
+from app.session.view import View
 from app.solvers import EnergyBalance, ShootingOptions
 from app.solvers.shooting.solver import Shooting
 from app.solvers.shooting.stages import EMITTER, ShotBuffers
+from app.viewer.picture import picture
 
 __all__ = ["forest"]
 
@@ -321,32 +322,35 @@ def test_further_shots_come_to_the_same_answer(gpu: Gpu, planted: Callable[..., 
 @pytest.mark.long
 def test_the_picture_stays_and_the_panel_tells(gpu: Gpu) -> None:
     """Texels of a leaf lie elsewhere in a texture of another height: the sampler weighs them with a fraction of so many bits."""
-    shooting = ShootingOptions(resolution=64, residual=0.2, **MANY)  # type: ignore[arg-type]
-    session = Session(gpu, shooting=shooting, atlas=AtlasOptions(adaptive=True, texels=900))
+    light = LightmapOptions(adaptive=True, **MANY)  # type: ignore[arg-type]
+    options = ShootingOptions(resolution=64, residual=0.2)
+    session = Session(gpu, options=options, atlas=AtlasOptions(texels=900), light=light)
+    view = View(session)
     session.open_now("cornell-box")
     solver = session.solver
     assert isinstance(solver, Shooting)
-    while not (solver.settled and session.converged):
-        session.shoot(8)
-        session.hear(books=False)
+    while not (solver.settled and session.run.converged):
+        session.work(8)
+        session.run.poll(energy=False)
     peak = session.stats.memory_mib
-    session.set_shooting(shooting.replace(**FEW))
+    session.set_light(light.replace(**FEW))
     pictures, resize = [], solver._resize
 
     def watched(slots: int) -> None:
-        pictures.append(picture(session, (240, 160)))
+        pictures.append(picture(view, (240, 160)))
         books = solver.energy()
         resize(slots)
         assert_same_books(solver.energy(), books)
         assert books.escaped.min() > 0
-        pictures.append(picture(session, (240, 160)))
+        pictures.append(picture(view, (240, 160)))
 
     solver._resize = watched  # type: ignore[method-assign]
-    session.shoot(8)
-    while not (solver.settled and session.converged):
-        session.shoot(8)
-        session.hear(books=False)
+    session.work(8)
+    while not (solver.settled and session.run.converged):
+        session.work(8)
+        session.run.poll(energy=False)
     before, after = pictures
     assert np.abs(before.astype(int) - after).max() <= 1
     assert session.stats.memory_mib < peak / 2
+    view.release()
     session.release()

@@ -6,6 +6,7 @@ import pytest
 
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
+from app.lightmap.options import LightmapOptions
 from app.session.session import Session
 from app.solvers import ShootingOptions
 from app.visibility.projections import PROJECTIONS
@@ -18,11 +19,13 @@ def box(gpu: Gpu):
     session.release()
 
 
-def opened(session: Session, **atlas: object) -> int:
-    session.atlas = AtlasOptions(**atlas)  # type: ignore[arg-type]
+def opened(session: Session, texels: int, *, adaptive: bool = False) -> int:
+    session.atlas, session.light = AtlasOptions(texels=texels), LightmapOptions(adaptive=adaptive)
     session.open_now("cornell-box")
-    assert session.hemicube_image().size == PROJECTIONS["hemicube"].size(session.solver.resolution)
-    return session.solver.resolution
+    resolution: int = session.solver.resolved["resolution"]
+    (image,) = session.solver.inspect(images=True).images.values()
+    assert image.size == PROJECTIONS["hemicube"].size(resolution)
+    return resolution
 
 
 def test_it_follows_the_texels_between_two_bounds(box: Session) -> None:
@@ -38,7 +41,7 @@ def test_a_tree_is_judged_by_the_texels_that_it_may_grow(box: Session) -> None:
 
 
 def test_what_is_set_holds_and_is_reported(box: Session) -> None:
-    box.shooting = ShootingOptions(resolution=128)
+    box.set_options(ShootingOptions(resolution=128))
     assert opened(box, texels=2_000) == 128
-    box.set_shooting(ShootingOptions())
-    assert box.parameters["shooting"]["resolution"] == 256 == box.stats.resolution
+    box.set_options(ShootingOptions())
+    assert box.parameters["shooting"]["resolution"] == 256 == box.stats.resolved["resolution"]

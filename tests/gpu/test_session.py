@@ -15,15 +15,15 @@ import pytest
 from gl_objects import forgotten, held
 
 from app.atlas.options import AtlasOptions
-from app.commands.headless import picture
 from app.errors import SceneError, UserError
 from app.gpu import Gpu
-from app.lightmap.options import STORAGE
+from app.lightmap.options import STORAGE, LightmapOptions
 from app.render.false_colour import colour_map
-from app.session.picking import read_again
-from app.session.session import Session, Stop
-from app.session.solve import share_done
+from app.session.run import Stop
+from app.session.session import Session
+from app.session.view import View
 from app.solvers import ShootingOptions
+from app.viewer.picture import picture
 
 __all__ = ["forgotten"]
 
@@ -33,11 +33,18 @@ PLENTY = 1e6  # ms
 
 
 @pytest.fixture
-def session(gpu: Gpu) -> Iterator[Session]:
-    session = Session(gpu, shooting=SHOOTING, atlas=ATLAS)
+def view(gpu: Gpu) -> Iterator[View]:
+    session = Session(gpu, options=SHOOTING, atlas=ATLAS)
+    view = View(session)
     session.open_now("furnace")
-    yield session
+    yield view
+    view.release()
     session.release()
+
+
+@pytest.fixture
+def session(view: View) -> Session:
+    return view.session
 
 
 def irradiance(session: Session) -> float:
@@ -56,67 +63,67 @@ def wait_for(session: Session) -> None:
 
 @pytest.mark.parametrize("shots", [1, 5, 20])
 def test_advance_makes_as_many_shots_as_asked_for(session: Session, shots: int) -> None:
-    assert session.advance(budget_ms=PLENTY, shots=shots) == shots
+    assert session.advance(budget_ms=PLENTY, amount=shots) == shots
     assert irradiance(session) > 0
 
 
 def test_advance_stops_at_its_budget(session: Session) -> None:
-    session.advance(budget_ms=PLENTY, shots=1)  # whatever a driver does only once
-    made = session.advance(budget_ms=0.0, shots=1000)
+    session.advance(budget_ms=PLENTY, amount=1)  # whatever a driver does only once
+    made = session.advance(budget_ms=0.0, amount=1000)
     assert 1 <= made <= 8  # one batch: the clock is looked at after it
 
 
 def test_paused_and_converged_sessions_do_not_shoot(session: Session) -> None:
-    session.running = False
-    assert session.advance(budget_ms=PLENTY, shots=5) == 0
+    session.run.running = False
+    assert session.advance(budget_ms=PLENTY, amount=5) == 0
     assert irradiance(session) == 0
-    session.shoot()
+    session.work()
     assert irradiance(session) > 0
-    session.running = True
+    session.run.running = True
     session.solve(Stop())
-    assert session.converged
-    shots = session.solver.shots
-    assert session.advance(budget_ms=PLENTY, shots=5) == 0
-    session.set_shooting(session.shooting.replace(residual=0.01))  # not enough any more
-    assert session.advance(budget_ms=PLENTY, shots=5) == 5
-    assert session.solver.shots > shots
+    assert session.run.converged
+    shots = session.solver.issued
+    assert session.advance(budget_ms=PLENTY, amount=5) == 0
+    session.set_options(session.options.replace(residual=0.01))  # not enough any more
+    assert session.advance(budget_ms=PLENTY, amount=5) == 5
+    assert session.solver.issued > shots
 
 
 def test_solve_stops_after_shots(session: Session) -> None:
     heard: list[int] = []
-    session.solve(Stop(shots=12), progress=lambda stats: heard.append(stats.shots))
-    assert session.solver.shots == 12 and not session.converged
+    session.solve(Stop(work=12), tell=lambda stats: heard.append(stats.done))
+    assert session.solver.issued == 12 and not session.run.converged
     assert heard == sorted(heard)
-    assert session.stats.shots == 12
-    assert share_done(session, Stop(shots=24)) >= 0.5
+    assert session.stats.done == 12
+    assert session.run.share_done(Stop(work=24)) >= 0.5
 
 
 def test_solve_stops_after_seconds(session: Session) -> None:
-    session.set_shooting(session.shooting.replace(residual=1e-9, level=0, coarsen=False))
+    session.set_options(session.options.replace(residual=1e-9, level=0, coarsen=False))
     start = time.perf_counter()
     session.solve(Stop(seconds=0.3))
-    assert not session.converged
-    assert session.solver.shots > 0
-    assert 0.3 <= session.seconds < time.perf_counter() - start + 0.01
+    assert not session.run.converged
+    assert session.solver.issued > 0
+    assert 0.3 <= session.run.seconds < time.perf_counter() - start + 0.01
 
 
 def test_solve_runs_to_convergence_and_knows_it(session: Session) -> None:
     session.solve(Stop())
     stats = session.stats
-    assert stats.converged and stats.residual <= 0.05
+    assert stats.converged and stats.remaining <= 0.05
     assert stats.unshot <= 0.05 * stats.emitted
     assert stats.absorbed + stats.escaped + stats.unshot == pytest.approx(
         stats.emitted, rel=5e-3
     )  # form factors: 0.5 %
-    assert session.history.column("shots")[-1] == stats.shots
-    assert share_done(session, Stop()) == 1
+    assert session.run.history.column("work")[-1] == stats.done
+    assert session.run.share_done(Stop()) == 1
 
 
-def test_a_solve_that_still_shoots_is_not_all_done(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_solve_that_still_shoots_is_not_all_done(session: Session) -> None:
     session.solve(Stop())
-    monkeypatch.setattr(type(session.solver), "settled", property(lambda solver: False))
-    assert 0.9 < share_done(session, Stop()) < 1
-    assert share_done(session, Stop(shots=session.solver.shots)) == 1  # all that was asked for
+    session.run.progress = dataclasses.replace(session.run.progress, converged=False)
+    assert 0.9 < session.run.share_done(Stop()) < 1
+    assert session.run.share_done(Stop(work=session.solver.issued)) == 1  # all that was asked for
 
 
 # -- what begins again -------------------------------------------------------------------------------------------------
@@ -124,10 +131,10 @@ def test_a_solve_that_still_shoots_is_not_all_done(session: Session, monkeypatch
 
 def test_another_material_changes_the_light_that_is_there(session: Session) -> None:
     session.solve(Stop())
-    dim, texels, shots = irradiance(session), session.lightmap.texel_count, session.solver.shots
+    dim, texels, shots = irradiance(session), session.lightmap.texel_count, session.solver.issued
     lightmap = session.lightmap
     session.set_material(0, dataclasses.replace(session.scene.materials[0], albedo=(0.75, 0.75, 0.75)))
-    assert irradiance(session) == dim and session.solver.shots == shots and not session.converged
+    assert irradiance(session) == dim and session.solver.issued == shots and not session.run.converged
     assert session.lightmap is lightmap and session.lightmap.texel_count == texels  # nothing was unfolded again
     session.solve(Stop())
     # B = E / (1 - ρ), H = E / (1 - ρ): twice as much at ρ = 0.75 as at 0.5, but for 5 % of light that is not yet shot
@@ -148,21 +155,24 @@ def test_another_material_changes_the_light_that_is_there(session: Session) -> N
     ids=str,
 )
 def test_only_another_storage_restarts(session: Session, change: dict[str, object], restarts: bool) -> None:
-    session.solve(Stop(shots=8))
+    session.solve(Stop(work=8))
     before = irradiance(session)
-    session.set_shooting(session.shooting.replace(**change))
+    if "storage" in change:
+        session.set_light(session.light.replace(**change))
+    else:
+        session.set_options(session.options.replace(**change))
     assert irradiance(session) == (0 if restarts else before)
-    assert session.solver.shots == (0 if restarts else 8)
-    session.solve(Stop(shots=session.solver.shots + 8))
+    assert session.solver.issued == (0 if restarts else 8)
+    session.solve(Stop(work=session.solver.issued + 8))
     assert irradiance(session) > (0 if restarts else before)  # it shoots with the new options
 
 
 def test_restart_begins_again(session: Session) -> None:
-    session.solve(Stop(shots=8))
+    session.solve(Stop(work=8))
     first = irradiance(session)
     session.restart()
-    assert irradiance(session) == 0 and session.solver.shots == 0 and session.seconds == 0
-    session.solve(Stop(shots=8))
+    assert irradiance(session) == 0 and session.solver.issued == 0 and session.run.seconds == 0
+    session.solve(Stop(work=8))
     assert irradiance(session) == first
 
 
@@ -170,36 +180,36 @@ def test_restart_begins_again(session: Session) -> None:
 
 
 def test_a_scene_opens_in_the_background(session: Session) -> None:
-    session.solve(Stop(shots=8))
+    session.solve(Stop(work=8))
     session.open("cornell-box")
     assert session.name == "Furnace"  # until it is there
     wait_for(session)
     assert session.name == "Cornell box" and session.message is None
-    assert session.solver.shots == 0
-    assert session.advance(budget_ms=PLENTY, shots=3) == 0  # this frame has done enough
+    assert session.solver.issued == 0
+    assert session.advance(budget_ms=PLENTY, amount=3) == 0  # this frame has done enough
     session.poll()
-    assert session.advance(budget_ms=PLENTY, shots=3) == 3
+    assert session.advance(budget_ms=PLENTY, amount=3) == 3
     assert set(session.load_seconds) >= {"read", "unfold", "texels", "upload"}
 
 
 def test_another_density_cuts_the_scene_anew(session: Session) -> None:
     before = session.lightmap.texel_count
-    session.set_atlas(AtlasOptions(texels=4 * before))
+    session.cut_anew(AtlasOptions(texels=4 * before))
     wait_for(session)
     assert session.name == "Furnace"
     assert session.lightmap.texel_count == pytest.approx(4 * before, rel=0.3)  # whole patches only
 
 
-def test_cutting_anew_keeps_edits_exposure_and_camera(session: Session) -> None:
+def test_cutting_anew_keeps_edits_exposure_and_camera(view: View, session: Session) -> None:
     """Nothing is read again: what was edited before and while it is cut stays, and so does what the user has set."""
     session.expose_on_open = True
     before = session.lightmap
     green = dataclasses.replace(session.scene.materials[0], albedo=(0.1, 0.7, 0.2))
     session.set_material(0, green)
-    session.display = session.display.replace(exposure=-3.5)
-    session.view.orbit(0.7, 0.2)
-    eye = session.view.eye.copy()
-    session.set_atlas(AtlasOptions(texels=4000))
+    view.display = view.display.replace(exposure=-3.5)
+    view.camera.orbit(0.7, 0.2)
+    eye = view.camera.eye.copy()
+    session.cut_anew(AtlasOptions(texels=4000))
     dimmed = dataclasses.replace(green, emission=(0.5, 0.25, 0.125))
     session.set_material(0, dimmed)  # while it is under way
     wait_for(session)
@@ -209,21 +219,21 @@ def test_cutting_anew_keeps_edits_exposure_and_camera(session: Session) -> None:
     residual = session.lightmap.residual()[session.lightmap.pool.surfaces.face >= 0]
     np.testing.assert_allclose(residual, np.broadcast_to(np.pi * np.array(dimmed.emission), residual.shape), rtol=1e-6)
     assert session.stats.emitted == pytest.approx(session.stats.unshot, rel=1e-5)  # a sum in single precision
-    assert session.display.exposure == -3.5
-    np.testing.assert_array_equal(session.view.eye, eye)
+    assert view.display.exposure == -3.5
+    np.testing.assert_array_equal(view.camera.eye, eye)
 
 
 def test_a_scene_on_its_way_is_not_lost_to_another_cut(session: Session) -> None:
     session.open("cornell-box")
     with pytest.raises(UserError, match="cornell-box is loading"):
-        session.set_atlas(AtlasOptions(texels=2000))
+        session.cut_anew(AtlasOptions(texels=2000))
     wait_for(session)
     assert session.name == "Cornell box" and session.atlas == ATLAS
 
 
 def test_a_cut_that_is_stopped_changes_nothing(session: Session) -> None:
     before = session.lightmap
-    session.set_atlas(AtlasOptions(texels=4000))
+    session.cut_anew(AtlasOptions(texels=4000))
     assert session.loading is not None
     session.loading.cancel()
     session.poll()
@@ -236,7 +246,7 @@ def test_a_cut_that_is_stopped_changes_nothing(session: Session) -> None:
 def test_what_is_stopped_while_it_is_uploaded_keeps_the_scene(
     session: Session, forgotten: Callable[[], list[object]], parts: int
 ) -> None:
-    session.solve(Stop(shots=8))
+    session.solve(Stop(work=8))
     light = irradiance(session)
     session.open("cornell-box")
     assert session.loading is not None
@@ -252,7 +262,7 @@ def test_what_is_stopped_while_it_is_uploaded_keeps_the_scene(
     assert session.loading is None and session.name == "Furnace" and irradiance(session) == light
     assert session.message == "cornell-box: stopped; Furnace stays as it is"
     assert not forgotten()
-    session.shoot()
+    session.work()
     assert irradiance(session) > light
 
 
@@ -262,14 +272,14 @@ def test_options_changed_while_a_scene_is_uploaded_are_used(session: Session) ->
     while session.loading is not None and not session.loading.ended:
         assert time.monotonic() < until
     session.poll()
-    session.set_shooting(session.shooting.replace(level=4, storage="rgba16f"))
+    session.set_options(session.options.replace(level=4))
     wait_for(session)
     assert session.name == "Cornell box"
-    assert session.solver.options == session.shooting and session.lightmap.storage == "rgba16f"
+    assert session.solver.options == session.options and session.options.level == 4
 
 
 def test_a_bad_file_leaves_the_scene_and_says_why(session: Session, tmp_path: Path) -> None:
-    session.solve(Stop(shots=8))
+    session.solve(Stop(work=8))
     before = irradiance(session)
     bad = tmp_path / "bad.glb"
     bad.write_bytes(b"not a scene")
@@ -300,13 +310,13 @@ def test_a_session_without_a_scene(gpu: Gpu, tmp_path: Path) -> None:
 def test_reloading_leaves_nothing_behind(gpu: Gpu, forgotten: Callable[[], list[object]]) -> None:
     """20 scenes opened, lit and closed again; the first few let caches fill."""
     process = psutil.Process(os.getpid())
-    session = Session(gpu, shooting=SHOOTING, atlas=ATLAS)
+    session = Session(gpu, options=SHOOTING, atlas=ATLAS)
     counts, megabytes = [], []
     for k in range(24):
         session.open_now(("furnace", "cornell-box")[k % 2])
-        session.advance(budget_ms=PLENTY, shots=3)  # leaves a read-back in flight
+        session.advance(budget_ms=PLENTY, amount=3)  # leaves a read-back in flight
         for level in (3, 2):
-            session.set_shooting(session.shooting.replace(level=level))
+            session.set_options(session.options.replace(level=level))
         if k % 2:
             counts.append(held(gpu))
             megabytes.append(process.memory_info().rss / 2**20)
@@ -320,9 +330,9 @@ def test_reloading_leaves_nothing_behind(gpu: Gpu, forgotten: Callable[[], list[
 def test_release_gives_everything_back(gpu: Gpu, forgotten: Callable[[], list[object]]) -> None:
     before = held(gpu)
     programs = len(gpu.shaders._programs)
-    session = Session(gpu, shooting=SHOOTING, atlas=ATLAS)
+    session = Session(gpu, options=SHOOTING, atlas=ATLAS)
     session.open_now("cornell-box")
-    session.solve(Stop(shots=20))
+    session.solve(Stop(work=20))
     assert held(gpu) > before + 10
     session.release()
     kept = len(gpu.shaders._programs) - programs  # the shader library keeps programs and their empty vertex arrays
@@ -331,15 +341,15 @@ def test_release_gives_everything_back(gpu: Gpu, forgotten: Callable[[], list[ob
 
 
 @pytest.mark.parametrize("storage", STORAGE)
-def test_picking_reads_the_light_and_changes_none(session: Session, storage: str) -> None:
+def test_picking_reads_the_light_and_changes_none(view: View, session: Session, storage: str) -> None:
     session.open_now("cornell-box")
-    session.set_shooting(session.shooting.replace(storage=storage))
-    session.solve(Stop(shots=8))
+    session.set_light(session.light.replace(storage=storage))
+    session.solve(Stop(work=8))
     before = session.lightmap.irradiance()
     texture = session.gpu.texture((64, 48), 4, "f1")
     target = session.gpu.target(texture)
-    session.draw(target, (64, 48))
-    picked = session.pick(10, 24)  # the left wall
+    view.draw(target, (64, 48))
+    picked = view.pick(10, 24)  # the left wall
     assert picked is not None and max(picked.H) > 0
     (column, row), columns = picked.texel, session.lightmap.columns
     tile = session.charts.tile
@@ -352,30 +362,32 @@ def test_picking_reads_the_light_and_changes_none(session: Session, storage: str
 
 
 def test_a_picked_point_is_found_again_in_a_tree_that_grew(gpu: Gpu) -> None:
-    session = Session(gpu, atlas=AtlasOptions(texels=1500, adaptive=True))
+    session = Session(gpu, atlas=AtlasOptions(texels=1500), light=LightmapOptions(adaptive=True))
+    view = View(session)
     session.open_now("cornell-box")
     texture = gpu.texture((64, 48), 4, "f1")
     target = gpu.target(texture)
-    session.draw(target, (64, 48))
-    first = {at: session.pick(*at) for at in ((10, 24), (32, 40), (40, 44), (40, 12))}
-    session.solve(Stop(shots=500))
-    again = {at: read_again(session, picked) for at, picked in first.items()}
+    view.draw(target, (64, 48))
+    first = {at: view.pick(*at) for at in ((10, 24), (32, 40), (40, 44), (40, 12))}
+    session.solve(Stop(work=500))
+    again = {at: view.read_again(picked) for at, picked in first.items()}
     assert any(again[at].texel != first[at].texel for at in first), "leaves have split under some of the points"
     for at, picked in again.items():
         assert picked.position == first[at].position and picked.triangle == first[at].triangle
-        assert picked.H == session.pick(*at).H != first[at].H, "as if picked now"
+        assert picked.H == view.pick(*at).H != first[at].H, "as if picked now"
+    view.release()
     session.release()
     gpu.release_all(target, texture)
 
 
-def test_a_false_colour_picture_has_its_legend(session: Session) -> None:
+def test_a_false_colour_picture_has_its_legend(view: View, session: Session) -> None:
     session.open_now("cornell-box")
-    session.solve(Stop(shots=30))
-    session.display = session.display.replace(false_colour="illuminance", layer="albedo")
-    image = picture(session, (640, 360)) / 255
+    session.solve(Stop(work=30))
+    view.display = view.display.replace(false_colour="illuminance", layer="albedo")
+    image = picture(view, (640, 360)) / 255
     corner = image[:300, :140]
     for colour in colour_map(48)[[0, 12, 24, 36, 47]]:
         assert (np.abs(corner - colour).max(-1) < 1.5 / 255).sum() > 30, "every part of the scale is there"
-    session.display = session.display.replace(false_colour="off")
-    plain = picture(session, (640, 360))[:300, :140] / 255
+    view.display = view.display.replace(false_colour="off")
+    plain = picture(view, (640, 360))[:300, :140] / 255
     assert (np.abs(plain - colour_map(48)[24]).max(-1) < 1.5 / 255).sum() == 0

@@ -17,6 +17,7 @@ from app.render.options import DisplayOptions
 from app.session.loading import load
 from app.session.pacing import FAST_FRAME, SLOW_FRAME, Turns
 from app.session.session import Session
+from app.session.view import View
 from app.solvers import ShootingOptions
 from app.ui.app import Ui
 from app.viewer.ui_frame import UiFrame
@@ -26,10 +27,17 @@ PATIENCE = 60.0  # s
 
 
 @pytest.fixture
-def session(gpu: Gpu) -> Iterator[Session]:
+def view(gpu: Gpu) -> Iterator[View]:
     session = Session(gpu, atlas=SMALL, expose_on_open=True)
-    yield session
+    view = View(session)
+    yield view
+    view.release()
     session.release()
+
+
+@pytest.fixture
+def session(view: View) -> Session:
+    return view.session
 
 
 def frames(session: Session, until: Callable[[], bool]) -> int:
@@ -49,18 +57,21 @@ def opened(session: Session, source: str) -> Session:
     return session
 
 
-def test_a_scene_opens_in_parts_and_is_exposed(session: Session) -> None:
+def test_a_scene_opens_in_parts_and_is_exposed(view: View, session: Session) -> None:
     session.open("cornell-box")
     frames(session, lambda: session.loading is not None and session.loading.ended)
     assert frames(session, lambda: session.opened) > 3, "upload and programs are spread over frames"
-    assert session.solver.shots == 0 and session.stats.residual == 1.0, "warming up leaves no light behind"
+    assert session.solver.issued == 0 and session.stats.remaining == 1.0, "warming up leaves no light behind"
     assert session.stats.unshot == pytest.approx(session.stats.emitted)
-    assert session.display.exposure == pytest.approx(first_exposure(session.lightmap.pool))
+    assert view.display.exposure == pytest.approx(first_exposure(session.lightmap.pool))
 
 
 def test_an_exposure_that_was_given_stays(gpu: Gpu) -> None:
-    session = Session(gpu, atlas=SMALL, display=DisplayOptions(exposure=3.0))
-    assert opened(session, "cornell-box").display.exposure == 3.0
+    session = Session(gpu, atlas=SMALL)
+    view = View(session, DisplayOptions(exposure=3.0))
+    opened(session, "cornell-box")
+    assert view.display.exposure == 3.0
+    view.release()
     session.release()
 
 
@@ -79,41 +90,41 @@ def test_another_scene_may_be_asked_for_between_two_parts(session: Session) -> N
     session.poll()  # two parts of several
     assert session.loading is not None
     opened(session, "furnace")
-    assert session.name != "Cornell box" and session.solver.poll(wait=True).residual <= 1.0
+    assert session.name != "Cornell box" and session.solver.poll(wait=True).remaining <= 1.0
 
 
 @pytest.mark.parametrize("stop", ["pause", "converge"])
 def test_numbers_settle_when_shooting_stops(session: Session, stop: str) -> None:
     opened(session, "cornell-box")
-    frames(session, lambda: session.solver.shots >= 5)
+    frames(session, lambda: session.solver.issued >= 5)
     if stop == "pause":
-        session.running = False
+        session.run.running = False
     else:
-        session.set_shooting(session.shooting.replace(residual=0.99))
+        session.set_options(session.options.replace(residual=0.99))
     assert not session.at_rest
     frames(session, lambda: session.at_rest)
-    assert session.solver.report.shots == session.solver.shots, "the reports of the last shots have arrived"
+    assert session.run.progress.done == session.solver.issued, "the reports of the last shots have arrived"
     stats = session.stats
     assert (
-        0.9 * stats.residual < stats.unshot / stats.emitted <= stats.residual * (1 + 1e-6)
+        0.9 * stats.remaining < stats.unshot / stats.emitted <= stats.remaining * (1 + 1e-6)
     )  # a report is from before its last shot
-    last = [session.history.column(name)[-1] for name in ("shots", "residual")]
-    assert last == [stats.shots, pytest.approx(stats.unshot / stats.emitted)]
+    last = [session.run.history.column(name)[-1] for name in ("work", "remaining")]
+    assert last == [stats.done, pytest.approx(stats.unshot / stats.emitted)]
 
 
 def test_one_shot_settles_too(session: Session) -> None:
-    session.running = False
+    session.run.running = False
     opened(session, "cornell-box")
-    session.shoot()
+    session.work()
     frames(session, lambda: session.at_rest)
-    assert session.stats.shots == 1 and session.stats.unshot < session.stats.emitted
+    assert session.stats.done == 1 and session.stats.unshot < session.stats.emitted
 
 
 def test_a_restart_knows_its_book_without_looking(session: Session) -> None:
     opened(session, "cornell-box")
-    frames(session, lambda: session.solver.shots >= 5)
+    frames(session, lambda: session.solver.issued >= 5)
     session.restart()
-    kept, measured = session.books, session.solver.books()
+    kept, measured = session.run.energy, session.solver.energy()
     for field in dataclasses.fields(kept):
         np.testing.assert_allclose(getattr(kept, field.name), getattr(measured, field.name), rtol=1e-6, atol=1e-9)
 
@@ -148,27 +159,27 @@ def dim(session: Session, factor: float) -> None:
 
 def test_an_edit_keeps_the_light(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     opened(session, "cornell-box")
-    frames(session, lambda: session.solver.shots >= 5)
+    frames(session, lambda: session.solver.issued >= 5)
     clears = counted(monkeypatch, session.lightmap, "clear")
-    light, shots = session.lightmap.irradiance(), session.solver.shots
+    light, shots = session.lightmap.irradiance(), session.solver.issued
     dim(session, 0.5)
     assert not clears and (session.lightmap.irradiance() == light).all()
-    assert session.solver.shots >= shots
+    assert session.solver.issued >= shots
 
 
 def test_an_edit_tells_what_it_took(session: Session) -> None:
-    session.set_shooting(ShootingOptions(residual=0.1))
+    session.set_options(ShootingOptions(residual=0.1))
     opened(session, "cornell-box")
-    assert session.stats.edit_shots is None
+    assert session.stats.edit_work is None
     frames(session, lambda: session.at_rest)
-    fresh = session.stats.fresh_shots
-    assert fresh == session.stats.shots > 0
+    fresh = session.stats.fresh_work
+    assert fresh == session.stats.done > 0
     dim(session, 0.5)
     frames(session, lambda: session.at_rest)
-    assert session.stats.edit_shots == session.stats.shots - fresh and session.stats.fresh_shots == fresh
-    assert session.stats.edit_shots < fresh
+    assert session.stats.edit_work == session.stats.done - fresh and session.stats.fresh_work == fresh
+    assert session.stats.edit_work < fresh
     session.restart()
-    assert session.stats.edit_shots is None and session.stats.fresh_shots is None
+    assert session.stats.edit_work is None and session.stats.fresh_work is None
 
 
 @pytest.mark.parametrize("running", [True, False])
@@ -176,8 +187,8 @@ def test_a_slider_that_is_dragged_makes_no_book_until_it_rests(
     session: Session, monkeypatch: pytest.MonkeyPatch, running: bool
 ) -> None:
     opened(session, "cornell-box")
-    session.running = running
-    looks = counted(monkeypatch, session.solver, "books")
+    session.run.running = running
+    looks = counted(monkeypatch, session.solver, "energy")
     for _ in range(10):
         dim(session, 0.95)
         session.poll()
@@ -185,15 +196,15 @@ def test_a_slider_that_is_dragged_makes_no_book_until_it_rests(
         time.sleep(0.02)
     assert not looks
     session.solver.poll(wait=True)
-    assert (session.solver.shots > 0) == running, "the light follows while it is dragged"
+    assert (session.solver.issued > 0) == running, "the light follows while it is dragged"
     frames(session, lambda: bool(looks))
-    assert session.books.reflectance == pytest.approx(session.solver.books().reflectance)
+    assert session.run.energy.reflectance == pytest.approx(session.solver.energy().reflectance)
 
 
 def test_books_that_take_long_are_made_rarely(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
-    session.set_shooting(session.shooting.replace(residual=1e-9))
+    session.set_options(session.options.replace(residual=1e-9))
     opened(session, "cornell-box")
-    looks = counted(monkeypatch, session.solver, "books", seconds=0.04)
+    looks = counted(monkeypatch, session.solver, "energy", seconds=0.04)
     frames(session, lambda: bool(looks))
     until = looks[0] + 2.5
     frames(session, lambda: time.perf_counter() > until)
@@ -208,25 +219,25 @@ def test_exposure_follows_the_lamp(session: Session) -> None:
     assert first_exposure(pool) == pytest.approx(before - 3)  # 2³ times the light
 
 
-def test_a_frame_that_does_not_look_shows_the_view_as_it_was(gpu: Gpu, session: Session) -> None:
+def test_a_frame_that_does_not_look_shows_the_view_as_it_was(view: View, gpu: Gpu, session: Session) -> None:
     session.open_now("cornell-box")
     size = (640, 360)
     texture = gpu.texture(size, 4, "f1")
     target, ui = gpu.target(texture), Ui()
     frame = UiFrame(gpu, ui)
 
-    def view(look: bool) -> np.ndarray:
-        frame.draw(session, target, size=size, look=look)
+    def seen(look: bool) -> np.ndarray:
+        frame.draw(view, target, size=size, look=look)
         left, bottom, width, height = ui.view_rect
         image = np.frombuffer(texture.read(), np.uint8).reshape(size[1], size[0], 4)
         return image[bottom : bottom + height, left : left + width].copy()
 
     for _ in range(4):
-        view(True)  # the panels find their places
-    before = view(True)
-    session.display = session.display.replace(exposure=session.display.exposure - 6)  # only the lamp is lit
-    assert np.array_equal(view(False), before)
-    assert not np.array_equal(view(True), before)
+        seen(True)  # the panels find their places
+    before = seen(True)
+    view.display = view.display.replace(exposure=view.display.exposure - 6)  # only the lamp is lit
+    assert np.array_equal(seen(False), before)
+    assert not np.array_equal(seen(True), before)
     frame.release()
     ui.release()
     gpu.release_all(target, texture)

@@ -16,11 +16,14 @@ from app.atlas.parametrize import parametrize
 from app.gpu import Gpu, ShaderLibrary
 from app.gpu.shader import SHADERS, Source
 from app.lightmap.lightmap import Lightmap
+from app.lightmap.options import LightmapOptions
 from app.render.camera import CameraView
 from app.render.options import LAYERS, DisplayOptions
 from app.render.resolve import PLACES_WIDTH
 from app.scene.load import load_scene
-from app.session.session import Session, Stop
+from app.session.run import Stop
+from app.session.session import Session
+from app.session.view import View
 from app.solvers import ShootingOptions
 from app.solvers.shooting.options import MAX_LEVEL, highest_level
 
@@ -31,15 +34,18 @@ def test_every_program_that_asks_for_the_tile_is_told(gpu: Gpu, monkeypatch: pyt
     """Whoever forgets it gets the default, and no error."""
     library = ShaderLibrary(gpu.ctx)
     monkeypatch.setattr(gpu, "shaders", library)
-    atlas = AtlasOptions(texels=500, tile=8, adaptive=True)
-    session = Session(gpu, shooting=ShootingOptions(resolution=64, residual=0.5, gradient=0.1), atlas=atlas)
+    light = LightmapOptions(adaptive=True, gradient=0.1)
+    options = ShootingOptions(resolution=64, residual=0.5)
+    session = Session(gpu, options=options, atlas=AtlasOptions(texels=500, tile=8), light=light)
+    view = View(session)
+    view = View(session)
     session.open_now("cornell-box")
-    session.solve(Stop(shots=40))
+    session.solve(Stop(work=40))
     texture = gpu.texture(SIZE, 4, "f1")
     target = gpu.target(texture)
     for layer in LAYERS:
-        session.display = session.display.replace(layer=layer)
-        session.draw(target, SIZE)
+        view.display = view.display.replace(layer=layer)
+        view.draw(target, SIZE)
     asked = []
     for key in library._programs:
         name, defines, slots, vertex = str(key[0]), dict(key[1]), dict(key[2]), str(key[3])  # type: ignore[call-overload]
@@ -56,6 +62,7 @@ def test_every_program_that_asks_for_the_tile_is_told(gpu: Gpu, monkeypatch: pyt
         "solvers/shooting/books",
         "solvers/shooting/judge",
     } <= set(asked)
+    view.release()
     session.release()
     gpu.release_all(target, texture)
     library.release()
@@ -129,7 +136,7 @@ def test_another_tile_cuts_the_open_scene_anew(gpu: Gpu) -> None:
     session = Session(gpu, atlas=AtlasOptions(texels=900))
     session.open_now("cornell-box")
     before = session.stats
-    session.set_atlas(session.atlas.replace(tile=8))
+    session.cut_anew(session.atlas.replace(tile=8))
     while session.loading is not None:
         session.poll()
     after = session.stats

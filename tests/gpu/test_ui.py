@@ -37,7 +37,7 @@ EFFECTS: dict[str, Callable[[Desk], bool]] = {
     "F5": lambda d: any("reloaded" in t.text for t in d.ui.state.toasts),
     "F12": lambda d: Request.SCREENSHOT in d.requests,
     "Space": lambda d: not d.session.running,
-    ".": lambda d: ("shoot",) in d.session.calls and not d.session.running,
+    ".": lambda d: ("work",) in d.session.calls and not d.session.running,
     "R": lambda d: ("restart",) in d.session.calls,
     "F": lambda d: d.ui.state.flight is not None,
     "C": lambda d: d.session.display.show == "reference",
@@ -88,7 +88,7 @@ def test_escape_closes_before_it_quits(desk: Desk) -> None:
 def test_keys_typed_into_a_field_are_text(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
     desk.frames()
     desk.ui.io.add_key_event(imgui.Key.mod_ctrl, True)
-    desk.click(*where["shots_per_frame"])
+    desk.click(*where["work_per_frame"])
     desk.ui.io.add_key_event(imgui.Key.mod_ctrl, False)
     desk.frames(2)
     assert desk.ui.io.want_text_input
@@ -96,7 +96,7 @@ def test_keys_typed_into_a_field_are_text(desk: Desk, where: dict[str, tuple[flo
     desk.ui.io.add_input_characters_utf8("17")
     desk.key(imgui.Key.enter)
     assert desk.session.running
-    assert desk.ui.state.pace.shots_per_frame == 17
+    assert desk.ui.state.pace.work_per_frame == 17
 
 
 # -- widgets -----------------------------------------------------------------------------------------------------------
@@ -159,7 +159,7 @@ def test_an_error_becomes_a_toast(gpu: Gpu, where: dict[str, tuple[float, float]
     def refuse(options: ShootingOptions) -> None:
         raise UserError("--discs 4: no such discs here")
 
-    desk.session.set_shooting = refuse  # type: ignore[method-assign]
+    desk.session.set_options = refuse  # type: ignore[method-assign]
     desk.frames()
     x, y = where["discs"]
     desk.drag((x, y), (x + 40, y))

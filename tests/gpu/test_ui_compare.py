@@ -80,7 +80,7 @@ def test_references_are_asked_for(panel: Desk, where: dict[str, tuple[float, flo
     panel.frames()
     panel.click(*where["background"])
     assert panel.session.calls == [("solve_reference", ReferenceOptions())]
-    panel.session.fetching = SimpleNamespace(stage="12 shots", fraction=0.3)
+    panel.session.compared.fetching = SimpleNamespace(stage="12 shots", fraction=0.3)
     panel.frames()
     panel.click(*where["Stop"])
     assert panel.session.calls[-1] == ("stop_fetching",)
@@ -107,14 +107,14 @@ def test_the_line_is_dragged_and_nothing_else(compared: Desk) -> None:
     session.display = session.display.replace(show="split", split=0.5)
     compared.frames()
     left, top, width, height = compared.ui.state.view_px
-    eye = session.view.eye.copy()
+    eye = session.camera.eye.copy()
     compared.drag((left + width / 2, top + height / 3), (left + 0.8 * width, top + height / 3))
     assert session.display.split == pytest.approx(0.8, abs=1 / width)
-    assert (session.view.eye == eye).all() and ("pick",) not in [call[:1] for call in session.calls]
+    assert (session.camera.eye == eye).all() and ("pick",) not in [call[:1] for call in session.calls]
     compared.drag((left + 0.8 * width, top + height / 3), (left + 2 * width, top + height / 3))
     assert session.display.split == 1.0
     compared.drag(VIEW, (VIEW[0] + 60, VIEW[1]))  # away from the line
-    assert session.display.split == 1.0 and (session.view.eye != eye).any()
+    assert session.display.split == 1.0 and (session.camera.eye != eye).any()
 
 
 def test_a_hand_holds_the_line(compared: Desk) -> None:

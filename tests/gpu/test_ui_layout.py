@@ -85,7 +85,7 @@ def test_the_view_is_drawn_in_its_place(desk: Desk) -> None:
 
 
 def test_pictures_of_the_same_state_are_the_same(gpu: Gpu) -> None:
-    first, second = (ui_image(gpu, FakeSession(), (640, 400), measured=False) for _ in range(2))
+    first, second = (ui_image(FakeSession(gpu=gpu), (640, 400), measured=False) for _ in range(2))
     assert first.shape == (400, 640, 3)
     assert (first == second).all()
     assert first.std() > 10
@@ -94,4 +94,4 @@ def test_pictures_of_the_same_state_are_the_same(gpu: Gpu) -> None:
 @pytest.mark.parametrize("size", [(0, 100), (100, 10**6)], ids=str)
 def test_a_picture_of_a_size_that_cannot_be(gpu: Gpu, size: tuple[int, int]) -> None:
     with pytest.raises(UserError, match=f"{size[0]}×{size[1]}"):
-        ui_image(gpu, FakeSession(), size)
+        ui_image(FakeSession(gpu=gpu), size)

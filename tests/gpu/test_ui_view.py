@@ -13,7 +13,6 @@ from imgui_bundle import imgui
 
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
-from app.ui import navigation
 from app.ui.panels import atlas
 
 __all__ = ["desk", "session", "where"]
@@ -46,11 +45,11 @@ def test_the_draft_of_a_cut_stays_until_it_is_done(gpu: Gpu, where: dict[str, tu
     desk.session.loading = SimpleNamespace(stage="unfolding", fraction=0.4, cancel=lambda: None)
     desk.frames()
     desk.click(*where["anew"])
-    assert ("set_atlas",) not in desk.session.calls, "a scene is on its way"
+    assert ("cut_anew",) not in desk.session.calls, "a scene is on its way"
     desk.session.loading = None
     desk.frames()
     desk.click(*where["anew"])
-    assert ("set_atlas",) in desk.session.calls and desk.ui.state.atlas == draft
+    assert ("cut_anew",) in desk.session.calls and desk.ui.state.atlas == draft
     desk.release()
 
 
@@ -76,9 +75,9 @@ MOVES = {
 
 @pytest.mark.parametrize("move", MOVES)
 def test_mouse_and_keys_move_the_eye(desk: Desk, move: str) -> None:
-    before = desk.session.view.copy()
+    before = desk.session.camera.copy()
     MOVES[move](desk)
-    after = desk.session.view
+    after = desk.session.camera
     assert not np.allclose(after.eye, before.eye)
     if move == "orbit":
         np.testing.assert_allclose(after.target, before.target, atol=1e-12)
@@ -91,11 +90,11 @@ def test_mouse_and_keys_move_the_eye(desk: Desk, move: str) -> None:
 
 
 def test_the_mouse_over_a_panel_moves_nothing(desk: Desk) -> None:
-    before = desk.session.view.copy()
+    before = desk.session.camera.copy()
     desk.drag((150, 200), (250, 260), button=2)
     desk.ui.io.add_mouse_wheel_event(0, 1)
     desk.frames(2)
-    np.testing.assert_array_equal(desk.session.view.world_from_camera, before.world_from_camera)
+    np.testing.assert_array_equal(desk.session.camera.world_from_camera, before.world_from_camera)
 
 
 @pytest.mark.parametrize("seconds", [1 / 240, 1 / 60, 1 / 7])
@@ -103,28 +102,27 @@ def test_movement_depends_on_time_not_on_frames(gpu: Gpu, seconds: float) -> Non
     desk = Desk(gpu, FakeSession(), (320, 240))
     desk.key(imgui.Key.f)
     desk.frames(math.ceil(0.4 / seconds), seconds)
-    goal = desk.session.view.copy()
+    goal = desk.session.camera.copy()
     goal.focus(np.zeros(3), 1.0)
-    np.testing.assert_allclose(desk.session.view.eye, goal.eye, atol=1e-12)
-    start = desk.session.view.eye.copy()
+    np.testing.assert_allclose(desk.session.camera.eye, goal.eye, atol=1e-12)
+    start = desk.session.camera.eye.copy()
     desk.ui.io.add_key_event(imgui.Key.d, True)
     desk.frames(round(1 / seconds), seconds)
-    moved = np.linalg.norm(desk.session.view.eye - start)
+    moved = np.linalg.norm(desk.session.camera.eye - start)
     desk.release()
     assert moved == pytest.approx(0.4, rel=0.01)  # radii per second; a frame more or less at 7 per second is not lost
 
 
-def test_what_is_picked_is_read_again_while_shooting(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_picked_is_read_again_while_shooting(desk: Desk) -> None:
     """The point, whatever its pixel shows after the eye has moved or the panels are hidden."""
     desk.session.picked = PICKED
     desk.click(*VIEW)
     desk.session.picked = None
-    monkeypatch.setattr(navigation, "read_again", lambda session, picked: session.calls.append("read") or picked)
-    for move in (lambda: None, lambda: desk.session.view.orbit(0.1, 0.0), lambda: desk.key(imgui.Key.f2)):
+    for move in (lambda: None, lambda: desk.session.camera.orbit(0.1, 0.0), lambda: desk.key(imgui.Key.f2)):
         move()
-        before = desk.session.calls.count("read")
+        before = desk.session.calls.count(("read_again",))
         desk.frames(20, seconds=0.05)
-        assert 2 <= desk.session.calls.count("read") - before <= 4  # four times a second
+        assert 2 <= desk.session.calls.count(("read_again",)) - before <= 4  # four times a second
         assert desk.ui.state.picked is PICKED
     desk.session.running = False
     before = len(desk.session.calls)

@@ -16,11 +16,14 @@ import pytest
 from PIL import Image
 
 from app.atlas.options import AtlasOptions
-from app.commands.headless import picture
 from app.gpu import Gpu
+from app.lightmap.options import LightmapOptions
 from app.render.options import DisplayOptions
-from app.session.session import Session, Stop
+from app.session.run import Stop
+from app.session.session import Session
+from app.session.view import View
 from app.solvers import ShootingOptions
+from app.viewer.picture import picture
 
 ROOT = Path(__file__).parent.parent.parent
 GOLDENS = ROOT / "screenshots"
@@ -107,11 +110,14 @@ REELS = (
 @pytest.mark.parametrize("reel", REELS, ids=lambda reel: f"{reel.scene}-{reel.texels}" + "-quadtree" * reel.adaptive)
 def test_the_gallery_looks_as_it_did(gpu: Gpu, reel: Reel, request: pytest.FixtureRequest) -> None:
     regenerate = request.config.getoption("--regenerate-screenshots")
-    session = Session(gpu, shooting=reel.shooting, atlas=AtlasOptions(texels=reel.texels, adaptive=reel.adaptive))
+    light = LightmapOptions(adaptive=reel.adaptive)
+    session = Session(gpu, options=reel.shooting, atlas=AtlasOptions(texels=reel.texels), light=light)
+    view = View(session)
     try:
         session.open_now(reel.scene)
-        images = {taken.name: _taken(session, taken, reel.size) for taken in reel.pictures}
+        images = {taken.name: _taken(view, taken, reel.size) for taken in reel.pictures}
     finally:
+        view.release()
         session.release()
     for name, image in images.items():
         assert image.shape == (reel.size[1], reel.size[0], 3)
@@ -128,15 +134,15 @@ def test_the_gallery_looks_as_it_did(gpu: Gpu, reel: Reel, request: pytest.Fixtu
     assert not wrong, f"so many pixels differ: {wrong}; see {FAILED}"
 
 
-def _taken(session: Session, taken: Picture, size: tuple[int, int]) -> np.ndarray[Any, Any]:
-    session.solve(Stop(shots=taken.shots))
-    session.look_through(session.scene.cameras[taken.camera])
-    session.display = DisplayOptions(**taken.display)
+def _taken(view: View, taken: Picture, size: tuple[int, int]) -> np.ndarray[Any, Any]:
+    view.session.solve(Stop(work=taken.shots))
+    view.look_through(view.session.scene.cameras[taken.camera])
+    view.display = DisplayOptions(**taken.display)
     if taken.exposure is None:
-        session.expose()
+        view.expose()
     else:
-        session.display = session.display.replace(exposure=taken.exposure)
-    return picture(session, size)
+        view.display = view.display.replace(exposure=taken.exposure)
+    return picture(view, size)
 
 
 def _differing(name: str, image: np.ndarray[Any, Any]) -> float:

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.atlas.options import AtlasOptions
 from app.gpu import gpu_context
+from app.lightmap.options import LightmapOptions
 from app.render.options import DisplayOptions
-from app.session.session import Session, Stop
+from app.session.run import Stop
+from app.session.session import Session
+from app.session.view import View
 from app.viewer.ui_frame import ui_image
 
 ROOT = Path(__file__).parent.parent.parent
@@ -30,25 +32,27 @@ MAGNIFIED = 8
 
 
 GOLDENS = {
-    "viewer": (AtlasOptions(), DisplayOptions()),
-    "viewer-quadtree": (AtlasOptions(adaptive=True), DisplayOptions(grid=True)),
+    "viewer": (LightmapOptions(), DisplayOptions()),
+    "viewer-quadtree": (LightmapOptions(adaptive=True), DisplayOptions(grid=True)),
 }
 
 
 @pytest.mark.parametrize("name", GOLDENS)
 def test_the_viewer_looks_as_it_did(request: pytest.FixtureRequest, name: str) -> None:
     golden = ROOT / "screenshots" / f"{name}.png"
-    atlas, display = GOLDENS[name]
+    light, display = GOLDENS[name]
     with gpu_context() as gpu:
-        session = Session(gpu, atlas=atlas, display=display, expose_on_open=True)
+        session = Session(gpu, light=light, expose_on_open=True)
+        view = View(session, display)
         session.open_now("cornell-box")
-        session.solve(Stop(shots=SHOTS))
-        image = ui_image(gpu, session, SIZE, measured=False)
+        session.solve(Stop(work=SHOTS))
+        image = ui_image(view, SIZE, measured=False)
+        view.release()
         session.release()
         software = gpu.software
     assert image.shape == (SIZE[1], SIZE[0], 3)
-    view = image[100:450, 400:880]
-    assert view.std() > 10 and view.max() > 150  # a lit box, not a blank
+    middle = image[100:450, 400:880]
+    assert middle.std() > 10 and middle.max() > 150  # a lit box, not a blank
     if not software:
         pytest.skip("goldens are compared on the software rasteriser only")
     if request.config.getoption("--regenerate-screenshots"):

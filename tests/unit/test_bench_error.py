@@ -10,7 +10,7 @@ import subprocess
 import sys
 import textwrap
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -24,16 +24,18 @@ from app.atlas.points import random_points
 from app.bench.accuracy import curve, error
 from app.bench.accuracy.error import TITLE
 from app.bench.accuracy.methods import DEFAULT_METHODS, METHODS, method_names
-from app.bench.papers.measure import opened, warm_up
+from app.bench.papers.measure import warm_up
 from app.bench.peers.peers import PEERS
 from app.cli import ERROR_SCENES, build_parser, run
 from app.gpu import Gpu
+from app.lightmap.options import LightmapOptions
 from app.options import specs
 from app.reference import truth
 from app.reference.truth import Truth
 from app.scene.load import load_scene
 from app.scene.model import Scene
-from app.solvers import ShootingOptions
+from app.session.batch import opened
+from app.solvers import Progress, ShootingOptions
 from app.util.console import Console
 from app.util.tables import FLIP, missing
 
@@ -82,24 +84,24 @@ class OneSecondSteps:
     """A solver whose every step takes a second, and halves the residual."""
 
     options = ShootingOptions(residual=2.0**-20)
-    settled = True
 
     def __init__(self, clock: FakeClock) -> None:
-        self._clock, self.report, self.residual = clock, self, 1.0
+        self._clock, self.residual = clock, 1.0
 
-    def warm_up(self, shots: int) -> Iterator[None]:
+    def warm_up(self) -> Iterator[None]:
         return iter(())
 
     def reset(self) -> None:
         self.residual = 1.0
 
-    def step(self, shots: int) -> int:
+    def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
         self._clock.now += 1.0
         self.residual /= 2
-        return shots
+        yield
+        return amount
 
-    def poll(self, *, wait: bool = False) -> OneSecondSteps:
-        return self
+    def poll(self, *, wait: bool = False) -> Progress:
+        return Progress(0, self.residual, np.zeros(3), self.residual <= self.options.residual)
 
 
 @pytest.mark.parametrize(("limit", "last"), [(100.0, 20.0), (7.5, 8.0)])
@@ -124,7 +126,10 @@ def test_looking_stops_the_clock(gpu: Gpu, limit: float, last: float) -> None:
 def test_nothing_changes_by_looking(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same solve, looked at once and after every step: as much light after as many shots."""
     known = truth.truth_of(furnace(), "closed-form", 1, silent)
-    with opened(gpu, furnace(), AtlasOptions(texels=600), ShootingOptions(residual=0.2)) as (lightmap, solver):
+    with opened(gpu, furnace(), AtlasOptions(texels=600), LightmapOptions(), ShootingOptions(residual=0.2)) as (
+        lightmap,
+        solver,
+    ):
         looks = []
         for growth in (1e9, 1.0):
             monkeypatch.setattr(curve, "GROWTH", growth)
@@ -139,14 +144,15 @@ def test_nothing_changes_by_looking(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -
 
 @pytest.mark.parametrize("adaptive", [False, True])
 def test_warming_up_leaves_no_trace(gpu: Gpu, adaptive: bool) -> None:
-    with opened(gpu, "cornell-box", AtlasOptions(texels=2_000, adaptive=adaptive), ShootingOptions()) as (
+    light = LightmapOptions(adaptive=adaptive)
+    with opened(gpu, "cornell-box", AtlasOptions(texels=2_000), light, ShootingOptions()) as (
         lightmap,
         solver,
     ):
         tiles = set(lightmap.pool.leaves.only(lightmap.pool.used).keys.tolist())
         warm_up(gpu, solver)
         assert set(lightmap.pool.leaves.only(lightmap.pool.used).keys.tolist()) == tiles
-        assert solver.poll(wait=True).shots == 0 and solver.unshot_share() == pytest.approx(1.0, rel=1e-5)
+        assert solver.poll(wait=True).done == 0 and solver.settle().remaining == pytest.approx(1.0, rel=1e-5)
         assert not lightmap.irradiance().any()
 
 
@@ -176,21 +182,25 @@ def test_errors_are_those_at_lit_points() -> None:
 
 
 def test_each_method_differs_in_its_axis_alone() -> None:
-    base = ShootingOptions()
-    every = {name: method.options(16_000, base) for name, method in METHODS.items()}
-    assert every["uniform"] == (AtlasOptions(texels=16_000), base)
-    assert every["adaptive"] == (AtlasOptions(texels=1_000, adaptive=True), base)
+    base, light = ShootingOptions(), LightmapOptions()
+    every = {name: method.options(16_000, light, base) for name, method in METHODS.items()}
+    assert every["uniform"] == (AtlasOptions(texels=16_000), light, base)
+    assert every["adaptive"] == (AtlasOptions(texels=1_000), light.replace(adaptive=True), base)
     assert len({repr(options) for options in every.values()}) == len(METHODS), "two methods are the same"
     for name, method in METHODS.items():
-        changed = [s.name for s in specs(ShootingOptions) if getattr(every[name][1], s.name) != getattr(base, s.name)]
+        pairs = zip(every[name][1:], (light, base), strict=True)
+        changed = [
+            k for own, usual in pairs for k, v in own.as_dict().items() if v != usual.as_dict()[k] and k != "adaptive"
+        ]
         assert len(changed) == (method.axis != "solver"), name
     assert set(DEFAULT_METHODS) <= set(METHODS)
 
 
 def test_every_choice_of_a_solver_is_a_method() -> None:
     for name in ("form_factor", "visibility", "projection", "storage"):
-        spec = next(s for s in specs(ShootingOptions) if s.name == name)
-        tried = {method.options(None, ShootingOptions())[1].as_dict()[name] for method in METHODS.values()}
+        spec = next(s for s in (*specs(ShootingOptions), *specs(LightmapOptions)) if s.name == name)
+        chosen = [method.options(None, LightmapOptions(), ShootingOptions()) for method in METHODS.values()]
+        tried = {(light.as_dict() | shooting.as_dict())[name] for _, light, shooting in chosen}
         assert tried == set(spec.choices)
 
 

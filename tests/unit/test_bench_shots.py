@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 
 from app.atlas.options import AtlasOptions
-from app.bench.papers.measure import opened
 from app.bench.speed.copy import Copy
 from app.bench.speed.shots import bounds, passes_ms
 from app.bench.speed.stream import Stream, texel_bytes
 from app.gpu import Gpu
-from app.solvers import ShootingOptions, UniformShooting
+from app.lightmap.options import LightmapOptions
+from app.session.batch import opened
+from app.solvers import ShootingOptions
+from app.solvers.shooting.solver import Shooting
 from app.solvers.shooting.stages import BATCH
+from app.util.parts import run_to_end
 
 GB = 1e9
 
@@ -39,7 +42,9 @@ def test_what_bounds_the_receiver_pass(receive_ms: float, stream_ms: float, copy
 
 @pytest.mark.parametrize(("storage", "light"), [("rgba32f", 2 * 2 * 16), ("rgba16f", 2 * 2 * 8), ("fixed8", 2 * 2 * 4)])
 def test_bytes_of_a_texel_follow_from_its_formats(gpu: Gpu, storage: str, light: int) -> None:
-    with opened(gpu, "textured-room", AtlasOptions(texels=600), ShootingOptions(storage=storage)) as (lightmap, _):
+    with opened(
+        gpu, "textured-room", AtlasOptions(texels=600), LightmapOptions(storage=storage), ShootingOptions()
+    ) as (lightmap, _):
         albedo = 4 * np.dtype(lightmap.pool.arrays["t_albedo"].dtype).itemsize
         assert texel_bytes(lightmap, flat=True) == light + albedo
         assert texel_bytes(lightmap, flat=False) == light + albedo + 16 + 8
@@ -48,10 +53,10 @@ def test_bytes_of_a_texel_follow_from_its_formats(gpu: Gpu, storage: str, light:
 @pytest.mark.parametrize("visibility", ["item-id", "combined"])
 def test_the_stream_draws_the_texels_of_the_receiver_pass_and_changes_no_light(gpu: Gpu, visibility: str) -> None:
     options = ShootingOptions(visibility=visibility)
-    with opened(gpu, "cornell-box", AtlasOptions(texels=8_000), options) as (lightmap, solver):
-        assert isinstance(solver, UniformShooting) and set(lightmap.receivers) == {True, False}
+    with opened(gpu, "cornell-box", AtlasOptions(texels=8_000), LightmapOptions(), options) as (lightmap, solver):
+        assert isinstance(solver, Shooting) and set(lightmap.receivers) == {True, False}
         solver.reset()
-        solver.step(BATCH)
+        run_to_end(solver.work(BATCH))
         stream, steps = Stream(gpu, solver), solver.passes(BATCH)
         steps["choose"]()
         before = lightmap.irradiance(), lightmap.residual()
@@ -70,7 +75,7 @@ def test_the_stream_draws_the_texels_of_the_receiver_pass_and_changes_no_light(g
 
 
 def test_all_of_it_is_timed_in_turns(gpu: Gpu) -> None:
-    with opened(gpu, "furnace", AtlasOptions(texels=600), ShootingOptions()) as (lightmap, solver):
+    with opened(gpu, "furnace", AtlasOptions(texels=600), LightmapOptions(), ShootingOptions()) as (lightmap, solver):
         copy, runs = Copy(gpu, lightmap.size), list[Any]()
 
         def run() -> None:

@@ -19,8 +19,11 @@ from app.cli import run
 from app.errors import UserError
 from app.gpu import Gpu
 from app.lightmap.at_points import irradiance_of
+from app.lightmap.options import LightmapOptions
+from app.session.batch import opened
 from app.solvers import ShootingOptions
 from app.solvers.shooting.stages import BATCH
+from app.util.parts import run_to_end
 from app.util.tables import Column, csv_text, markdown_table
 
 COLUMNS = (Column("scene", "scene"), Column("n", "texels", ","), Column("ms", "ms", ".2f"))
@@ -198,14 +201,14 @@ def test_flip_sees_what_has_changed(rng: np.random.Generator) -> None:
 def test_curve_is_of_the_state_after_its_shots(gpu: Gpu) -> None:
     """The first point again with exactly so many shots: an off-by-one batch is 10 % and more at the start."""
     options = ShootingOptions(residual=0.5)
-    with measure.opened(gpu, room_of(37), AtlasOptions(texels=1_500), options) as (_, solver):
+    with opened(gpu, room_of(37), AtlasOptions(texels=1_500), LightmapOptions(), options) as (_, solver):
         run = measure.shoot(gpu, solver, 60.0)
         shots, residual = run.curve[1]
         solver.reset()
-        while solver.poll(wait=True).shots < shots:
-            solver.step(BATCH)
-        assert solver.report.shots == shots
-        assert solver.unshot_share() == pytest.approx(residual, rel=1e-4)  # sums of 32-bit floats
+        while solver.poll(wait=True).done < shots:
+            run_to_end(solver.work(BATCH))
+        assert solver.poll().done == shots
+        assert solver.settle().remaining == pytest.approx(residual, rel=1e-4)  # sums of 32-bit floats
         assert [s for s, _ in run.curve] == sorted({s for s, _ in run.curve}) and run.settled
         assert run.curve[-1] == (run.shots, run.residual)
 
@@ -242,7 +245,8 @@ def test_equal_error_is_read_between_uniform_rows() -> None:
 def test_a_lightmap_is_read_where_its_points_are(gpu: Gpu, adaptive: bool) -> None:
     """E = a position's height above the floor, exact where bilinear: inside of faces; texels at their edges hold the mean of
     what they cover, half a texel in."""
-    with measure.opened(gpu, "furnace", AtlasOptions(texels=4_000, adaptive=adaptive), ShootingOptions()) as (
+    light = LightmapOptions(adaptive=adaptive)
+    with opened(gpu, "furnace", AtlasOptions(texels=4_000), light, ShootingOptions()) as (
         lightmap,
         _,
     ):

@@ -113,7 +113,7 @@ BAD = [
     (SHOT + "--resolution 100", "100: must be 64 to 2048 in steps of 64"),
     (SHOT + "--visibility bogus", "bogus: must be one of item-id"),
     (SHOT + "--storage bogus", "bogus: must be one of rgba32f"),
-    ("info cornell-box --storage bogus", "invalid choice: 'bogus'"),
+    ("info cornell-box --storage bogus", "bogus: must be one of rgba32f"),
     # texels
     (SHOT + "--texels 0", "0: must be 1 to"),
     (SHOT + "--texels 10000001.5", "must be 1 to"),

@@ -17,7 +17,7 @@ from PIL import Image
 
 import app.viewer.window
 from app.cli import run
-from app.session.session import Session
+from app.session.run import Run
 
 ROOT = Path(__file__).parent.parent.parent
 NOWHERE = os.devnull + "/home"  # cannot be made, even by root
@@ -66,19 +66,20 @@ def test_charts_are_found_without_a_folder_to_keep_them(tmp_path: Path) -> None:
 
 def poison(monkeypatch: pytest.MonkeyPatch, texture: str, call: int) -> None:
     """The ``call``-th batch of shots writes NaN to one texel that covers a surface."""
-    shoot, calls = Session.shoot, []
+    work, calls = Run.work, []
 
-    def poisoned(session: Session, shots: int) -> int:
-        made = shoot(session, shots)
+    def poisoned(run: Run, amount: int) -> int:
+        made = work(run, amount)
         calls.append(made)
         if len(calls) == call:
-            pool = session.lightmap.pool
+            lightmap = run.solver.lightmap  # type: ignore[attr-defined]
+            pool = lightmap.pool
             tile, y, x = np.argwhere(pool.surfaces.face >= 0)[100]
             at = tile % pool.columns * pool.tile + x, tile // pool.columns * pool.tile + y
-            session.lightmap.texture(texture).write(np.full(4, np.nan, "f4").tobytes(), viewport=(*map(int, at), 1, 1))
+            lightmap.texture(texture).write(np.full(4, np.nan, "f4").tobytes(), viewport=(*map(int, at), 1, 1))
         return made
 
-    monkeypatch.setattr(Session, "shoot", poisoned)
+    monkeypatch.setattr(Run, "work", poisoned)
 
 
 @pytest.mark.parametrize(

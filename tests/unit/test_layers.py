@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -61,22 +61,28 @@ def outside_of_its_family(path: Path, name: str) -> bool:
 
 
 def imported(path: Path) -> set[str]:
+    """All that a file imports, also what only a type checker sees: a circle of types is a circle."""
     names: set[str] = set()
-    for node in _statements(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            names |= {f"{node.module}.{alias.name}" for alias in node.names} if node.module == "app" else {node.module}
+            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
     return names
 
 
-def _statements(node: ast.AST) -> Iterator[ast.AST]:
-    """Every node except those that only a type checker sees."""
-    if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-        return
-    yield node
-    for child in ast.iter_child_nodes(node):
-        yield from _statements(child)
+def module_of(path: Path) -> str:
+    return ".".join(("app", *path.relative_to(APP).with_suffix("").parts)).removesuffix(".__init__")
+
+
+def test_no_circle_of_imports() -> None:
+    """Modules that import each other, however far around."""
+    modules = {module_of(path): path for path in FILES}
+    graph = {name: {other for other in imported(path) if other in modules} - {name} for name, path in modules.items()}
+    for name in graph:  # a package's own __init__ gathers what is inside it
+        graph[name] = {o for o in graph[name] if not name.startswith(o + ".") and not o == "app"}
+    order = TopologicalSorter(graph)
+    order.prepare()  # raises CycleError, which names the circle
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(APP)))
@@ -116,11 +122,17 @@ def test_the_protocol_names_all_that_is_asked_of_a_solver(path: Path) -> None:
     assert uses_of_a_solver(path) <= named
 
 
+def test_files_at_the_root_are_the_four() -> None:
+    assert {path.stem for path in APP.glob("*.py")} == {"__init__", "__main__", "cli", "errors", "options"}
+
+
 def test_every_solver_has_what_the_protocol_names() -> None:
+    from app.options import specs
     from app.solvers import DEFAULT_SOLVER, SOLVERS, Solver
 
     assert DEFAULT_SOLVER in SOLVERS
     methods = {name for name, value in vars(Solver).items() if callable(value) and not name.startswith("_")}
-    assert methods >= {"reset", "set_options", "step", "poll", "books", "passes", "inspect", "release"}
-    for make in SOLVERS.values():
-        assert methods <= set(dir(make))
+    assert methods >= {"reset", "set_options", "work", "poll", "settle", "energy", "passes", "inspect", "release"}
+    for family in SOLVERS.values():
+        assert methods <= set(dir(family.make))
+        assert family.threshold in {spec.name for spec in specs(family.options)}

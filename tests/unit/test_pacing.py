@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from types import SimpleNamespace
 
 import pytest
 
 from app.session import pacing
-from app.session.pacing import BRISK_BUDGET, BRISK_FRAME, LONG_FRAME, MOST_BANDS, Pacer
+from app.session.pacing import INTERACTIVE_BUDGET, INTERACTIVE_FRAME, LONG_FRAME, MOST_BANDS, Pacer
 
 PART = 3.0  # ms of a part of a shot
 PARTS = 40
@@ -22,15 +23,16 @@ class Clockwork:
     def perf_counter(self) -> float:
         return self.now
 
-    def step(self, shots: int) -> int:
-        self.calls.append(("step", shots))
-        return shots
-
-    def step_part(self, bands: int) -> bool:
-        self.calls.append(("part", bands))
-        self.now += PART * 1e-3
-        self.left -= 1
-        return self.left == 0
+    def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
+        if bands == 1:
+            self.calls.append(("step", amount))
+            return amount
+        while self.left > 0:
+            self.calls.append(("part", bands))
+            self.now += PART * 1e-3
+            self.left -= 1
+            yield
+        return amount
 
 
 @pytest.fixture
@@ -44,30 +46,35 @@ def pacer() -> Pacer:
     return Pacer(SimpleNamespace(ctx=SimpleNamespace(finish=lambda: None)))  # type: ignore[arg-type]
 
 
-def frame(pace: Pacer, work: Clockwork, seconds: float, *, brisk: bool, shots: int = 1) -> list[tuple[str, int]]:
+def frame(pace: Pacer, work: Clockwork, seconds: float, *, interactive: bool, shots: int = 1) -> list[tuple[str, int]]:
     """What a frame that begins so long after the last one does."""
     work.now += seconds
     work.calls.clear()
-    pace.advance(work, 20.0, shots, brisk=brisk)  # type: ignore[arg-type]
+    pace.advance(work, 20.0, shots, interactive=interactive)  # type: ignore[arg-type]
     return list(work.calls)
 
 
-@pytest.mark.parametrize(("brisk", "longest"), [(False, LONG_FRAME), (True, BRISK_FRAME)])
-def test_short_frames_make_whole_shots_and_long_ones_bands(clockwork: Clockwork, brisk: bool, longest: float) -> None:
+@pytest.mark.parametrize(("interactive", "longest"), [(False, LONG_FRAME), (True, INTERACTIVE_FRAME)])
+def test_short_frames_make_whole_shots_and_long_ones_bands(
+    clockwork: Clockwork, interactive: bool, longest: float
+) -> None:
     pace = pacer()
     for _ in range(3):
-        assert frame(pace, clockwork, 0.9 * longest, brisk=brisk) == [("step", 1)]
-    bands = [frame(pace, clockwork, 1.1 * longest, brisk=brisk)[0][1] for _ in range(5)]
+        assert frame(pace, clockwork, 0.9 * longest, interactive=interactive) == [("step", 1)]
+    bands = []
+    for _ in range(5):
+        clockwork.left = 1  # the last part of a shot: the next one is cut into other bands
+        bands.append(frame(pace, clockwork, 1.1 * longest, interactive=interactive)[0][1])
     assert bands == [2, 4, 8, MOST_BANDS, MOST_BANDS]
     clockwork.left = 1
-    assert frame(pace, clockwork, 0.3 * longest, brisk=brisk) == [("part", MOST_BANDS // 2)]
+    assert frame(pace, clockwork, 0.3 * longest, interactive=interactive) == [("part", MOST_BANDS // 2)]
 
 
 def test_a_hand_gets_all_but_a_little_of_a_frame(clockwork: Clockwork) -> None:
     pace = pacer()
-    frame(pace, clockwork, 0.0, brisk=False)
-    idle = frame(pace, clockwork, 2 * LONG_FRAME, brisk=False)
-    held = frame(pace, clockwork, 2 * LONG_FRAME, brisk=True)
+    frame(pace, clockwork, 0.0, interactive=False)
+    idle = frame(pace, clockwork, 2 * LONG_FRAME, interactive=False)
+    held = frame(pace, clockwork, 2 * LONG_FRAME, interactive=True)
     assert PART * len(idle) >= 20.0 > PART * (len(idle) - 1)
-    assert PART * len(held) >= BRISK_BUDGET > PART * (len(held) - 1)
-    assert frame(pace, clockwork, 2 * LONG_FRAME, brisk=True, shots=8)[0][0] == "part"
+    assert PART * len(held) >= INTERACTIVE_BUDGET > PART * (len(held) - 1)
+    assert frame(pace, clockwork, 2 * LONG_FRAME, interactive=True, shots=8)[0][0] == "part"

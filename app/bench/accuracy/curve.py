@@ -21,6 +21,7 @@ from app.reference.truth import Truth
 from app.scene.model import F64
 from app.solvers import ShootingOptions, Solver
 from app.solvers.shooting.stages import BATCH
+from app.util.parts import run_to_end
 from app.util.tables import Row
 
 GROWTH = 2.0**0.25  # of the time from one look to the next
@@ -64,9 +65,8 @@ def solve_curve(
     rows: list[Row] = []
     watch, cpu, due, over = Stopwatch(clock), Stopwatch(cpu_clock), 0.0, False
     while not over:
-        solver.step(BATCH)
-        done = solver.poll().residual <= solver.options.residual and solver.settled
-        over = done or watch.seconds >= limit
+        run_to_end(solver.work(BATCH))
+        over = solver.poll().converged or watch.seconds >= limit
         if over or watch.seconds >= due:
             gpu.ctx.finish()
             with watch.held(), cpu.held():
@@ -77,9 +77,9 @@ def solve_curve(
 
 def look_at(lightmap: Lightmap, solver: Solver[ShootingOptions], truth: Truth) -> Row:
     """Where a solve stands and how far from the truth. Waits for the GPU."""
-    shots = solver.poll(wait=True).shots
-    row: Row = {"shots": shots, "residual": solver.unshot_share(), "texels": lightmap.texel_count}
-    return row | errors(irradiance_of(lightmap, truth.points), truth) | {"imbalance": solver.books().imbalance_share}
+    now = solver.settle()
+    row: Row = {"shots": now.done, "residual": now.remaining, "texels": lightmap.texel_count}
+    return row | errors(irradiance_of(lightmap, truth.points), truth) | {"imbalance": solver.energy().imbalance_share}
 
 
 def errors(E: F64, truth: Truth) -> Row:

@@ -23,16 +23,17 @@ from app.bench.accuracy.curve import LEVELS, first_at, look_at, solve_curve
 from app.bench.accuracy.methods import METHODS
 from app.bench.accuracy.view import SIZE, View, view_of
 from app.bench.machine import load, machine, processor
-from app.bench.papers.measure import opened
 from app.bench.peers.peers import PEERS, Task
 from app.errors import UserError
 from app.estimate.error import Expectation
 from app.gpu import Gpu, gpu_context
 from app.lightmap.at_points import irradiance_of
+from app.lightmap.options import LightmapOptions
 from app.options import from_flags
 from app.reference.truth import Truth, choose, truth_of
 from app.scene.load import load_scene
 from app.scene.model import Scene
+from app.session.batch import opened
 from app.solvers import ShootingOptions
 from app.util.console import Console, Tell
 from app.util.json_text import json_text
@@ -138,20 +139,21 @@ class Plan:
     methods: tuple[str, ...]
     peers: tuple[str, ...]
     texels: int | None
+    light: LightmapOptions
     shooting: ShootingOptions
     seconds: float
     paths: int
 
-    def options(self, method: str) -> tuple[AtlasOptions, ShootingOptions]:
+    def options(self, method: str) -> tuple[AtlasOptions, LightmapOptions, ShootingOptions]:
         """Of a method. Raises UserError."""
-        return METHODS[method].options(self.texels, self.shooting)
+        return METHODS[method].options(self.texels, self.light, self.shooting)
 
 
 def bench_error(flags: argparse.Namespace) -> int:
     """Measure and write error.json, error.csv, error.md, and with matplotlib a PNG for each scene. Raises UserError."""
     console = Console(quiet=flags.json)
-    shooting = from_flags(ShootingOptions, flags)
-    plan = Plan(flags.methods, flags.peers, flags.texels, shooting, flags.seconds, flags.paths)
+    shooting, light = from_flags(ShootingOptions, flags), from_flags(LightmapOptions, flags)
+    plan = Plan(flags.methods, flags.peers, flags.texels, light, shooting, flags.seconds, flags.paths)
     for name in plan.methods:
         plan.options(name)  # whose mistakes are told before anything is measured
     scenes = _scenes(flags.scenes, flags.reference)
@@ -233,13 +235,13 @@ def _measure(gpu: Gpu, one: SceneCurves, plan: Plan, console: Console, tell: Tel
 def _curve(gpu: Gpu, one: SceneCurves, truth: Truth, name: str, plan: Plan) -> list[Row]:
     """Of a method or a peer. Raises UserError."""
     if name in PEERS:
-        atlas, _ = plan.options("uniform")
+        atlas, _, _ = plan.options("uniform")
         return PEERS[name].curve(Task(one.scene, truth, one.view, atlas, plan.seconds))
     with opened(gpu, one.scene, *plan.options(name)) as (lightmap, solver):
         expectation, looks = Expectation(gpu, lightmap, MAPS), itertools.count()
 
         def expected() -> Row:
-            error = run_to_end(expectation.parts(solver.books().returned, SECONDS))
+            error = run_to_end(expectation.parts(solver.energy().returned, SECONDS))
             return {} if error is None else {"expected": error.rms}
 
         def look() -> Row:
@@ -264,8 +266,9 @@ def _values(one: SceneCurves, plan: Plan) -> dict[str, Any]:
     for name, rows in one.curves.items():
         curves[name] = {"samples": rows}
         if name not in PEERS:
-            atlas, options = plan.options(name)
-            curves[name] |= {"axis": METHODS[name].axis, "atlas": atlas.as_dict(), "shooting": options.as_dict()}
+            atlas, light, options = plan.options(name)
+            curves[name] |= {"axis": METHODS[name].axis, "atlas": atlas.as_dict()}
+            curves[name] |= {"lightmap": light.as_dict(), "shooting": options.as_dict()}
     return {
         "scene": one.name,
         "source": str(one.scene.source),

@@ -9,22 +9,28 @@ from typing import Any
 
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import ROOT_SHARE
+from app.lightmap.options import LightmapOptions
 from app.solvers import ShootingOptions
 
 
 @dataclass(frozen=True)
 class Method:
-    """axis: what is chosen. shooting: options that differ from those that were asked for."""
+    """axis: what is chosen. adaptive: whether the lightmap is. shooting, light: options that differ from those that were asked
+    for."""
 
     axis: str
     adaptive: bool = False
     shooting: Mapping[str, Any] = field(default_factory=dict)
+    light: Mapping[str, Any] = field(default_factory=dict)
 
-    def options(self, texels: int | None, shooting: ShootingOptions) -> tuple[AtlasOptions, ShootingOptions]:
+    def options(
+        self, texels: int | None, light: LightmapOptions, shooting: ShootingOptions
+    ) -> tuple[AtlasOptions, LightmapOptions, ShootingOptions]:
         """texels: uniform ones; quadtrees begin with a sixteenth, so that some of their leaves become as fine or finer."""
         if self.adaptive and texels is not None:
             texels = max(texels // ROOT_SHARE, 1)
-        return AtlasOptions(texels=texels, adaptive=self.adaptive), shooting.replace(**self.shooting)
+        held = light.replace(adaptive=self.adaptive, **self.light)
+        return AtlasOptions(texels=texels), held, shooting.replace(**self.shooting)
 
 
 METHODS = {
@@ -35,8 +41,8 @@ METHODS = {
     "depth": Method("visibility", shooting={"visibility": "depth"}),
     "stereographic": Method("projection", shooting={"projection": "stereographic"}),
     "nonlinear": Method("projection", shooting={"projection": "nonlinear"}),
-    "rgba16f": Method("storage", shooting={"storage": "rgba16f"}),
-    "fixed8": Method("storage", shooting={"storage": "fixed8"}),
+    "rgba16f": Method("storage", light={"storage": "rgba16f"}),
+    "fixed8": Method("storage", light={"storage": "fixed8"}),
     "level-1": Method("shooting level", shooting={"level": 1}),
     "level-3": Method("shooting level", shooting={"level": 3}),
 }

@@ -11,12 +11,14 @@ import functools
 import numpy as np
 
 from app.atlas.options import AtlasOptions
-from app.bench.papers.measure import opened, shoot
+from app.bench.papers.measure import shoot
 from app.gpu import Gpu
 from app.lightmap.at_points import irradiance_of
+from app.lightmap.options import LightmapOptions
 from app.reference.metrics import median_local, quantile_local, relative_rms
 from app.reference.truth import Truth, dense_truth
 from app.scene.load import load_scene
+from app.session.batch import opened
 from app.solvers import ShootingOptions
 from app.util.tables import Row
 
@@ -32,15 +34,15 @@ def reference() -> Truth:
 
 
 def error_row(gpu: Gpu, atlas: AtlasOptions, gradient: float | None = None) -> Row:
-    """Error, texels, shots and seconds of a solve, however long it takes. gradient: of quadtrees."""
-    truth, options = reference(), ShootingOptions(residual=CONVERGED)
+    """Error, texels, shots and seconds of a solve, however long it takes. gradient: of quadtrees; uniform texels without."""
+    truth, light = reference(), LightmapOptions()
     if gradient is not None:
-        options = options.replace(gradient=gradient)
-    with opened(gpu, SCENE, atlas, options) as (lightmap, solver):
+        light = light.replace(adaptive=True, gradient=gradient)
+    with opened(gpu, SCENE, atlas, light, ShootingOptions(residual=CONVERGED)) as (lightmap, solver):
         run = shoot(gpu, solver, np.inf)
         E = irradiance_of(lightmap, truth.points)
         texels = lightmap.texel_count
-    row: Row = {"subdivision": "adaptive" if atlas.adaptive else "uniform", "tile": atlas.tile, "gradient": gradient}
+    row: Row = {"subdivision": "adaptive" if light.adaptive else "uniform", "tile": atlas.tile, "gradient": gradient}
     row |= {
         "texels": texels,
         "shots": run.shots,

@@ -6,11 +6,10 @@ triangle. Loading, unfolding and cutting are not timed.
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -18,15 +17,18 @@ from app.atlas.options import AtlasOptions
 from app.bench.papers.published import CoombeRow, RmsRow, WallnerRow
 from app.bench.papers.rooms import room_of
 from app.bench.speed.shots import ms_per_shot, passes_ms
-from app.commands.headless import picture
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
-from app.scene.model import Scene
-from app.session.loading import load
-from app.session.session import Session, Stop
-from app.solvers import DEFAULT_SOLVER, SOLVERS, ShootingOptions, Solver
+from app.lightmap.options import LightmapOptions
+from app.session.batch import opened, solve_until
+from app.session.run import Stop
+from app.session.session import Session
+from app.session.view import View
+from app.solvers import Progress, ShootingOptions, Solver
 from app.solvers.shooting.stages import BATCH
+from app.util.parts import run_to_end
 from app.util.tables import FLIP, Row, missing
+from app.viewer.picture import picture
 from app.visibility.projections import PROJECTIONS
 
 SOLVE = 10  # times as long as a measurement a solve may take
@@ -55,51 +57,36 @@ class Run:
         return self.seconds / max(self.shots, 1)
 
 
-@contextlib.contextmanager
-def opened(
-    gpu: Gpu, source: str | Scene, atlas: AtlasOptions, options: ShootingOptions
-) -> Iterator[tuple[Lightmap, Solver[ShootingOptions]]]:
-    """A scene with nothing shot yet."""
-    lightmap = Lightmap(gpu, load(source, atlas).pool, storage=options.storage)
-    try:
-        solver = SOLVERS["adaptive" if atlas.adaptive else DEFAULT_SOLVER](gpu, lightmap, options)
-        try:
-            yield lightmap, solver
-        finally:
-            solver.release()
-    finally:
-        lightmap.release()
-
-
-def warm_up(gpu: Gpu, solver: Solver[ShootingOptions]) -> None:
-    """Draw once with each program, for drivers compile it then: each pass, and a step with what is not part of every one."""
-    for _ in solver.warm_up(BATCH):
+def warm_up(gpu: Gpu, solver: Solver[Any]) -> None:
+    """Draw once with each program, for drivers compile it then: each pass, and a batch with what is not part of every one."""
+    for _ in solver.warm_up():
         pass
     solver.reset()
-    solver.step(BATCH)
+    run_to_end(solver.work(BATCH))
     solver.poll(wait=True)
     solver.reset()
     gpu.ctx.finish()
 
 
-def shoot(gpu: Gpu, solver: Solver[ShootingOptions], seconds: float) -> Run:
-    """Solve from the start until converged and settled, or for so many seconds."""
+def shoot(gpu: Gpu, solver: Solver[Any], seconds: float) -> Run:
+    """Solve from the start until converged, or for so many seconds."""
     warm_up(gpu, solver)
     run, heard, start = Run(curve=[(0, 1.0)]), 0, time.perf_counter()
-    while run.seconds < seconds:
-        report = solver.poll()
-        if report.shots > heard:  # its residual is that before its own shots
-            run.curve += [(heard, report.residual)] if heard else []
-            heard = report.shots
-        run.settled = report.residual <= solver.options.residual and solver.settled
-        if run.settled:
-            break
-        solver.step(BATCH)
+
+    def over(now: Progress) -> bool:
+        nonlocal heard
+        if now.done > heard:  # its residual is that before its own shots
+            run.curve += [(heard, now.remaining)] if heard else []
+            heard = now.done
+        run.settled = now.converged
         run.seconds = time.perf_counter() - start
+        return run.settled or run.seconds >= seconds
+
+    solve_until(solver, BATCH, over)
     gpu.ctx.finish()
     run.seconds = time.perf_counter() - start
-    run.shots = solver.poll(wait=True).shots
-    run.residual = solver.unshot_share()
+    run.shots = solver.poll(wait=True).done
+    run.residual = solver.settle().remaining
     if run.shots > run.curve[-1][0]:
         run.curve.append((run.shots, run.residual))
     return run
@@ -114,12 +101,13 @@ def light_up(lightmap: Lightmap) -> None:
 def coombe_row(gpu: Gpu, seconds: float, theirs: CoombeRow, texels: int | None = None) -> Row:
     """Uniform and adaptive texels and seconds per shot of one scene. texels: to aim at, if not theirs."""
     aim = texels or theirs.uniform_texels
-    options = ShootingOptions(residual=DIRECT, depth=ROOTS, budget=max(2 * aim, 65_536))
-    with opened(gpu, theirs.scene, AtlasOptions(texels=aim), options) as (lightmap, solver):
+    options = ShootingOptions(residual=DIRECT)
+    with opened(gpu, theirs.scene, AtlasOptions(texels=aim), LightmapOptions(), options) as (lightmap, solver):
         uniform_texels, triangles = lightmap.texel_count, len(lightmap.scene.triangles)
         uniform = shoot(gpu, solver, SOLVE * seconds)
-    roots = AtlasOptions(texels=max(aim >> 2 * ROOTS, 1), adaptive=True)
-    with opened(gpu, theirs.scene, roots, options) as (lightmap, solver):
+    roots = AtlasOptions(texels=max(aim >> 2 * ROOTS, 1))
+    light = LightmapOptions(adaptive=True, depth=ROOTS, budget=max(2 * aim, 65_536))
+    with opened(gpu, theirs.scene, roots, light, options) as (lightmap, solver):
         adaptive = shoot(gpu, solver, SOLVE * seconds)
         held = lightmap.texel_count
         solver.set_options(options.replace(residual=NEVER))
@@ -153,7 +141,10 @@ def wallner_row(gpu: Gpu, seconds: float, theirs: WallnerRow) -> Row:
         "their_cube_ms": theirs.cube_s / theirs.iterations * 1e3,
         "their_sphere_ms": theirs.sphere_s / theirs.iterations * 1e3,
     }
-    with opened(gpu, room_of(theirs.triangles), AtlasOptions(texels=theirs.texels), options) as (lightmap, solver):
+    with opened(gpu, room_of(theirs.triangles), AtlasOptions(texels=theirs.texels), LightmapOptions(), options) as (
+        lightmap,
+        solver,
+    ):
         row |= {"triangles": len(lightmap.scene.triangles), "texels": lightmap.texel_count}
         for name in PROJECTIONS:
             solver.set_options(options.replace(projection=name))
@@ -165,7 +156,8 @@ def wallner_row(gpu: Gpu, seconds: float, theirs: WallnerRow) -> Row:
 
 def scaling_row(gpu: Gpu, seconds: float, sweep: str, triangles: int, texels: int) -> Row:
     """Milliseconds per shot, the sum of its passes, and of the two large ones. sweep: which of the two numbers is varied."""
-    with opened(gpu, room_of(triangles), AtlasOptions(texels=texels), ShootingOptions(residual=NEVER)) as (
+    options = ShootingOptions(residual=NEVER)
+    with opened(gpu, room_of(triangles), AtlasOptions(texels=texels), LightmapOptions(), options) as (
         lightmap,
         solver,
     ):
@@ -187,9 +179,9 @@ def exponents(rows: list[Row]) -> None:
 def convergence_row(gpu: Gpu, seconds: float, scene: str, texels: int, projection: str, theirs: int | None) -> Row:
     """Shots until so much is unshot. theirs: shots of the paper's scene."""
     options = ShootingOptions(projection=projection, residual=LEVELS[-1])
-    with opened(gpu, scene, AtlasOptions(texels=texels), options) as (lightmap, solver):
+    with opened(gpu, scene, AtlasOptions(texels=texels), LightmapOptions(), options) as (lightmap, solver):
         run = shoot(gpu, solver, SOLVE * seconds)
-        row: Row = {"scene": scene, "texels": lightmap.texel_count, "imbalance": solver.books().imbalance_share}
+        row: Row = {"scene": scene, "texels": lightmap.texel_count, "imbalance": solver.energy().imbalance_share}
     row |= {"projection": projection, "their_shots": theirs, "shots": run.shots, "seconds": run.seconds}
     row |= {level_key(level): first_below(run.curve, level) for level in LEVELS}
     return row | {"curve": run.curve}
@@ -209,22 +201,25 @@ def rms_row(gpu: Gpu, seconds: float, theirs: RmsRow) -> Row:
     no FLIP where it is not installed."""
     roots = round(ROOT_TEXELS * theirs.size**2) if theirs.level else round(ROOT_TEXELS * theirs.size**2 / 4)
     adaptive = theirs.subdivision == "adaptive"
-    atlas = AtlasOptions(texels=roots if adaptive else roots << 2 * theirs.level, adaptive=adaptive)
+    atlas = AtlasOptions(texels=roots if adaptive else roots << 2 * theirs.level)
+    light = LightmapOptions(adaptive=adaptive, depth=theirs.level)
     row: Row = {"subdivision": theirs.subdivision, "level": theirs.level, "size": theirs.size}
     pictures, converged = {}, True
-    session = Session(gpu, atlas=atlas)
+    session = Session(gpu, atlas=atlas, light=light)
+    view = View(session)
     try:
         for name in PROJECTIONS:
-            session.set_shooting(ShootingOptions(projection=name, residual=LEVELS[-1], depth=theirs.level))
+            session.set_options(ShootingOptions(projection=name, residual=LEVELS[-1]))
             session.open_now("cornell-box")
             session.solve(Stop(seconds=SOLVE * seconds))
-            if session.interrupted:
+            if session.run.interrupted:
                 raise KeyboardInterrupt
-            converged = converged and session.converged
-            pictures[name] = picture(session, PICTURE).astype(np.float64) / 255
-            row |= {f"{name}_s": session.seconds, f"{name}_texels": session.lightmap.texel_count}
-            row[f"{name}_unshot"] = session.solver.report.residual
+            converged = converged and session.run.converged
+            pictures[name] = picture(view, PICTURE).astype(np.float64) / 255
+            row |= {f"{name}_s": session.run.seconds, f"{name}_texels": session.lightmap.texel_count}
+            row[f"{name}_unshot"] = session.run.progress.remaining
     finally:
+        view.release()
         session.release()
     if converged:  # else the pictures differ by their shots
         for name in ("stereographic", "nonlinear"):

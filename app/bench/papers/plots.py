@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from app.bench.papers.tables import Plot
+from app.bench.papers.table import Plot
 from app.errors import UserError
 from app.util.tables import Row
 

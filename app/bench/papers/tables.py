@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from app.atlas.options import AtlasOptions
 from app.bake import prepare_directory
 from app.bench.machine import load, machine
 from app.bench.papers import equal, measure, published
+from app.bench.papers.table import Measure, Plot, Table
 from app.errors import UserError
 from app.gpu import Gpu, gpu_context
 from app.reference.truth import PATCHES
@@ -30,32 +31,6 @@ AT_TEXELS, AT_TRIANGLES = 100_000, 10_000  # of the sweep over the other
 CONVERGENCE = ("museum", 31_000)
 EQUAL_TEXELS = 8_000, 32_000, 128_000, 256_000  # uniform ones
 EQUAL_TREES = (16, 0.5), (8, 0.5), (8, 0.25)  # texels along a leaf, gradient
-Measure = Callable[[Gpu, float], Row]
-
-
-@dataclass(frozen=True)
-class Plot:
-    """A line for each y key over the x key, for each value of ``by``; or, of a ``curve``, one for each row."""
-
-    x: str
-    ys: tuple[str, ...]
-    by: str
-    labels: tuple[str, str]
-    logarithmic: bool = True
-
-
-@dataclass(frozen=True)
-class Table:
-    """jobs: (label, what measures one row within about so many seconds). finish: adds what follows from all rows."""
-
-    name: str
-    title: str
-    theirs: str
-    notes: tuple[str, ...]
-    columns: tuple[Column, ...]
-    jobs: tuple[tuple[str, Measure], ...]
-    plot: Plot | None = None
-    finish: Callable[[list[Row]], None] = lambda rows: None
 
 
 def bench_tables(flags: argparse.Namespace) -> int:
@@ -236,7 +211,7 @@ def _equal() -> Table:
         (
             *(job(f"{texels:,} uniform texels", AtlasOptions(texels=texels)) for texels in EQUAL_TEXELS),
             *(
-                job(f"leaves of {tile}, gradient {gradient:g}", AtlasOptions(adaptive=True, tile=tile), gradient)
+                job(f"leaves of {tile}, gradient {gradient:g}", AtlasOptions(tile=tile), gradient)
                 for tile, gradient in EQUAL_TREES
             ),
         ),

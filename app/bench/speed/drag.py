@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from app.lightmap.options import LightmapOptions
 from app.options import specs
-from app.solvers import ShootingOptions
 
 SWEEP = 75  # frames from one end of a slider to the other
 SWEEPS = 4
@@ -14,10 +14,10 @@ DEPTHS = (6, 2)
 DRAGGED = ("gradient", "depth")
 
 
-def drag(name: str, start: ShootingOptions) -> Iterator[ShootingOptions]:
+def drag(name: str, start: LightmapOptions) -> Iterator[LightmapOptions]:
     """What the panel hands over, frame by frame, while the slider of one of DRAGGED is moved: the gradient down from where it
     is, the depth between DEPTHS, and back."""
-    least = {spec.name: spec.minimum or 0.0 for spec in specs(ShootingOptions)}["gradient"]
+    least = {spec.name: spec.minimum or 0.0 for spec in specs(LightmapOptions)}["gradient"]
     for nth in range(1, SWEEPS * SWEEP + 1):
         sweep, step = divmod(nth, SWEEP)
         place = (step if sweep % 2 == 0 else SWEEP - step) / SWEEP

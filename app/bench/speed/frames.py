@@ -17,14 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from app.atlas.options import AtlasOptions
 from app.bench.speed.drag import DRAGGED, drag
+from app.commands.steps import session_options
 from app.errors import UserError
 from app.gpu import Gpu, gpu_context
-from app.options import from_flags
+from app.lightmap.options import LightmapOptions
 from app.session.pacing import Turns
 from app.session.session import Session
-from app.solvers import ShootingOptions
+from app.session.view import View
 from app.ui.app import Ui
 from app.ui.state import Pace
 from app.util.console import Console
@@ -44,17 +44,17 @@ def bench_frames(flags: argparse.Namespace) -> int:
         raise UserError("--drag: only --adaptive has the sliders that it moves")
     console = Console(quiet=flags.json)
     with gpu_context() as gpu, console.progress("frames") as tell:
-        session = Session(
-            gpu, shooting=from_flags(ShootingOptions, flags), atlas=from_flags(AtlasOptions, flags), expose_on_open=True
-        )
+        session = Session(gpu, **session_options(flags), expose_on_open=True)
+        view = View(session)
         tell(f"opening {flags.scene}", 0.0)
         session.open(flags.scene)
-        viewer = _Viewer(gpu, session)
+        viewer = _Viewer(gpu, view)
         try:
             times = _measure_drags(viewer, tell) if flags.drag else _measure(viewer)
         finally:
             viewer.release()
         values = {"scene": session.name, "renderer": gpu.limits.renderer, "texels": session.stats.texels, **times}
+        view.release()
         session.release()
     console.result(values, _drag_table(values) if flags.drag else _table(values))
     return 0
@@ -63,8 +63,8 @@ def bench_frames(flags: argparse.Namespace) -> int:
 class _Viewer:
     """The viewer's frames, drawn into a texture."""
 
-    def __init__(self, gpu: Gpu, session: Session) -> None:
-        self._gpu, self.session = gpu, session
+    def __init__(self, gpu: Gpu, view: View) -> None:
+        self._gpu, self._view, self.session = gpu, view, view.session
         self._texture = gpu.texture(SIZE, 4, "f1")
         self._target = gpu.target(self._texture)
         self._ui = Ui()
@@ -81,20 +81,20 @@ class _Viewer:
             raise UserError(self.session.message or f"{self.session.name}: did not open")
         return rows
 
-    def frame(self, options: ShootingOptions | None = None) -> list[float]:
-        """One frame: milliseconds by part, and of CPU time. options: that a hand at a slider asks for."""
-        session, held = self.session, options is not None
+    def frame(self, light: LightmapOptions | None = None) -> list[float]:
+        """One frame: milliseconds by part, and of CPU time. light: the options that a hand at a slider asks for."""
+        session, held = self.session, light is not None
         cpu, clock = time.process_time(), [time.perf_counter()]
         session.poll()
         clock.append(time.perf_counter())
-        shoot, look = self._turns.next(self._seconds) if session.shooting_goes_on else (False, True)
-        if shoot:
-            session.advance(budget_ms=Pace().frame_budget, shots=1, brisk=held)
+        solve, look = self._turns.next(self._seconds) if session.solving else (False, True)
+        if solve:
+            session.advance(budget_ms=Pace().frame_budget, amount=1, interactive=held)
         self._gpu.ctx.finish()
         clock.append(time.perf_counter())
-        if options is not None and options != session.shooting:
-            session.set_shooting(options)
-        self._frame.draw(session, self._target, size=SIZE, look=look)
+        if light is not None and light != session.light:
+            session.set_light(light)
+        self._frame.draw(self._view, self._target, size=SIZE, look=look)
         self._gpu.ctx.finish()
         clock.append(time.perf_counter())
         self._seconds = clock[-1] - clock[0]
@@ -111,7 +111,7 @@ def _measure(viewer: _Viewer) -> dict[str, Any]:
     opening = viewer.open() + [viewer.frame() for _ in range(WARM_UP)]
     rows = []
     for _ in range(FRAMES):
-        if viewer.session.converged:
+        if viewer.session.run.converged:
             viewer.session.restart()
         rows.append(viewer.frame())
     first = np.array(opening)[1:, :-1].sum(1)  # the very first builds the interface
@@ -131,7 +131,7 @@ def _measure_drags(viewer: _Viewer, tell: Callable[[str, float], None]) -> dict[
     drags = {}
     for nth, name in enumerate(DRAGGED):
         tell(f"dragging {name}", nth / len(DRAGGED))
-        rows = [viewer.frame(options) for options in drag(name, session.shooting)]
+        rows = [viewer.frame(light) for light in drag(name, session.light)]
         drags[name] = _summary(rows) | {"leaves": session.lightmap.tiles}
     return {"leaves_opened": opened, "leaves_after_1_s": grown, "drags": drags}
 

@@ -20,12 +20,15 @@ from app.bench.speed.copy import Copy
 from app.bench.speed.stream import Stream
 from app.gpu import Gpu, gpu_context
 from app.lightmap.lightmap import Lightmap
+from app.lightmap.options import LightmapOptions
 from app.options import from_flags
 from app.session.loading import load
-from app.solvers import ShootingOptions, Solver, UniformShooting
+from app.solvers import ShootingOptions, Solver
 from app.solvers.shooting.shot import AuditTargets
+from app.solvers.shooting.solver import Shooting
 from app.solvers.shooting.stages import BATCH
 from app.util.console import Console
+from app.util.parts import run_to_end
 from app.util.tables import Column, Row, markdown, markdown_table
 
 SIZES = (
@@ -65,7 +68,7 @@ BOUNDS_NOTE = (
 )
 
 
-class Unaudited(UniformShooting):
+class Unaudited(Shooting):
     """As later in a solve, when shots are no longer strong enough to be tried before they are made."""
 
     def _fails(self, shots: int) -> Generator[None, None, bool]:
@@ -82,20 +85,24 @@ def try_one(shots: Unaudited) -> None:
 def bench_shots(flags: argparse.Namespace) -> int:
     """Print the table."""
     console = Console(quiet=flags.json)
-    options = from_flags(ShootingOptions, flags)
+    options, light = from_flags(ShootingOptions, flags), from_flags(LightmapOptions, flags)
     rows = []
     with gpu_context() as gpu, console.progress("shots") as tell:
         for i, (name, texels) in enumerate(SIZES):
             tell(f"{name}, {texels:,} texels", i / len(SIZES))
-            rows.append(_measure(gpu, name, texels, options))
-        values = {"renderer": gpu.limits.renderer, "options": options.as_dict(), "sizes": rows}
+            rows.append(_measure(gpu, name, texels, options, light))
+        values = {
+            "renderer": gpu.limits.renderer,
+            "options": options.as_dict() | {"storage": light.storage},
+            "sizes": rows,
+        }
     console.result(values, _table(values))
     return 0
 
 
-def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions) -> dict[str, Any]:
+def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions, light: LightmapOptions) -> dict[str, Any]:
     pool = load(name, AtlasOptions(texels=texels)).pool
-    lightmap = Lightmap(gpu, pool, storage=options.storage)
+    lightmap = Lightmap(gpu, pool, light)
     solver = Unaudited(gpu, lightmap, options)
     ms_per_shot(gpu, solver, 1, WARM_UP)
     single_ms = ms_per_shot(gpu, solver, 1, SECONDS)
@@ -123,15 +130,15 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions) -> dict
 
 def ms_per_shot(gpu: Gpu, solver: Solver[ShootingOptions], batch: int, seconds: float) -> float:
     """Mean wall time of a shot that was made [ms]; a batch leaves out those too weak beside its best."""
-    before = solver.poll(wait=True).shots
+    before = solver.poll(wait=True).done
     gpu.ctx.finish()
     start = time.perf_counter()
     while time.perf_counter() < start + seconds:
-        solver.step(batch)
+        run_to_end(solver.work(batch))
         solver.poll()
     gpu.ctx.finish()
     elapsed = time.perf_counter() - start
-    return elapsed * 1e3 / max(solver.poll(wait=True).shots - before, 1)
+    return elapsed * 1e3 / max(solver.poll(wait=True).done - before, 1)
 
 
 def _ms(gpu: Gpu, run: Callable[[], object]) -> float:

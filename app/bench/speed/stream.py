@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from app.gpu import Gpu, Pass
 from app.lightmap.lightmap import LIGHT, Lightmap
-from app.solvers import UniformShooting
 from app.solvers.shooting.options import VISIBILITIES
+from app.solvers.shooting.solver import Shooting
 from app.solvers.shooting.stages import BATCH, BLOCK_BYTES
 
 SHAPED = ("t_position_area", "t_normal_ids")  # of tiles of any shape
@@ -20,7 +20,7 @@ CHOSEN = ("t_position_area", "t_normal_ids", "t_irradiance", "t_residual")
 class Stream:
     """Reads and blends for the same texels and shots what the receiver pass of a solver does, and computes nothing."""
 
-    def __init__(self, gpu: Gpu, shooting: UniformShooting) -> None:
+    def __init__(self, gpu: Gpu, shooting: Shooting) -> None:
         self._gpu, self._shooting = gpu, shooting
         self._passes = {key: self._pass(*key) for key in shooting.stages.receive}
         self._moved: list[float] = []

@@ -235,7 +235,7 @@ class UniformShooting(ShotPasses):
             self.issued = self.report.shots
         report = self.report
         converged = report.residual <= self.options.residual and self.settled
-        return Progress(report.shots, report.residual, report.escaped, converged, not self.grown, self.note)
+        return Progress(report.shots, report.residual, report.escaped, bool(converged), not self.grown, self.note)
 
     def settle(self) -> Progress:
         """End the work under way, and measure what is unshot."""

@@ -12,7 +12,7 @@ from app.ui import theme, widgets
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.session.session import Session
+    from app.session.view import View
 
 REFRESH_SECONDS = 0.25  # between two pictures of it
 MOST_PX = 512  # along its longer edge
@@ -44,16 +44,16 @@ class Place:
         return (up, right) if self.turned else (right, up)
 
 
-def draw(session: Session, state: State) -> None:
+def draw(view: View, state: State) -> None:
     """The picture as large as the panel has room for; made only while it is in sight."""
-    place = _place(session.charts.size, state.ratio)
-    image = _image(session, state, place) if imgui.is_rect_visible(place.size) else None
+    place = _place(view.session.charts.size, state.ratio)
+    image = _image(view, state, place) if imgui.is_rect_visible(place.size) else None
     if image is None or state.texture_id is None:
         imgui.dummy(place.size)
         return
     imgui.image(imgui.ImTextureRef(state.texture_id(image)), place.size, imgui.ImVec2(0, 1), imgui.ImVec2(1, 0))
     if imgui.is_item_hovered():
-        _leaf(session, place)
+        _leaf(view, place)
 
 
 def _place(atlas: tuple[int, int], ratio: float) -> Place:
@@ -66,21 +66,21 @@ def _place(atlas: tuple[int, int], ratio: float) -> Place:
     return Place(corner.x, corner.y, max(scale, 1e-3), atlas, turns)
 
 
-def _image(session: Session, state: State, place: Place) -> Any:
+def _image(view: View, state: State, place: Place) -> Any:
     """Made anew a few times a second, and whenever it is of another size or the textures behind it may be others."""
     pixels = max(round(place.size.x * state.ratio), 1), max(round(place.size.y * state.ratio), 1)
-    source = session.lightmap, session.display, pixels, place.turned
+    source = view.session.lightmap, view.display, pixels, place.turned
     state.inset_age += imgui.get_io().delta_time
     known = state.inset
     if known is None or known[1] is None or known[0] != source or state.inset_age >= REFRESH_SECONDS:
-        known = state.inset = source, session.atlas_image(pixels, turned=place.turned)
+        known = state.inset = source, view.atlas_image(pixels, turned=place.turned)
         state.inset_age = 0.0
     return known[1]
 
 
-def _leaf(session: Session, place: Place) -> None:
+def _leaf(view: View, place: Place) -> None:
     """Frame the leaf under the pointer, and say what it is."""
-    leaf = leaf_at(session.lightmap, place.atlas_from_screen(imgui.get_mouse_pos()))
+    leaf = leaf_at(view.session.lightmap, place.atlas_from_screen(imgui.get_mouse_pos()))
     if leaf is None:
         return
     one, other = place.screen_from_atlas(*leaf.rect[:2]), place.screen_from_atlas(*leaf.rect[2:])

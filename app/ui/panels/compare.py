@@ -11,7 +11,7 @@ from app.ui.state import State
 
 if TYPE_CHECKING:
     from app.compare.comparison import Comparison
-    from app.session.session import Session
+    from app.session.view import View
 
 ICONS = theme.ICONS
 VIEWS = ("solution", "reference", "split", "error")
@@ -31,73 +31,73 @@ FINER = (
 )
 
 
-def draw(session: Session, state: State) -> None:
+def draw(view: View, state: State) -> None:
     """The whole panel."""
-    comparison = session.comparison
+    comparison = view.session.compared.comparison
     if widgets.fold("Expected error"):
-        _expected(session)
+        _expected(view)
     if comparison is None:
         widgets.wrapped("A reference is a bake of this scene, or a finer solve of it.", theme.DIM)
     else:
-        _views(session, state)
+        _views(view, state)
         if widgets.fold("Error"):
-            _error(session, comparison)
+            _error(view, comparison)
     if widgets.fold("Reference"):
-        _reference(session, state)
+        _reference(view, state)
     if widgets.fold("Solve one"):
-        _solve(session, state)
+        _solve(view, state)
 
 
-def shown(session: Session) -> str:
+def shown(view: View) -> str:
     """Which of VIEWS it is."""
-    display = session.shown
+    display = view.shown
     return "error" if display.layer == "error" else display.show
 
 
-def show(session: Session, state: State, view: str) -> None:
+def show(view: View, state: State, what: str) -> None:
     """One of VIEWS; without a reference a line that says so."""
-    if session.comparison is None:
+    if view.session.compared.comparison is None:
         state.notify("no reference yet: the Compare panel opens or solves one", error=True)
         return
-    display = session.display
-    if view == "error":
+    display = view.display
+    if what == "error":
         state.layer = display.layer
-        session.display = display.replace(layer="error")
+        view.display = display.replace(layer="error")
     else:
         layer = state.layer if display.layer == "error" else display.layer
-        session.display = display.replace(layer=layer, show=view)
+        view.display = display.replace(layer=layer, show=what)
 
 
-def _views(session: Session, state: State) -> None:
+def _views(view: View, state: State) -> None:
     """One button for each, side by side."""
-    now, gap = shown(session), imgui.get_style().item_spacing.x
-    texts = [imgui.calc_text_size(view.capitalize()).x for view in VIEWS]
+    now, gap = shown(view), imgui.get_style().item_spacing.x
+    texts = [imgui.calc_text_size(what.capitalize()).x for what in VIEWS]
     rest = (imgui.get_content_region_avail().x - (len(VIEWS) - 1) * gap - sum(texts)) / len(VIEWS)
-    for view, text in zip(VIEWS, texts, strict=True):
-        if view != VIEWS[0]:
+    for what, text in zip(VIEWS, texts, strict=True):
+        if what != VIEWS[0]:
             imgui.same_line()
-        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*(theme.AMBER if view == now else theme.TEXT)))
-        if imgui.button(view.capitalize(), imgui.ImVec2(text + rest, 0)):
-            show(session, state, view)
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*(theme.AMBER if what == now else theme.TEXT)))
+        if imgui.button(what.capitalize(), imgui.ImVec2(text + rest, 0)):
+            show(view, state, what)
         imgui.pop_style_color()
-        widgets.tooltip(MEANINGS[view])
+        widgets.tooltip(MEANINGS[what])
 
 
-def _expected(session: Session) -> None:
+def _expected(view: View) -> None:
     """What the solution says of itself, once light is at rest."""
-    error = session.expected
+    error = view.session.expected
     if error is not None:
         widgets.facts("expected", [("RMS", widgets.percent(error.rms)), ("Median", widgets.percent(error.median))])
-    elif session.at_rest:
+    elif view.session.at_rest:
         widgets.dim("nothing is lit")
-    elif session.expecting.share > 0:
-        imgui.progress_bar(session.expecting.share, imgui.ImVec2(-1, 0), "")
+    elif view.session.estimate.share > 0:
+        imgui.progress_bar(view.session.estimate.share, imgui.ImVec2(-1, 0), "")
     else:
         widgets.dim("known when shooting pauses or ends")
     widgets.tooltip(EXPECTED)
 
 
-def _error(session: Session, comparison: Comparison) -> None:
+def _error(view: View, comparison: Comparison) -> None:
     error = comparison.error
     if error is None:
         widgets.dim("measuring")
@@ -115,13 +115,13 @@ def _error(session: Session, comparison: Comparison) -> None:
         f"Of irradiance, at {comparison.lit:,} random points that are lit in the reference. RMS over the mean; median and 90 % "
         "of the errors over the reference at each point; bias of the mean"
     )
-    for note in comparison.notes(session.lightmap):
+    for note in comparison.notes(view.session.lightmap):
         widgets.wrapped(note, theme.AMBER)
 
 
-def _reference(session: Session, state: State) -> None:
+def _reference(view: View, state: State) -> None:
     """What it is, where there is one, and where it comes from."""
-    comparison = session.comparison
+    comparison = view.session.compared.comparison
     if comparison is not None:
         light = comparison.light
         texels = "unknown" if light.texels is None else f"{light.texels:,}"
@@ -134,20 +134,22 @@ def _reference(session: Session, state: State) -> None:
     imgui.same_line()
     imgui.begin_disabled(comparison is None)
     if imgui.button("Forget", imgui.ImVec2(width, 0)):
-        state.act(session.drop_reference)
+        state.act(view.drop_reference)
     imgui.end_disabled()
 
 
-def _solve(session: Session, state: State) -> None:
+def _solve(view: View, state: State) -> None:
     """The knobs of a solve in the background, or how far it is."""
-    fetching = session.fetching
+    fetching = view.session.compared.fetching
     if fetching is None:
-        state.reference = widgets.edit_options(state.reference, starts={"texels": session.reference_texels})
+        state.reference = widgets.edit_options(
+            state.reference, starts={"texels": view.session.compared.reference_texels}
+        )
         if imgui.button("Solve in the background", imgui.ImVec2(-1, 0)):
-            state.act(lambda: session.solve_reference(state.reference))
+            state.act(lambda: view.session.compared.solve(state.reference))
         widgets.tooltip(FINER)
         return
     imgui.progress_bar(fetching.fraction, imgui.ImVec2(-1, 0), "")
     widgets.wrapped(fetching.stage, theme.DIM)
     if imgui.button("Stop", imgui.ImVec2(-1, 0)):
-        state.act(session.stop_fetching)
+        state.act(view.session.compared.stop_fetching)

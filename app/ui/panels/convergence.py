@@ -11,64 +11,70 @@ from app.ui import theme, widgets
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.session.session import Session
+    from app.session.view import View
 
 MOST_POINTS = 400  # per curve: more cannot be told apart in a panel
 SMALLEST = 1e-6  # of the power emitted, for the logarithmic axis
 PLOT_EM = 20.0  # width of a plot with its legend
 TIMINGS_EM = 19.0  # width of the table of passes: the longest name and its bar
 Curve = tuple[np.ndarray, np.ndarray, theme.RGBA]  # x, y, colour
-AXES = ("shots", "seconds")
+AXES = ("work", "seconds")  # columns of the history
 AXIS = int(implot.AxisFlags_.auto_fit | implot.AxisFlags_.no_highlight)
 LEGEND = int(implot.LegendFlags_.no_menus | implot.LegendFlags_.outside | implot.LegendFlags_.horizontal)
 PLOT = int(implot.Flags_.no_mouse_text | implot.Flags_.no_menus | implot.Flags_.no_box_select)
 
 
-def draw(session: Session, state: State) -> None:
+def draw(view: View, state: State) -> None:
     """The whole panel: what is shown, two plots side by side, and where there is room the passes to the right."""
     em, gap = imgui.get_font_size(), imgui.get_style().item_spacing.x
-    passes = bool(session.timings) and state.measured
+    passes = bool(view.session.timings) and state.measured
     beside = passes and imgui.get_content_region_avail().x > (2 * PLOT_EM + TIMINGS_EM) * em
     choices = (*AXES, "passes") if passes and not beside else AXES
-    shown = state.plot if state.measured and state.plot in choices else "shots"
+    shown = state.plot if state.measured and state.plot in choices else "work"
     if state.measured:
         _choice(state, shown, choices)
     area = imgui.get_content_region_avail()
     if shown == "passes":
-        _passes(session, imgui.ImVec2(area.x, area.y))
+        _passes(view, imgui.ImVec2(area.x, area.y))
         return
     table = TIMINGS_EM * em if beside else 0.0
     _plots(
-        session,
+        view,
         imgui.ImVec2((area.x - (table + gap if table else 0.0) - gap) / 2, area.y),
         shown,
-        named=not state.measured,
+        None if state.measured else _axis(state, shown),
     )
     if table:
         imgui.same_line()
-        _passes(session, imgui.ImVec2(table, area.y))
+        _passes(view, imgui.ImVec2(table, area.y))
 
 
 def _choice(state: State, shown: str, choices: tuple[str, ...]) -> None:
     """One line: what is plotted over, or the passes; and how fast it goes."""
     assert state.stats is not None
     for choice in choices:
-        if imgui.radio_button(choice, shown == choice):
+        if imgui.radio_button(_axis(state, choice), shown == choice):
             state.plot = choice
         imgui.same_line()
-    widgets.dim(f"{widgets.number(state.stats.shots_per_second, 3)} shots/s")
+    widgets.dim(f"{widgets.number(state.stats.per_second, 3)} {state.stats.unit}/s")
 
 
-def _plots(session: Session, size: imgui.ImVec2, label: str, *, named: bool) -> None:
-    """Over a column of the history; ``named`` writes which below."""
-    history = session.history
-    rows = np.flatnonzero(np.isfinite(history.column("residual")) & np.isfinite(history.column("absorbed")))
+def _axis(state: State, column: str) -> str:
+    """What a column of the history is called."""
+    assert state.stats is not None
+    return state.stats.unit if column == "work" else column
+
+
+def _plots(view: View, size: imgui.ImVec2, column: str, label: str | None) -> None:
+    """Over a column of the history; label: written below."""
+    history = view.session.run.history
+    rows = np.flatnonzero(np.isfinite(history.column("remaining")) & np.isfinite(history.column("absorbed")))
     chosen = _thinned(rows)
-    x = history.column(label)[chosen]
-    curves = {n: history.column(n)[chosen] for n in ("residual", "absorbed", "escaped")}
-    _shares(size, session, label, x, curves["residual"], named=named)
+    x = history.column(column)[chosen]
+    curves = {n: history.column(n)[chosen] for n in ("remaining", "absorbed", "escaped")}
+    _shares(size, view, column, x, curves["remaining"], label)
     imgui.same_line()
-    _energy(size, x, curves, label if named else None)
+    _energy(size, x, curves, label)
 
 
 def _thinned(rows: np.ndarray) -> np.ndarray:
@@ -86,18 +92,18 @@ def _begin(name: str, size: imgui.ImVec2, label: str | None) -> bool:
 
 
 def _shares(
-    size: imgui.ImVec2, session: Session, label: str, x: np.ndarray, residual: np.ndarray, *, named: bool
+    size: imgui.ImVec2, view: View, column: str, x: np.ndarray, residual: np.ndarray, label: str | None
 ) -> None:
     """The residual, and beside it the error where there is a reference, in logarithms [fraction]."""
-    if not _begin("residual", size, label if named else None):
+    if not _begin("residual", size, label):
         return
     curves: dict[str, Curve] = {"residual / emitted": (x, residual, theme.AMBER)}
-    if session.comparison is not None:
+    if view.session.compared.comparison is not None:
         curves = {"residual": (x, residual, theme.AMBER)}  # all three names fit above the plot
-        rows = session.comparison.errors
+        rows = view.session.compared.comparison.errors
         chosen = _thinned(np.flatnonzero(np.isfinite(rows.column("rms"))))
-        for name, column, colour in (("RMS error", "rms", theme.RMS), ("median error", "median", theme.MEDIAN)):
-            curves[name] = rows.column(label)[chosen], rows.column(column)[chosen], colour
+        for name, error, colour in (("RMS error", "rms", theme.RMS), ("median error", "median", theme.MEDIAN)):
+            curves[name] = rows.column(column)[chosen], rows.column(error)[chosen], colour
     lowest = min(float(values.min(initial=1.0)) for _, values, _ in curves.values())
     highest = max(float(values.max(initial=1.0)) for _, values, _ in curves.values())
     decade = 10.0 ** min(np.floor(np.log10(max(lowest, SMALLEST))), -1.0)  # whole decades, at least one
@@ -117,7 +123,7 @@ def _energy(size: imgui.ImVec2, x: np.ndarray, curves: dict[str, np.ndarray], la
     if _begin("energy", size, label):
         implot.setup_axis(implot.ImAxis_.y1, None, int(implot.AxisFlags_.no_highlight))
         implot.setup_axis_limits(implot.ImAxis_.y1, 0.0, 1.0, implot.Cond_.always)
-        names = (("absorbed", theme.ABSORBED), ("escaped", theme.ESCAPED), ("residual", theme.UNSHOT))
+        names = (("absorbed", theme.ABSORBED), ("escaped", theme.ESCAPED), ("remaining", theme.UNSHOT))
         lower = np.zeros_like(x)
         for name, colour in names:
             upper = lower + curves[name]
@@ -127,9 +133,9 @@ def _energy(size: imgui.ImVec2, x: np.ndarray, curves: dict[str, np.ndarray], la
         implot.end_plot()
 
 
-def _passes(session: Session, size: imgui.ImVec2) -> None:
+def _passes(view: View, size: imgui.ImVec2) -> None:
     """Milliseconds of each pass, in as many columns as there is room for; whole rows only."""
-    timings = list(session.timings.items())
+    timings = list(view.session.timings.items())
     columns = max(int(size.x // (TIMINGS_EM * imgui.get_font_size())), 1)
     row = imgui.get_text_line_height() + 2 * imgui.get_style().cell_padding.y
     height = max(size.y // row, 1) * row
@@ -140,7 +146,7 @@ def _passes(session: Session, size: imgui.ImVec2) -> None:
     for column in range(columns):
         imgui.table_setup_column(f"pass {column}", imgui.TableColumnFlags_.width_fixed)
         imgui.table_setup_column(f"ms {column}", imgui.TableColumnFlags_.width_stretch)
-    longest = max(session.timings.values())
+    longest = max(view.session.timings.values())
     for label, ms in timings:
         imgui.table_next_column()
         imgui.text_unformatted(label)

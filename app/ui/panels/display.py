@@ -12,26 +12,26 @@ from app.ui.panels import compare
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.session.session import Session
+    from app.session.view import View
 
 SCALED, DEVELOPED = ("false_colour_log", "false_colour_max"), ("tone_map", "exposure")
 COMPARED = ("show", "split")  # the Compare panel has them
 
 
-def draw(session: Session, state: State) -> None:
+def draw(view: View, state: State) -> None:
     """The whole panel: DisplayOptions, one widget each; the false-colour scale only while it is used."""
-    kind = measured(session.shown)
+    kind = measured(view.shown)
     skip = {"off": SCALED, "error": (*SCALED, *DEVELOPED)}.get(kind, DEVELOPED)
     unit = {"false_colour_max": UNITS[kind]} if kind in UNITS else {}
-    edited = widgets.edit_options(session.display, skip=(*skip, *COMPARED), units=unit)
-    if edited.layer == "error" and session.display.layer != "error":
-        state.act(lambda: compare.show(session, state, "error"))  # which says so where there is no reference
+    edited = widgets.edit_options(view.display, skip=(*skip, *COMPARED), units=unit)
+    if edited.layer == "error" and view.display.layer != "error":
+        state.act(lambda: compare.show(view, state, "error"))  # which says so where there is no reference
     else:
-        session.display = edited
+        view.display = edited
     if kind == "off":
         widgets.labelled("Set exposure")
         if imgui.button("Auto", imgui.ImVec2(-1, 0)):
-            state.act(session.expose)
+            state.act(view.expose)
         widgets.tooltip(
             "Set the exposure from the light of the scene: what surfaces reflect becomes mid grey on average"
         )

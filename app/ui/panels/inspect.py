@@ -6,64 +6,63 @@ from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
 
-from app.solvers import TREE
 from app.ui import theme, widgets
 from app.ui.panels import atlas
 from app.ui.state import State
 
 if TYPE_CHECKING:
     from app.session.picking import Picked
-    from app.session.session import Session
+    from app.session.view import View
 
 REFRESH_SECONDS = 0.25  # between two pictures of it
 
 
-def draw(session: Session, state: State) -> None:
+def draw(view: View, state: State) -> None:
     """The whole panel."""
     if state.picked is None:
         widgets.wrapped("Click a surface to read its texel.", theme.DIM)
     else:
         if widgets.fold("Surface"):
-            _surface(session, state.picked)
+            _surface(view, state.picked)
         if widgets.fold("Light [W/m²]"):
-            _light(session, state.picked)
-    if widgets.fold("What the last shooter saw"):
-        _shooter(session, state)
+            _light(view, state.picked)
+    _solver(view, state)
     if widgets.fold("Atlas"):
-        atlas.draw(session, state)
+        atlas.draw(view, state)
 
 
-def _shooter(session: Session, state: State) -> None:
-    image, vanished = _hemicube(session, state)
-    if image is None or state.texture_id is None:
-        return
-    width = widgets.steady_width()
-    imgui.image(
-        imgui.ImTextureRef(state.texture_id(image)),
-        imgui.ImVec2(width, width * image.size[1] / image.size[0]),
-        imgui.ImVec2(0, 1),
-        imgui.ImVec2(1, 0),
-    )
-    widgets.tooltip(f"What the patch that shot last sees, one colour per surface: {session.shooting.projection}")
-    if vanished:
-        widgets.facts("small", [("Smaller than a sample", f"{vanished:,} triangles")])
-        widgets.tooltip("They lie between the samples of this map, and are drawn as one sample each")
+def _solver(view: View, state: State) -> None:
+    """What the solver shows of its last work: one fold for each of its pictures, and facts below the last."""
+    for caption in view.session.family.pictures:
+        if not widgets.fold(caption):
+            continue
+        inspection = _inspection(view, state)
+        image = inspection.images.get(caption)
+        if image is None or state.texture_id is None:
+            continue
+        width = widgets.steady_width()
+        imgui.image(
+            imgui.ImTextureRef(state.texture_id(image)),
+            imgui.ImVec2(width, width * image.size[1] / image.size[0]),
+            imgui.ImVec2(0, 1),
+            imgui.ImVec2(1, 0),
+        )
+        if inspection.facts:
+            widgets.facts("solver", list(inspection.facts.items()))
 
 
-def _hemicube(session: Session, state: State) -> tuple[Any, int]:
-    """The picture of the last shot and the triangles that vanish in it, made anew a few times a second, and whenever the
-    textures behind it may be others.
-    """
-    shooting = session.shooting.as_dict().items()
-    source = session.lightmap, [value for name, value in shooting if name not in TREE]
-    state.hemicube_age += imgui.get_io().delta_time
-    if state.hemicube is None or state.hemicube[0] != source or state.hemicube_age >= REFRESH_SECONDS:
-        state.hemicube, state.hemicube_age = (source, session.hemicube_image(), session.vanished()), 0.0
-    return state.hemicube[1:]
+def _inspection(view: View, state: State) -> Any:
+    """With pictures, made anew a few times a second, and whenever the textures behind them may be others."""
+    session = view.session
+    source = session.lightmap, session.solver, session.options
+    state.inspected_age += imgui.get_io().delta_time
+    if state.inspected is None or state.inspected[0] != source or state.inspected_age >= REFRESH_SECONDS:
+        state.inspected, state.inspected_age = (source, session.solver.inspect(images=True)), 0.0
+    return state.inspected[1]
 
 
-def _surface(session: Session, picked: Picked) -> None:
-    materials = session.scene.materials
+def _surface(view: View, picked: Picked) -> None:
+    materials = view.session.scene.materials
     material = materials[picked.material].name if picked.material < len(materials) else str(picked.material)
     widgets.facts(
         "place",
@@ -72,7 +71,7 @@ def _surface(session: Session, picked: Picked) -> None:
             ("Material", material),
             ("Triangle", f"{picked.triangle}{' (back)' if picked.back else ''}, chart {picked.chart}"),
             ("Texel", f"{picked.texel[0]}, {picked.texel[1]} of facet {picked.facet}"),
-            ("Patch", f"{picked.patch[0]}, {picked.patch[1]} of {picked.patch_edge}×{picked.patch_edge} texels"),
+            *picked.facts.items(),
             ("Position [m]", widgets.triple(picked.position, 3)),
             ("Normal", widgets.triple(picked.normal, 3)),
             ("Area [m²]", widgets.number(picked.area)),
@@ -80,8 +79,8 @@ def _surface(session: Session, picked: Picked) -> None:
     )
 
 
-def _light(session: Session, picked: Picked) -> None:
-    right = session.reference_at(picked.texel) if picked.area > 0 else None
+def _light(view: View, picked: Picked) -> None:
+    right = view.session.compared.irradiance_at(picked.texel) if picked.area > 0 else None
     rows = (
         ("B", picked.B, "radiosity: all light that leaves"),
         ("E", picked.E, "exitance of its own"),

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from imgui_bundle import imgui
 
+from app.lightmap.options import QUADTREE
 from app.render.tone_mapping import encode_srgb
 from app.ui import theme, widgets
 from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
-    from app.session.session import Session
+    from app.session.view import View
 
 TALL_EM = 53.0  # a window in which the whole panel has room
 ROWS_SHOWN = 5  # of the material list before it scrolls
@@ -23,15 +24,15 @@ PICKER = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.no_inputs | img
 STRONGEST = 1e5  # W/(sr m²), end of the slider: the sun's disc is brighter, lamps are not
 
 
-def draw(session: Session, state: State) -> None:
+def draw(view: View, state: State) -> None:
     """The whole panel."""
-    _statistics(session, state)
+    _statistics(view, state)
     widgets.section("Materials")
-    _list(session, state)
-    if state.material < len(session.scene.materials):
-        _editor(session, state, session.scene.materials[state.material])
+    _list(view, state)
+    if state.material < len(view.session.scene.materials):
+        _editor(view, state, view.session.scene.materials[state.material])
     if widgets.fold("Texels", opened=has_room()):
-        _atlas(session, state)
+        _atlas(view, state)
 
 
 def has_room() -> bool:
@@ -39,17 +40,17 @@ def has_room() -> bool:
     return imgui.get_main_viewport().size.y > TALL_EM * imgui.get_font_size()
 
 
-def _statistics(session: Session, state: State) -> None:
+def _statistics(view: View, state: State) -> None:
     """Counts in two columns, and the warnings of loading."""
     stats = state.stats
     assert stats is not None
-    tile = session.charts.tile
+    tile = view.session.charts.tile
     counts = (
         ("Triangles", f"{stats.triangles:,}", "after repair"),
         ("Charts", f"{stats.charts:,}", "pieces of surface that unfold together"),
         ("Texels", f"{stats.texels:,}", "that cover a surface"),
         ("Tiles", f"{stats.tiles:,}", f"of {tile}×{tile} texels"),
-        ("Density", f"{widgets.number(session.charts.density, 3)}/m", "texels per metre that was aimed at"),
+        ("Density", f"{widgets.number(view.session.charts.density, 3)}/m", "texels per metre that was aimed at"),
         ("Memory", f"{widgets.number(stats.memory_mib, 3)} MiB", "of the texels on the GPU"),
     )
     if imgui.begin_table("statistics", 4, imgui.TableFlags_.sizing_stretch_prop):
@@ -60,28 +61,32 @@ def _statistics(session: Session, state: State) -> None:
             imgui.table_next_column()
             imgui.text_unformatted(value)
         imgui.end_table()
-    warnings = (*session.scene.warnings, *session.charts.warnings)
+    warnings = (*view.session.scene.warnings, *view.session.charts.warnings)
     if warnings and imgui.tree_node(f"{len(warnings)} warning{'s' * (len(warnings) > 1)}###warnings"):
         for warning in warnings:
             widgets.wrapped(warning, theme.AMBER)
         imgui.tree_pop()
 
 
-def _atlas(session: Session, state: State) -> None:
+def _atlas(view: View, state: State) -> None:
     """How finely surfaces are cut; takes hold with the button, since it takes a while. The draft stays until then."""
-    draft = session.atlas if state.atlas is None else state.atlas
+    session = view.session
+    atlas = session.atlas if state.atlas is None else state.atlas
+    light = session.light if state.adaptive is None else session.light.replace(adaptive=state.adaptive)
     assert state.stats is not None
     starts = {"density": float(session.charts.density), "texels": state.stats.texels}
-    draft = state.atlas = widgets.edit_options(draft, starts=starts)
-    if draft != session.atlas:
+    atlas = state.atlas = widgets.edit_options(atlas, starts=starts)
+    light = widgets.edit_options(light, skip=("storage", *QUADTREE))
+    state.adaptive = light.adaptive
+    if (atlas, light) != (session.atlas, session.light):
         imgui.begin_disabled(session.loading is not None)
         if imgui.button("Cut anew", imgui.ImVec2(-1, 0)):
-            state.act(lambda: session.set_atlas(draft))
+            state.act(lambda: session.cut_anew(atlas, light))
         imgui.end_disabled()
 
 
-def _list(session: Session, state: State) -> None:
-    materials = session.scene.materials
+def _list(view: View, state: State) -> None:
+    materials = view.session.scene.materials
     height = min(len(materials), ROWS_SHOWN) * imgui.get_text_line_height_with_spacing()
     imgui.begin_child("materials", imgui.ImVec2(0, height))
     clipper = imgui.ListClipper()
@@ -106,11 +111,11 @@ def _row(state: State, index: int, material: Any) -> None:
     imgui.pop_id()
 
 
-def _editor(session: Session, state: State, material: Any) -> None:
+def _editor(view: View, state: State, material: Any) -> None:
     index = state.material
     edited = dataclasses.replace(material, albedo=_albedo(material), emission=_emission(state, material))
     if (edited.albedo, edited.emission) != (material.albedo, material.emission):
-        state.act(lambda: session.set_material(index, edited))
+        state.act(lambda: view.session.set_material(index, edited))
     notes = [f"{word} texture" for word in ("albedo", "emission") if getattr(material, f"{word}_texture") is not None]
     if material.double_sided:
         notes.append("both sides")

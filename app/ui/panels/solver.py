@@ -1,4 +1,4 @@
-"""Solver: run, pause, one shot, restart; how fast; the knobs; and the energy book."""
+"""Solver: which one; run, pause, one step, restart; how fast; its options; and the energy balance."""
 
 from __future__ import annotations
 
@@ -6,42 +6,56 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.options import specs
-from app.solvers import TREE
+from app.lightmap.options import QUADTREE
+from app.solvers import SOLVERS
 from app.ui import theme, widgets
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.session.session import Session
+    from app.session.view import View
 
 ICONS = theme.ICONS
 BAR_EM = 0.5  # height of the bars
 
 
-def draw(session: Session, state: State) -> None:
+def draw(view: View, state: State) -> None:
     """The whole panel."""
-    assert state.stats is not None
-    _buttons(session, state, done=state.stats.converged)
+    session, stats = view.session, state.stats
+    assert stats is not None
+    _choice(view, state)
+    _buttons(view, state, done=stats.converged)
     _progress(state)
-    edited = session.shooting
-    if session.atlas.adaptive:
+    light = session.light
+    if light.adaptive:
         widgets.section("Quadtree")
-        _leaves(session, state)
-        edited = widgets.edit_options(edited, skip=(spec.name for spec in specs(type(edited)) if spec.name not in TREE))
+        _leaves(state)
+        light = widgets.edit_options(light, skip=("adaptive", "storage"))
     widgets.section("Pace")
     state.pace = widgets.edit_options(state.pace)
     widgets.section("Energy [W]")
     _energy(state)
-    widgets.section("Shooting")
-    assert state.stats is not None
-    edited = widgets.edit_options(
-        edited, skip=TREE, starts={"level": state.stats.level, "resolution": state.stats.resolution}
-    )
-    if edited is not session.shooting:
-        state.act(lambda: session.set_shooting(edited))
+    widgets.section(session.family.title)
+    options = widgets.edit_options(session.options, starts=stats.resolved)
+    light = widgets.edit_options(light, skip=("adaptive", *QUADTREE))
+    if options is not session.options:
+        state.act(lambda: session.set_options(options))
+    if light is not session.light:
+        state.act(lambda: session.set_light(light))
 
 
-def _leaves(session: Session, state: State) -> None:
+def _choice(view: View, state: State) -> None:
+    """Which solver it is; another one can be chosen while it runs."""
+    names = list(SOLVERS)
+    widgets.labelled("Solver")
+    now = names.index(view.session.solver_name)
+    imgui.set_next_item_width(-1)
+    changed, chosen = imgui.combo("##solver", now, [SOLVERS[name].title for name in names])
+    widgets.tooltip(view.session.family.help)
+    if changed and chosen != now:
+        state.act(lambda: view.session.set_solver(names[chosen]))
+
+
+def _leaves(state: State) -> None:
     """How many leaves there are, and what they spare."""
     stats = state.stats
     assert stats is not None
@@ -50,53 +64,56 @@ def _leaves(session: Session, state: State) -> None:
     imgui.same_line()
     right(widgets.percent(share), theme.DIM)
     widgets.tooltip(f"Of the {stats.uniform_texels:,} texels that the finest level everywhere would take")
-    if not session.solver.grown:
+    if stats.refining:
         widgets.dim("leaves are changing")
-    elif session.solver.note is not None:
-        widgets.wrapped(session.solver.note, theme.AMBER)
+    elif stats.note is not None:
+        widgets.wrapped(stats.note, theme.AMBER)
 
 
-def _buttons(session: Session, state: State, *, done: bool) -> None:
+def _buttons(view: View, state: State, *, done: bool) -> None:
+    session = view.session
     spacing = imgui.get_style().item_spacing.x
     width = (imgui.get_content_region_avail().x - 2 * spacing) / 3
     size = imgui.ImVec2(width, 0)
-    text = f"{ICONS.ICON_FA_PAUSE} Pause" if session.running else f"{ICONS.ICON_FA_PLAY} Run"
+    text = f"{ICONS.ICON_FA_PAUSE} Pause" if session.run.running else f"{ICONS.ICON_FA_PLAY} Run"
     imgui.begin_disabled(done)
     if imgui.button("Converged###run" if done else f"{text}###run", size):
-        toggle(session)
+        toggle(view)
     imgui.end_disabled()
-    widgets.tooltip("As little is left to shoot as Residual asks for, below" if done else "Space")
+    widgets.tooltip(
+        f"As little remains as {widgets.title(session.family.threshold)} asks for, below" if done else "Space"
+    )
     imgui.same_line()
-    if imgui.button("One shot", size):
-        session.running = False
-        state.act(session.shoot)
-    widgets.tooltip("Pause and shoot once: . (full stop)")
+    if imgui.button("One step", size):
+        session.run.running = False
+        state.act(session.work)
+    widgets.tooltip(f"Pause and go one step in {session.family.unit}: . (full stop)")
     imgui.same_line()
     if imgui.button(f"{ICONS.ICON_FA_ROTATE_LEFT} Restart", size):
         state.act(session.restart)
     widgets.tooltip("Forget all light and begin again: R")
 
 
-def toggle(session: Session) -> None:
+def toggle(view: View) -> None:
     """Run or pause."""
-    session.running = not session.running
+    view.session.run.running = not view.session.run.running
 
 
 def _progress(state: State) -> None:
     stats = state.stats
     assert stats is not None
-    share = min(max(0.0, 1.0 - stats.residual), 1.0)  # 0 where the residual is no number
+    share = min(max(0.0, 1.0 - stats.remaining), 1.0)  # 0 where it is no number
     imgui.progress_bar(share, imgui.ImVec2(-1, imgui.get_font_size() * BAR_EM), "")
-    widgets.tooltip("Power that has been shot, of the power emitted")
-    left = widgets.percent(stats.residual)
-    imgui.text_unformatted(f"converged, {left} unshot" if stats.converged else f"{left} still to shoot")
-    rate = f", {widgets.number(stats.shots_per_second, 3)}/s" if state.measured and not stats.converged else ""
+    left = f"{widgets.percent(stats.remaining)} {stats.remains}"
+    widgets.tooltip(f"What is done; {left}")
+    imgui.text_unformatted(f"converged, {left}" if stats.converged else left)
+    rate = f", {widgets.number(stats.per_second, 3)}/s" if state.measured and not stats.converged else ""
     imgui.same_line()
-    right(f"{stats.shots:,} shots{rate}", theme.DIM)
-    if stats.edit_shots is not None:
-        fresh = "" if stats.fresh_shots is None else f", from nothing {stats.fresh_shots:,}"
-        widgets.dim(f"the edit: {stats.edit_shots:,} shots{fresh}")
-        widgets.tooltip("Only the difference that an edit makes is shot, negative where light goes")
+    right(f"{stats.done:,} {stats.unit}{rate}", theme.DIM)
+    if stats.edit_work is not None:
+        fresh = "" if stats.fresh_work is None else f", from nothing {stats.fresh_work:,}"
+        widgets.dim(f"the edit: {stats.edit_work:,} {stats.unit}{fresh}")
+        widgets.tooltip("Only the difference that an edit makes is solved for, negative where light goes")
 
 
 def _energy(state: State) -> None:
@@ -119,7 +136,7 @@ def _energy(state: State) -> None:
             imgui.table_next_column()
             right(widgets.percent(power / stats.emitted if stats.emitted > 0 else 0.0))
         imgui.end_table()
-    widgets.dim(f"books off by {widgets.percent(abs(stats.imbalance))}")
+    widgets.dim(f"energy imbalance {widgets.percent(abs(stats.imbalance))}")
     widgets.tooltip("Emitted must equal absorbed + escaped + residual; the difference, of the power emitted")
 
 

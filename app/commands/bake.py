@@ -1,0 +1,75 @@
+"""``glowtree bake``: solve and write scene.glb, irradiance.exr and report.json."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import itertools
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from app.bake import prepare_directory, write_bake
+from app.commands.report import report, summary
+from app.commands.steps import open_scene, session_options, solve
+from app.errors import UserError
+from app.gpu import gpu_context
+from app.lightmap.collapse import collapse
+from app.session.session import Session
+from app.util.console import Console
+
+__all__ = ["bake"]
+
+
+def bake(flags: argparse.Namespace) -> int:
+    """Solve and write scene.glb, irradiance.exr and report.json. Raises UserError."""
+    console = Console(quiet=flags.json)
+    with _folder(flags.output), gpu_context() as gpu:
+        session = Session(gpu, **session_options(flags))
+        open_scene(session, flags.scene, console)
+        failure = solve(session, flags, console)
+        whole = failure is not None or session.run.interrupted or _estimate(session, console)
+        clock = time.perf_counter()
+        lightmap = session.lightmap
+        irradiance, covered = collapse(lightmap.pool, lightmap.irradiance(ambient=True))
+        session.load_seconds["read back"] = time.perf_counter() - clock
+        finite = np.asarray(np.isfinite(irradiance).all(-1))
+        lost = int((covered & ~finite).sum())
+        result = report(session) | {"texels_not_finite": lost}
+        irradiance = np.where(finite[..., None], np.maximum(irradiance, 0), np.float32(0))  # no light is still owed
+        files = write_bake(flags.output, session.scene, session.charts, irradiance, covered & finite, result)
+        line = summary(session, result)
+        session.release()
+    if failure is not None:
+        raise UserError(f"{failure}; {flags.output} has the light of all texels but {lost}")
+    result = {"output": [str(path) for path in vars(files).values()], **result}
+    console.result(result, f"{flags.output}: {line}")
+    return 130 if result["interrupted"] or not whole else 0
+
+
+def _estimate(session: Session, console: Console) -> bool:
+    """Work out how far off the light is expected to be. False where Ctrl-C goes without."""
+    clock = time.perf_counter()
+    try:
+        with console.progress("gathering") as tell:
+            session.estimate_now(lambda share: tell("the error that is expected", share))
+    except KeyboardInterrupt:
+        console.warn("stopped: nothing is said of the error that is expected")
+        return False
+    session.load_seconds["expected error"] = time.perf_counter() - clock
+    return True
+
+
+@contextlib.contextmanager
+def _folder(path: Path) -> Iterator[None]:
+    """A folder that can be written to; what was made of it is gone again if nothing came of it. Raises UserError."""
+    made = list(itertools.takewhile(lambda folder: not folder.exists(), (path, *path.parents)))
+    prepare_directory(path)
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):  # not empty: that is the normal case
+            for folder in made:
+                folder.rmdir()

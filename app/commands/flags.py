@@ -1,0 +1,106 @@
+"""Flags that several commands share, and how their values are read."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+from app.atlas.options import AtlasOptions
+from app.lightmap.options import LightmapOptions
+from app.options import add_flags
+from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
+
+DEFAULT_SCENE = "cornell-box"
+ALIKE = 0.75  # share of letters in common that makes a flag a likely slip for another; all begin with the same dashes
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse, with errors on one line. A flag must be written out, and one that is unknown is named with the nearest."""
+
+    def __init__(self, **keywords: Any) -> None:
+        super().__init__(**keywords, allow_abbrev=False)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        flags, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            known = re.findall(r"--[\w-]+", self.format_usage())
+            close = difflib.get_close_matches(unknown[0].split("=")[0], known, n=1, cutoff=ALIKE)
+            self.error(f"unknown argument {unknown[0]}" + (f"; did you mean {close[0]}?" if close else ""))
+        return flags, unknown
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def scene_flags(parser: Parser, *, optional: bool = False) -> None:
+    help = "a file (.glb .gltf .obj .ply .stl .toml) or the name of a scene"
+    if optional:
+        parser.add_argument("scene", nargs="?", default=DEFAULT_SCENE, help=f"{help} (default {DEFAULT_SCENE})")
+    else:
+        parser.add_argument("scene", help=help)
+    parser.add_argument("--light", action="store_true", help="add a ceiling light")
+    add_flags(parser, AtlasOptions)
+
+
+def solver_flags(parser: Parser, family: Family) -> None:
+    """Which solver, its options, and how light is held."""
+    help = "; ".join(f"{name}: {row.help}" for name, row in SOLVERS.items())
+    parser.add_argument(
+        "--solver", choices=tuple(SOLVERS), default=DEFAULT_SOLVER, help=f"{help} (default %(default)s)"
+    )
+    add_flags(parser, family.options)
+    add_flags(parser, LightmapOptions)
+
+
+def output_flag(parser: Parser, what: str, help: str) -> None:
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar=what, help=help)
+
+
+def reference_flag(parser: Parser) -> None:
+    help = "a bake of the same scene, to compare with: the error, and --layer error and --show"
+    parser.add_argument("--reference", type=Path, metavar="DIR", help=help)
+
+
+def size_flag(parser: Parser, what: str) -> None:
+    default = (1280, 720)
+    help = f"{what} size (default {default[0]}x{default[1]})"
+    parser.add_argument("--size", type=_size, default=default, metavar="WxH", help=help)
+
+
+def json_flag(parser: Parser) -> None:
+    parser.add_argument("--json", action="store_true", help="print JSON instead of text")
+
+
+def stop_flags(parser: Parser, family: Family) -> None:
+    stop = parser.add_argument_group(f"stop (whichever comes first; --{family.threshold} is always on)")
+    after = f"after N {family.unit}"
+    stop.add_argument(f"--{family.unit}", dest="work", type=positive(int), metavar="N", help=after)
+    stop.add_argument("--time", type=positive(float), metavar="S", help="after S seconds of solving")
+
+
+# -- values ------------------------------------------------------------------------------------------------------------
+
+
+def positive(kind: type[int] | type[float]) -> Callable[[str], float]:
+    def read(text: str) -> float:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = kind(0)
+        if not 0 < value < 1e12:
+            raise argparse.ArgumentTypeError(f"{text}: must be a {'whole ' if kind is int else ''}number above 0")
+        return value
+
+    return read
+
+
+def _size(text: str) -> tuple[int, int]:
+    sides = re.fullmatch(r"(\d{1,6})x(\d{1,6})", text.lower(), re.ASCII)
+    width, height = map(int, sides.groups()) if sides else (0, 0)
+    if not (16 <= width <= 16384 and 16 <= height <= 16384):
+        raise argparse.ArgumentTypeError(f"{text}: must be WIDTHxHEIGHT, each 16 to 16384")
+    return width, height

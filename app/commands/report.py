@@ -1,0 +1,72 @@
+"""What a solve came to, for people and for programs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from app import __version__
+from app.session.session import Session
+
+__all__ = ["notes", "report", "summary"]
+
+
+def report(session: Session) -> dict[str, Any]:
+    """Everything that shaped the solution and what came of it."""
+    stats, balance, run = session.stats, session.run.energy, session.run
+    return {
+        "glowtree": __version__,
+        "scene": session.name,
+        "source": str(session.source),
+        "renderer": session.gpu.limits.renderer,
+        "gl_version": session.gpu.limits.version,
+        "parameters": session.parameters,
+        "charts": {"count": stats.charts, "method": session.charts.method, "texels_per_metre": session.charts.density},
+        "triangles": stats.triangles,
+        "texels": stats.texels,
+        "atlas": list(session.charts.size),
+        "memory_mib": stats.memory_mib,
+        stats.unit: stats.done,
+        session.family.threshold: stats.remaining,
+        "converged": stats.converged,
+        "interrupted": run.interrupted,
+        "seconds": {**session.load_seconds, "shoot": stats.seconds},
+        "energy_w": {
+            name: [float(x) for x in getattr(balance, name)]
+            for name in ("emitted", "absorbed", "escaped", "unshot", "imbalance")
+        },
+        "imbalance": stats.imbalance,
+        **_error(session),
+        **({} if session.expected is None else {"expected_error": session.expected._asdict()}),
+        "warnings": [*session.scene.warnings, *session.charts.warnings, *notes(session)],
+    }
+
+
+def _error(session: Session) -> dict[str, Any]:
+    """Against the reference, at random points; nothing without one."""
+    comparison = session.compared.comparison
+    if comparison is None or comparison.error is None:
+        return {}
+    light = comparison.light
+    known = {"reference": light.name, "reference_texels": light.texels, "reference_residual": light.unshot}
+    return {"error": known | {"points": comparison.lit} | comparison.error._asdict()}
+
+
+def notes(session: Session) -> list[str]:
+    """What the solver has to say of the solution."""
+    note = session.run.progress.note
+    return [] if note is None else [note]
+
+
+def summary(session: Session, result: dict[str, Any]) -> str:
+    """One line of it."""
+    stats = session.stats
+    error = result.get("error")
+    compared = "" if error is None else f", off by {error['rms']:.2%} RMS and {error['median']:.2%} in the median"
+    expected = result.get("expected_error")
+    if expected is not None:
+        compared += f", expected to be off by {expected['rms']:.1%} RMS and {expected['median']:.1%} in the median"
+    state = "stopped early" if result["interrupted"] else "converged" if result["converged"] else "stopped as asked"
+    return (
+        f"{stats.done} {stats.unit} in {stats.seconds:.1f} s, {stats.remaining:.2%} {stats.remains} ({state}), "
+        f"{result['texels']} texels, energy imbalance {result['imbalance']:+.2%}{compared}, {result['renderer']}"
+    )

@@ -1,0 +1,70 @@
+"""What commands have in common: a session as the flags ask for it, opened and solved with progress on the terminal."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from app.atlas.options import AtlasOptions
+from app.commands.report import notes
+from app.errors import UserError
+from app.lightmap.options import LightmapOptions
+from app.options import from_flags
+from app.render.layers import LAYER_SHADERS
+from app.render.options import DisplayOptions
+from app.scene.load import NO_LIGHT
+from app.session.run import NotFiniteError, Stop
+from app.session.session import Session
+from app.session.stats import Stats
+from app.solvers import SOLVERS
+from app.util.console import Console
+
+__all__ = ["check_reference", "open_scene", "session_options", "solve"]
+
+
+def session_options(flags: argparse.Namespace) -> dict[str, Any]:
+    """What the flags say, as a Session takes it."""
+    return {
+        "solver": flags.solver,
+        "options": from_flags(SOLVERS[flags.solver].options, flags),
+        "atlas": from_flags(AtlasOptions, flags),
+        "light": from_flags(LightmapOptions, flags),
+        "default_light": getattr(flags, "light", False),
+    }
+
+
+def check_reference(flags: argparse.Namespace) -> None:
+    """Raise UserError for what cannot be shown without a reference."""
+    display = from_flags(DisplayOptions, flags)
+    for name, asks in (("layer", LAYER_SHADERS[display.layer].compares), ("show", display.show != "solution")):
+        if asks and flags.reference is None:
+            raise UserError(f"--{name} {getattr(display, name)}: needs a --reference")
+
+
+def open_scene(
+    session: Session, scene: str, console: Console, note: str | None = None, *, needs_light: bool = True
+) -> None:
+    """Load, and say what there is to say. Raises UserError for a scene that needs light and has none."""
+    with console.progress("loading") as tell:
+        session.open_now(scene, tell)
+    if needs_light and not session.scene.emits:
+        raise UserError(f"{scene}: {NO_LIGHT}")
+    for warning in (*([note] if note else []), *session.scene.warnings, *session.charts.warnings):
+        console.warn(warning)
+
+
+def solve(session: Session, flags: argparse.Namespace, console: Console) -> NotFiniteError | None:
+    """Solve. What broke the light is returned: what there is can still be written."""
+    stop = Stop(work=flags.work, seconds=flags.time)
+
+    def say(stats: Stats) -> None:
+        tell(f"{stats.done} {stats.unit}, {stats.remaining:.3%} {stats.remains}", session.run.share_done(stop))
+
+    with console.progress(session.family.title.lower()) as tell:
+        try:
+            session.solve(stop, say)
+        except NotFiniteError as error:
+            return error
+    for note in notes(session):
+        console.warn(note)
+    return None

@@ -1,0 +1,219 @@
+"""A solver at work: paced in a window, or from the first piece of work to the last without one.
+
+A run knows how long its solver has worked, how far it is, where the energy is, and how it came there. It draws nothing.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from app.errors import UserError
+from app.gpu import Gpu
+from app.scene.model import Material
+from app.session.energy import Effort, EnergyWatch
+from app.session.history import History
+from app.session.pacing import Pacer
+from app.solvers import EnergyBalance, Family, Progress, Solver
+from app.util.parts import run_to_end
+
+TELL_SECONDS = 0.2  # between two calls of progress
+NEARLY = 0.99  # done, by what remains: something else may still change
+NO_LIMIT = 1 << 30  # of work: a piece of it ends at its solver's own batch
+
+
+class NotFiniteError(UserError):
+    """The light has become infinite or no number."""
+
+
+@dataclass(frozen=True)
+class Stop:
+    """When a solve ends, besides when it has converged; whichever comes first. work: in the solver's unit."""
+
+    work: int | None = None
+    seconds: float | None = None
+
+
+class Run:
+    """The solve of the open scene. ``begin`` gives it a solver; it releases nothing.
+
+    running: whether ``advance`` works. seconds: of solving. interrupted: whether Ctrl-C ended the last ``solve``.
+    settled: whether progress, energy and history are those of the last piece of work.
+    """
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self.running, self.interrupted, self.settled = True, False, True
+        self.seconds = 0.0
+        self.history, self.effort = History(), Effort()
+        self.solver: Solver[Any]
+        self.family: Family
+        self.progress = Progress(0, 1.0, np.zeros(3))
+        self._pace, self._energy = Pacer(gpu), EnergyWatch()
+        self._message: Callable[[str], str] = str
+
+    def begin(self, solver: Solver[Any], family: Family, message: Callable[[str], str]) -> None:
+        """With another solver, from the light that there is now. message: of a solve whose light is
+        not finite after so much work."""
+        self.solver, self.family, self._message = solver, family, message
+        self._energy.begin(solver.energy())
+        self._start_clock()
+
+    def restart(self) -> None:
+        """Forget all light and begin again."""
+        self.solver.reset()
+        self._begin_again()
+
+    def _begin_again(self) -> None:
+        self._energy.begin_again()
+        self._start_clock()
+
+    def _start_clock(self) -> None:
+        self.seconds, self.settled = 0.0, True
+        self.effort.begin()
+        self._pace.begin()
+        self._gpu.timers.reset()
+        self.history = History()
+        self.progress = self.solver.poll()
+        self.history.add(0, 0.0, self.progress.remaining, 0.0)
+
+    # -- edits ---------------------------------------------------------------------------------------------------------
+
+    def options_changed(self) -> None:
+        """Other options of the solver, or of the leaves of its lightmap: what is left to do may be another."""
+        self.effort.options_changed()
+        self.progress = self.solver.poll()
+
+    def set_materials(self, materials: tuple[Material, ...]) -> None:
+        """Other albedos and emissions: the light that is there stays where the solver can solve for the difference."""
+        converged = self.converged
+        self.solver.set_materials(materials)
+        self.progress = self.solver.poll()
+        if self.solver.issued == 0:
+            self._begin_again()
+        else:
+            self.effort.edited(self.solver.issued, converged=converged)
+        self.history.add(self.solver.issued, self.seconds, self.progress.remaining, self.escaped_share)
+        self._energy.edited()
+        self.settled = False
+
+    # -- where it stands -----------------------------------------------------------------------------------------------
+
+    @property
+    def energy(self) -> EnergyBalance:
+        """The last energy balance that was measured."""
+        return self._energy.balance
+
+    @property
+    def converged(self) -> bool:
+        return self.progress.converged
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether ``advance`` has something to do."""
+        return self.running and not self.converged
+
+    @property
+    def escaped_share(self) -> float:
+        return float(self.progress.escaped.sum()) / max(float(self.energy.emitted.sum()), 1e-300)
+
+    def share_done(self, stop: Stop) -> float:
+        """Of a solve: of the work or seconds asked for, or of the decades of what remains down to the threshold, 0 to 1."""
+        threshold = min(float(getattr(self.solver.options, self.family.threshold)), 0.999999)
+        remaining = min(max(self.progress.remaining, 1e-12), 1.0)
+        shares = [1.0 if self.converged else min(float(np.log(remaining) / np.log(threshold)), NEARLY)]
+        if stop.work is not None:
+            shares.append(self.solver.issued / stop.work)
+        if stop.seconds is not None:
+            shares.append(self.seconds / stop.seconds)
+        return float(min(max(shares), 1.0))
+
+    # -- in a window ---------------------------------------------------------------------------------------------------
+
+    def advance(self, budget_ms: float, amount: int, *, interactive: bool) -> int:
+        """Do up to so much work within ``budget_ms``, see ``Pacer.advance``; how much was issued."""
+        self.settled = False
+        made = self._pace.advance(self.solver, budget_ms, amount, interactive=interactive)
+        self.seconds += self._pace.lap()
+        return made
+
+    def work(self, amount: int) -> int:
+        """Up to so much work, of one batch at most, also when paused or converged; how much was issued."""
+        self.settled = False
+        return run_to_end(self.solver.work(amount))
+
+    def poll(self, *, energy: bool = True, wait: bool = False) -> bool:
+        """Take in what the solver reports, with ``wait`` up to its last piece of work; the energy balance now and then, and once
+        when solving has stopped. Whether that took long. Raises NotFiniteError and pauses."""
+        before, slow = self.progress.done, False
+        self.progress = self.solver.poll(wait=wait)
+        if self.running and not np.isfinite(self.progress.remaining):
+            self.running = False
+            raise self._not_finite()
+        if not self.goes_on:
+            self._pace.pause()
+            if energy and self._energy.idle and not self.settled:
+                slow = True
+                self.settle()
+        elif energy and self._energy.due:
+            slow = True
+            self._energy.measure(self.solver)
+        if self.converged:
+            self.effort.converged(self.progress.done)
+        if self.progress.done != before and not self.settled:
+            self.history.add(self.progress.done, self.seconds, self.progress.remaining, self.escaped_share)
+        return slow
+
+    def settle(self) -> None:
+        """Wait for the GPU and bring progress, energy and history up to the last piece of work. Raises NotFiniteError, once."""
+        known = np.isfinite(self.progress.remaining)
+        self.progress = self.solver.settle()
+        self._energy.measure(self.solver)
+        self.settled = True
+        if self.energy.emitted.sum() > 0:
+            self.history.add(self.solver.issued, self.seconds, self.progress.remaining, self.escaped_share)
+            if known and not np.isfinite(self.progress.remaining + float(self.energy.absorbed.sum())):
+                raise self._not_finite()
+
+    # -- without a window ----------------------------------------------------------------------------------------------
+
+    def solve(self, stop: Stop, tell: Callable[[], None] | None = None) -> None:
+        """Work until ``stop``, or until converged; ``tell`` is called a few times a second. Ctrl-C ends it early and is noted as
+        ``interrupted``. Raises NotFiniteError; progress and energy are those of the last piece of work then, too."""
+        start, failure = time.perf_counter(), None
+        self.interrupted = False
+        try:
+            self._solve(stop, start, tell)
+        except KeyboardInterrupt:
+            self.interrupted = True
+        except NotFiniteError as error:
+            failure = error
+        self._gpu.ctx.finish()
+        self.seconds = time.perf_counter() - start
+        self.settle()
+        if failure is not None:
+            raise failure
+
+    def _solve(self, stop: Stop, start: float, tell: Callable[[], None] | None) -> None:
+        told = start
+        while not self.converged:
+            left = NO_LIMIT if stop.work is None else stop.work - self.solver.issued
+            if left <= 0 and stop.work is not None:
+                self.poll(energy=False, wait=True)  # some of the work issued may have come to nothing
+                left = stop.work - self.solver.issued
+            spent = time.perf_counter() - start
+            if left <= 0 or (stop.seconds is not None and spent >= stop.seconds):
+                break
+            self.work(left)
+            self.seconds = time.perf_counter() - start
+            self.poll(energy=False)
+            if tell and time.perf_counter() - told > TELL_SECONDS:
+                told = time.perf_counter()
+                tell()
+
+    def _not_finite(self) -> NotFiniteError:
+        return NotFiniteError(self._message(f"{self.progress.done} {self.family.unit}"))

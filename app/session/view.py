@@ -1,0 +1,142 @@
+"""What is seen of a session: pictures, what lies under a pixel, and the atlas.
+
+A view has a session, never the reverse: a session that bakes or measures has none, and no renderer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from app.gpu import Framebuffer, Texture
+from app.lightmap.lightmap import Lightmap
+from app.render.camera import CameraView
+from app.render.exposure import exposure_of
+from app.render.false_colour import Scale
+from app.render.frame import FrameRenderer
+from app.render.layers import LAYER_SHADERS
+from app.render.options import DisplayOptions
+from app.render.pick import with_texel
+from app.render.resolve import Reference
+from app.render.surfaces import Rect
+from app.scene.model import Camera
+from app.session.picking import Picked, picked_from_hit
+from app.session.session import Session
+
+LAST_WORK = "last shooter"  # the rectangle of an Inspection that ``display.last_shooter`` marks
+
+
+class View:
+    """A camera in the open scene, how its light is displayed, and the renderer. Whoever makes it releases it, before the session.
+
+    camera: set when a scene opens.
+    """
+
+    def __init__(self, session: Session, display: DisplayOptions | None = None) -> None:
+        self.session, self.display = session, display or DisplayOptions()
+        self.camera: CameraView
+        self._renderer = FrameRenderer(session.gpu)
+        session.follow(self._prepare, self._opened)
+
+    def _prepare(self, lightmap: Lightmap) -> Callable[[], None]:
+        self._renderer.prepare(lightmap, self.display.interpolation)
+        return self._renderer.give_up
+
+    def _opened(self, exposure: float | None, *, same_scene: bool, reference_gone: bool) -> None:
+        """Another lightmap is open. exposure: that its light will need [EV], where it is known."""
+        if not same_scene:
+            self.look_through(self.session.scene.cameras[0])
+        if exposure is not None:
+            self.display = self.display.replace(exposure=exposure)
+        if reference_gone:
+            self.display = self._without_reference
+
+    # -- the camera ----------------------------------------------------------------------------------------------------
+
+    def look_through(self, camera: Camera) -> None:
+        """Stand where a camera of the scene stands; orbit around the scene's middle from there."""
+        centre = self.session.lightmap.space.centre
+        distance = float(np.linalg.norm(np.asarray(camera.world_from_camera)[:3, 3] - centre))
+        self.camera = CameraView.from_camera(camera, distance)
+
+    # -- pictures ------------------------------------------------------------------------------------------------------
+
+    def draw(
+        self,
+        target: Framebuffer,
+        size: tuple[int, int],
+        *,
+        scale: Scale | None = None,
+        samples: int = 1,
+        whole: bool = True,
+    ) -> None:
+        """The picture of the solution as it is now; if not ``whole``, brought up to date over several frames."""
+        self._renderer.render(
+            target,
+            size,
+            self.session.lightmap,
+            self.camera,
+            self.shown,
+            reference=self._reference(whole=whole),
+            shooter=self._last_shooter,
+            scale=scale,
+            samples=samples,
+            whole=whole,
+        )
+
+    def expose(self) -> None:
+        """Set the exposure from the light of the scene."""
+        balance = self.session.run.energy
+        mean_residual = balance.unshot / max(balance.area, 1e-300)
+        self.display = self.display.replace(exposure=exposure_of(self.session.lightmap, mean_residual))
+
+    def atlas_image(self, size: tuple[int, int], *, turned: bool = False) -> Texture | None:
+        """The virtual atlas with what was drawn last, v up or to the right; None before the first picture."""
+        return self._renderer.atlas(self.session.lightmap, size, turned=turned)
+
+    @property
+    def _last_shooter(self) -> Rect | None:
+        """The patch that shot last, in atlas texels."""
+        return self.session.solver.inspect().rectangles.get(LAST_WORK) if self.display.last_shooter else None
+
+    # -- what lies under a pixel ---------------------------------------------------------------------------------------
+
+    def pick(self, x_px: int, y_px: int) -> Picked | None:
+        """What surface is at that pixel of the last frame, and the light on it."""
+        hit = self._renderer.pick(x_px, y_px)
+        return None if hit is None else picked_from_hit(self.session.lightmap, hit, self.session.solver)
+
+    def read_again(self, picked: Picked) -> Picked:
+        """The same point with its texel and light as they are now."""
+        lightmap = self.session.lightmap
+        return picked_from_hit(lightmap, with_texel(picked.hit, lightmap), self.session.solver)
+
+    # -- beside a reference --------------------------------------------------------------------------------------------
+
+    @property
+    def shown(self) -> DisplayOptions:
+        """The display options, as far as there is what they ask for."""
+        return self._without_reference if self.session.compared.comparison is None else self.display
+
+    def drop_reference(self) -> None:
+        """Show the solution alone again."""
+        self.session.compared.drop()
+        self.display = self._without_reference
+
+    @property
+    def _without_reference(self) -> DisplayOptions:
+        layer = self.display.layer
+        return self.display.replace(layer="combined" if LAYER_SHADERS[layer].compares else layer, show="solution")
+
+    def _reference(self, *, whole: bool) -> Reference | None:
+        """The light that is shown beside or instead of the solution's, and that errors are of."""
+        display, comparison = self.display, self.session.compared.comparison
+        if comparison is None:
+            return None
+        if display.show != "solution" or LAYER_SHADERS[display.layer].compares:
+            comparison.texels.follow(whole=whole)
+        return Reference(comparison.texels.texture, float(np.sqrt(3.0)) * comparison.dark)
+
+    def release(self) -> None:
+        self._renderer.release()
