@@ -1,9 +1,9 @@
-"""A scene solved from a program, without a session: what benches and hard cases drive."""
+"""A scene opened for a program, without a session: what benches and hard cases solve, see solvers/run.py."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from app.atlas.options import AtlasOptions
@@ -13,8 +13,7 @@ from app.lightmap.options import LightmapOptions
 from app.options import Options
 from app.scene.model import Scene
 from app.session.loading import load
-from app.solvers import DEFAULT_SOLVER, SOLVERS, Progress, Solver
-from app.util.parts import run_to_end
+from app.solvers import DEFAULT_SOLVER, SOLVERS, Solver
 
 
 @contextlib.contextmanager
@@ -37,10 +36,3 @@ def opened(
             made.release()
     finally:
         lightmap.release()
-
-
-def solve_until(solver: Solver[Any], batch: int, over: Callable[[Progress], bool]) -> None:
-    """Work, ``batch`` at a time, until ``over`` says so of the progress that has arrived; it is asked after each piece of work,
-    and before the first."""
-    while not over(solver.poll()):
-        run_to_end(solver.work(batch))
