@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.reference.form_factors import part_above_horizon, point_to_polygon
+from app.reference.line_of_sight import visible
 from app.reference.patches import Patches, make_patches, subdivide
-from app.reference.visibility import visible
 from app.scene.model import F64, Scene
 
 BLOCK = 1 << 16  # point–piece pairs at a time: about 50 MB

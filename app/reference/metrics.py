@@ -1,4 +1,4 @@
-"""How far values lie from a reference: one number each, with its formula.
+"""Metrics of error, how far values lie from a reference: one number each, with its formula.
 
 Values v and references r are arrays of one shape: (n,), or (n, 3) for linear Rec.709. The mean runs over all their
 numbers, channels included. ``local`` errors are one per point: |v - r| / |r| with |·| the length of the colour.
@@ -6,12 +6,21 @@ numbers, channels included. ``local`` errors are one per point: |v - r| / |r| wi
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 DARK = 1e-3  # share of the mean below which a point counts as dark
+
+
+class PointErrors(NamedTuple):
+    """Over lit points: relative RMS, bias of the mean, median and 90 % quantile of local errors [-]."""
+
+    rms: float
+    bias: float
+    median: float
+    q90: float
 
 
 def lit_points(reference: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -53,13 +62,16 @@ def median_local(value: ArrayLike, reference: ArrayLike) -> float:
     return quantile_local(value, reference, 0.5)
 
 
-def energy_imbalance(emitted: ArrayLike, absorbed: ArrayLike, escaped: ArrayLike, residual: ArrayLike) -> float:
-    """(absorbed + escaped + residual - emitted) / emitted, each the sum over its channels [W]. 0 if the books close.
-
-    NaN where nothing is emitted.
-    """
-    sums = [float(np.sum(np.asarray(x, np.float64))) for x in (emitted, absorbed, escaped, residual)]
-    return _ratio(sums[1] + sums[2] + sums[3] - sums[0], sums[0])
+def point_errors(value: NDArray[np.float64], reference: NDArray[np.float64]) -> PointErrors:
+    """Of colours (n, 3) at lit points; NaN where there are none, or where they are not finite."""
+    if not len(reference) or not np.isfinite(value).all():
+        return PointErrors(*[float("nan")] * 4)
+    return PointErrors(
+        relative_rms(value, reference),
+        bias(value, reference),
+        median_local(value, reference),
+        quantile_local(value, reference, 0.9),
+    )
 
 
 def _pair(value: ArrayLike, reference: ArrayLike) -> tuple[NDArray[Any], NDArray[Any]]:

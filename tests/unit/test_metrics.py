@@ -40,12 +40,6 @@ def test_colours_are_one_point():
 def test_black_references():
     np.testing.assert_array_equal(metrics.local_errors([0.0, 1.0], [0.0, 0.0]), [0.0, np.inf])
     assert math.isnan(metrics.relative_rms([1.0], [0.0]))
-    assert math.isnan(metrics.energy_imbalance(0, 0, 0, 0))
-
-
-def test_energy_imbalance():
-    assert metrics.energy_imbalance([3, 2, 1], [1, 1, 1], [1, 1, 0], [1, 0, 0]) == 0.0
-    assert metrics.energy_imbalance(10.0, 6.0, 2.0, 1.0) == pytest.approx(-0.1)
 
 
 def test_shapes_must_agree():

@@ -13,8 +13,8 @@ from app.reference.form_factors import (
     perpendicular_rectangles,
     point_to_polygon,
 )
+from app.reference.line_of_sight import visible
 from app.reference.patches import make_patches, subdivide, texture_at
-from app.reference.visibility import visible
 from app.scene.model import Material, Scene, Texture
 
 EXACT = 1e-9  # closed forms in 64-bit floats: rounding of some hundred operations, and nothing else

@@ -1,4 +1,4 @@
-"""Which random points of a scene are open: nothing lies right above them."""
+"""Random points that lie in narrow gaps, where a reference itself goes wrong: what is right above each."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.points import Points
-from app.reference.visibility import visible
+from app.reference.line_of_sight import visible
 from app.scene.model import Scene
 
 

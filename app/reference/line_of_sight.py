@@ -1,4 +1,4 @@
-"""Whether two points see each other: every segment against every triangle.
+"""Whether two points see each other, by brute force: every segment against every triangle.
 
 A segment crosses a triangle's plane at t = s/(s - e), s and e its ends' distances from the plane; it hits the triangle
 if the barycentric coordinates there, linear in t, are not negative. [Möller, Trumbore 1997] is the same in the order

@@ -1,4 +1,4 @@
-"""What errors are measured from: closed form, dense matrix and traced paths, the points that are left out, and the cache."""
+"""The reference irradiance that errors are measured from: closed form, dense matrix, traced paths, gaps, cache."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ import pytest
 from solver_scenes import grey, quads_scene, room
 
 from app.atlas.points import random_points
-from app.reference import truth
+from app.reference import irradiance
+from app.reference.closed_form import no_furnace
+from app.reference.gaps import open_above
+from app.reference.irradiance import ReferenceIrradiance
 from app.reference.metrics import relative_rms
 from app.reference.patches import texture_at
-from app.reference.points import open_above
-from app.reference.truth import Truth
 from app.scene.arrays import arrays_of
 from app.scene.load import load_scene
 from app.scene.model import Material, Scene, Texture
@@ -40,8 +41,8 @@ def furnace(albedo: float = 0.5, **changes: Any) -> Scene:
 
 
 def test_a_furnace_is_known_in_closed_form() -> None:
-    known = truth.truth_of(furnace(0.75), "closed-form", 1, silent)
-    assert truth.choose(furnace()) == "closed-form"
+    known = irradiance.reference_irradiance(furnace(0.75), "closed-form", 1, silent)
+    assert irradiance.choose_reference(furnace()) == "closed-form"
     assert np.allclose(known.E, 1.0 / (1 - 0.75)) and known.noise is None and known.lit.all()
 
 
@@ -55,13 +56,13 @@ def test_what_is_no_furnace() -> None:
         "two sides": furnace(double_sided=True),
         "no absorption": furnace(1.0),
     }
-    assert truth.no_furnace(furnace()) is None
-    assert [name for name, scene in scenes.items() if truth.no_furnace(scene) is None] == []
+    assert no_furnace(furnace()) is None
+    assert [name for name, scene in scenes.items() if no_furnace(scene) is None] == []
 
 
-def test_dense_truth_agrees_with_the_closed_form() -> None:
+def test_the_dense_matrix_agrees_with_the_closed_form() -> None:
     """Rows of the matrix sum to 1 in a closed convex room, whatever the patches."""
-    known = truth.dense_truth(furnace(), count=50, patches=100)
+    known = irradiance.dense_irradiance(furnace(), count=50, patches=100)
     assert np.allclose(known.E, 2.0, rtol=1e-9) and len(known.points) == 50
 
 
@@ -78,12 +79,12 @@ def test_points_in_gaps_are_left_out() -> None:
 
 def test_the_cache_is_hit_and_its_key_changes(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
-    solve = truth.solve_dense
-    monkeypatch.setattr(truth, "solve_dense", lambda *given: (calls.append(1), solve(*given))[1])
+    solve = irradiance.solve_dense
+    monkeypatch.setattr(irradiance, "solve_dense", lambda *given: (calls.append(1), solve(*given))[1])
     scene = furnace()
 
-    def made(scene: Scene, **changes: int) -> Truth:
-        return truth.dense_truth(scene, **({"count": 20, "patches": 40} | changes))
+    def made(scene: Scene, **changes: int) -> ReferenceIrradiance:
+        return irradiance.dense_irradiance(scene, **({"count": 20, "patches": 40} | changes))
 
     first, again = made(scene), made(scene)
     assert len(calls) == 1 and (again.E == first.E).all() and again.seconds == first.seconds
@@ -123,7 +124,7 @@ def test_textures_and_sides_are_part_of_the_key() -> None:
 def tracer() -> Any:
     """Where mitsuba is installed and runs; skipped elsewhere."""
     pytest.importorskip("mitsuba", reason="of the extra peers")
-    if (reason := truth.no_tracer()) is not None:
+    if (reason := irradiance.no_tracer()) is not None:
         pytest.skip(reason)
     from app.reference import path_tracer as tracer
 
@@ -131,7 +132,7 @@ def tracer() -> Any:
 
 
 def test_paths_in_a_furnace(tracer: Any) -> None:
-    known = truth.traced_truth(furnace(), 256, silent, count=100)
+    known = irradiance.path_traced_irradiance(furnace(), 256, silent, count=100)
     assert 0.001 < known.noise < 0.02
     # of 100 points the mean is ten times as exact; five of those
     assert known.E.mean() == pytest.approx(2.0, rel=0.5 * known.noise)
