@@ -1,1 +1,1 @@
-"""What a solution says of itself: how far off it is expected to be, and which exposure it will need."""
+"""What is known of a solution without any reference: how far off it is, and before the first shot which exposure it will need."""

@@ -1,4 +1,4 @@
-"""The light to come, before the first shot and without a GPU: radiosity H = F (E + ρ H) between some hundred points.
+"""Coarse forecast of the light, made on the CPU before any solving: radiosity H = F (E + ρ H) between some hundred points.
 
 Points lie on texels drawn by area, and on lamps drawn by power; F_ij = cos_i cos_j A_j / (π d² + A_j / 4) is the form factor of a
 small patch, kept finite where points nearly touch, with sums of at most 1. What stands between two points is looked up in a

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 
-from app.estimate.error import Expectation, ExpectedError
+from app.estimate.error import ErrorEstimate, ErrorEstimator
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
@@ -23,10 +23,10 @@ class RunningEstimate:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._expectation: Expectation | None = None
-        self._parts: Generator[float, None, ExpectedError | None] | None = None
+        self._expectation: ErrorEstimator | None = None
+        self._parts: Generator[float, None, ErrorEstimate | None] | None = None
         self._of: object = None
-        self.error: ExpectedError | None = None
+        self.error: ErrorEstimate | None = None
         self.share = 0.0
 
     def knows(self, state: object) -> bool:
@@ -40,7 +40,7 @@ class RunningEstimate:
             self.changed()
             if self._expectation is None:
                 maps = MAPS if len(lightmap.scene.triangles) < MANY else 1
-                self._expectation = Expectation(self._gpu, lightmap, maps)
+                self._expectation = ErrorEstimator(self._gpu, lightmap, maps)
             self._of, self._parts = state, self._expectation.parts(returned, SECONDS)
         elif self._parts is not None:
             try:

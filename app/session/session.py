@@ -14,7 +14,7 @@ from typing import Any, Protocol
 from app.atlas.charts import Charts
 from app.atlas.options import AtlasOptions
 from app.errors import UserError
-from app.estimate.error import ExpectedError
+from app.estimate.error import ErrorEstimate
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
@@ -310,7 +310,7 @@ class Session:
         self.message = trouble or self.message
 
     @property
-    def expected(self) -> ExpectedError | None:
+    def expected(self) -> ErrorEstimate | None:
         """How far off the light is expected to be: None as long as it is not known, or nothing is lit."""
         return self.estimate.error if self._opened and self.estimate.knows(self._state) else None
 

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from app.atlas.options import AtlasOptions
-from app.estimate.error import ExpectedError
+from app.estimate.error import ErrorEstimate
 from app.gpu import Gpu
 from app.lightmap.options import LightmapOptions
 from app.render.camera import CameraView
@@ -93,7 +93,7 @@ class FakeSession:
         self.session = self.run = self
         self.compared = FakeCompared(self.calls)
         self.solver_name, self.family = DEFAULT_SOLVER, SOLVERS[DEFAULT_SOLVER]
-        self.expected = ExpectedError(0.016, -0.003, 0.006, 240)
+        self.expected = ErrorEstimate(0.016, -0.003, 0.006, 240)
         self.estimate = SimpleNamespace(share=1.0)
         cameras = (SimpleNamespace(name="front", world_from_camera=np.eye(4), yfov=0.7),)
         self.scene = SimpleNamespace(materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras)

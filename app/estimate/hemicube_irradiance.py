@@ -1,4 +1,4 @@
-"""Irradiance at points, gathered from the solution as it is [Cohen85, delta form factors]:
+"""Irradiance at points, gathered through a hemicube above each from the solution as it is [Cohen85, delta form factors]:
 
     H'(x) = ∫ B(y) cosθ dω / π ≈ Σ B_q ΔF_q        over the samples q of a hemicube above x, B = E + ρH of the texel seen
 
@@ -19,8 +19,8 @@ BLOCK = 16  # px, added up at once
 VIEWS = 5
 
 
-class Gather:
-    """From one lightmap, at up to ``maps`` points at once. Whoever makes it releases it."""
+class HemicubeIrradiance:
+    """Gathers from one lightmap, at up to ``maps`` points at once. Whoever makes it releases it."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, maps: int) -> None:
         self._gpu, self._lightmap, self.maps = gpu, lightmap, maps

@@ -1,4 +1,4 @@
-"""Light gathered at points, and the error that it says of a solution."""
+"""The error that a solution states of itself, and the light gathered at points that tells it."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from solver_scenes import begin, grey, quads_scene, room, table_room
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
 from app.atlas.points import random_points
-from app.estimate.error import FEWEST, POINTS, TURNS, Expectation, choose, expected_error
-from app.estimate.gather import Gather, tangents
+from app.estimate.error import FEWEST, POINTS, TURNS, ErrorEstimator, choose_points, estimate_error
+from app.estimate.hemicube_irradiance import HemicubeIrradiance, tangents
 from app.gpu import Gpu
 from app.lightmap.at_points import irradiance_of
 from app.lightmap.lightmap import Lightmap
@@ -31,7 +31,7 @@ __all__ = ["box", "cornell", "forest", "forgotten"]
 
 
 def gathered(gpu: Gpu, lightmap: Lightmap, position: F64, normal: F64) -> F64:
-    gather = Gather(gpu, lightmap, len(position))
+    gather = HemicubeIrradiance(gpu, lightmap, len(position))
     turn = np.random.default_rng(2).uniform(0, 2 * np.pi, len(position))
     irradiance = gather.irradiance(gather.look(position, normal, turn))
     gather.release()
@@ -112,10 +112,10 @@ def test_tangents_are_square_to_normals() -> None:
 
 def test_noise_of_the_hemicubes_cancels() -> None:
     """Light that is off by 1 % at random, gathered with three times as much noise, twice."""
-    rng, truth = np.random.default_rng(8), np.full((4000, 3), 5.0)
-    solution = truth * (1 + 0.01 * rng.standard_normal((4000, 1)))
-    seen = truth[:, None] * (1 + 0.03 * rng.standard_normal((4000, TURNS, 1)))
-    error = expected_error(solution, seen, np.ones(4000), np.zeros(3))
+    rng, right = np.random.default_rng(8), np.full((4000, 3), 5.0)
+    solution = right * (1 + 0.01 * rng.standard_normal((4000, 1)))
+    seen = right[:, None] * (1 + 0.03 * rng.standard_normal((4000, TURNS, 1)))
+    error = estimate_error(solution, seen, np.ones(4000), np.zeros(3))
     assert error is not None and error.points == 4000
     assert error.rms == pytest.approx(0.01, rel=0.1)
     assert error.median == pytest.approx(0.01 * 0.674, rel=0.15)  # 67 % of a normal spread
@@ -124,11 +124,11 @@ def test_noise_of_the_hemicubes_cancels() -> None:
 def test_chance_does_not_come_back(rng: np.random.Generator) -> None:
     """Errors of 3 % that cancel, where nine tenths of the light returns: their mean over 256 points is not a tenth of that
     spread by more than chance, but counts ten times in each."""
-    truth = np.full((POINTS, 3), 2.0)
+    right = np.full((POINTS, 3), 2.0)
     squares = []
     for _ in range(200):
-        solution = truth * (1 + 0.03 * rng.standard_normal((POINTS, 1)))
-        error = expected_error(solution, np.repeat(truth[:, None], TURNS, 1), np.ones(POINTS), np.full(3, 0.9))
+        solution = right * (1 + 0.03 * rng.standard_normal((POINTS, 1)))
+        error = estimate_error(solution, np.repeat(right[:, None], TURNS, 1), np.ones(POINTS), np.full(3, 0.9))
         assert error is not None
         squares.append(error.rms**2)
     assert np.sqrt(np.mean(squares)) == pytest.approx(0.03, rel=0.1)  # 0.035 with it
@@ -136,8 +136,8 @@ def test_chance_does_not_come_back(rng: np.random.Generator) -> None:
 
 def test_what_lacks_everywhere_comes_back() -> None:
     """Where all points lack a tenth and half of it returns, two tenths are missing."""
-    truth = np.ones((50, 3))
-    error = expected_error(0.8 * truth, np.repeat(0.9 * truth[:, None], TURNS, 1), np.ones(50), np.full(3, 0.5))
+    right = np.ones((50, 3))
+    error = estimate_error(0.8 * right, np.repeat(0.9 * right[:, None], TURNS, 1), np.ones(50), np.full(3, 0.5))
     assert error is not None
     assert error.rms == pytest.approx(0.2) and error.bias == pytest.approx(-0.2)
 
@@ -147,7 +147,7 @@ def test_points_are_where_the_light_is_and_weigh_less_there(rng: np.random.Gener
     light = np.where(np.arange(5000) % 50 == 0, 100.0, 1.0)[:, None] * np.ones(3)
     found = []
     for _ in range(40):
-        chosen, weights = choose(light, rng)
+        chosen, weights = choose_points(light, rng)
         assert 60 < (light[chosen, 0] > 1).sum() < 180  # of 256; two thirds of the light is there
         found.append(weights @ light[chosen, 0] / weights.sum())
     assert np.mean(found) == pytest.approx(light.mean(), rel=0.05)
@@ -157,20 +157,20 @@ def test_points_are_where_the_light_is_and_weigh_less_there(rng: np.random.Gener
 @pytest.mark.parametrize("broken", [np.nan, np.inf])
 def test_nothing_is_expected_of_the_dark_or_the_broken(broken: float) -> None:
     black = np.zeros((9, 3))
-    assert expected_error(black, np.zeros((9, TURNS, 3)), np.ones(9), np.zeros(3)) is None
-    assert expected_error(black + broken, np.ones((9, TURNS, 3)), np.ones(9), np.zeros(3)) is None
+    assert estimate_error(black, np.zeros((9, TURNS, 3)), np.ones(9), np.zeros(3)) is None
+    assert estimate_error(black + broken, np.ones((9, TURNS, 3)), np.ones(9), np.zeros(3)) is None
 
 
 def test_time_that_is_up_leaves_some_points(gpu: Gpu, box: Lightmap) -> None:
     box.light_target.clear(*[1.0] * 3, 0.0)
-    expectation = Expectation(gpu, box, 8)
-    all_of_them, some = (run_to_end(expectation.parts(np.zeros(3), seconds)) for seconds in (np.inf, 0.0))
+    estimator = ErrorEstimator(gpu, box, 8)
+    all_of_them, some = (run_to_end(estimator.parts(np.zeros(3), seconds)) for seconds in (np.inf, 0.0))
     assert all_of_them is not None and some is not None
     assert 0 < some.points <= FEWEST < all_of_them.points <= POINTS
     assert some.rms == pytest.approx(all_of_them.rms, rel=0.5)
     box.light_target.clear(*[np.inf] * 3, 0.0)
-    assert run_to_end(expectation.parts(np.zeros(3), 0.0)) is None
-    expectation.release()
+    assert run_to_end(estimator.parts(np.zeros(3), 0.0)) is None
+    estimator.release()
 
 
 @pytest.mark.parametrize("residual", [0.3, 0.03])
@@ -181,15 +181,15 @@ def test_a_furnace_knows_what_it_lacks(gpu: Gpu, residual: float) -> None:
     half.shoot()
     points = random_points(half.lightmap.scene, POINTS, 7)
     H = irradiance_of(half.lightmap, points)
-    truth = np.full_like(H, 3.0 / (1 - 0.5))
-    expectation = Expectation(gpu, half.lightmap, 32)
-    error = run_to_end(expectation.parts(half.book.returned, np.inf))
+    right = np.full_like(H, 3.0 / (1 - 0.5))
+    estimator = ErrorEstimator(gpu, half.lightmap, 32)
+    error = run_to_end(estimator.parts(half.book.returned, np.inf))
     assert error is not None and error.points == POINTS
     # what is unshot is not even: its light that comes back is taken to be
-    assert error.rms == pytest.approx(relative_rms(H, truth), rel=0.2)
+    assert error.rms == pytest.approx(relative_rms(H, right), rel=0.2)
     spread = error.rms / (1 - 0.5) / np.sqrt(POINTS)  # of the mean over random points, which comes back
-    assert error.bias == pytest.approx(bias(H, truth), rel=0.1, abs=3 * spread)
-    expectation.release()
+    assert error.bias == pytest.approx(bias(H, right), rel=0.1, abs=3 * spread)
+    estimator.release()
     half.release()
 
 
@@ -199,16 +199,16 @@ def test_shadows_on_coarse_texels_are_expected_to_be_off(gpu: Gpu) -> None:
     for one in (coarse, fine):
         one.settle()
     points = random_points(coarse.lightmap.scene, 2000, 3)
-    H, truth = (irradiance_of(one.lightmap, points) for one in (coarse, fine))
-    lit = lit_points(truth)
-    true = relative_rms(H[lit], truth[lit])
+    H, right = (irradiance_of(one.lightmap, points) for one in (coarse, fine))
+    lit = lit_points(right)
+    true = relative_rms(H[lit], right[lit])
     errors = []
     for one in (coarse, fine):
-        expectation = Expectation(gpu, one.lightmap, 16)
-        error = run_to_end(expectation.parts(one.book.returned, np.inf))
+        estimator = ErrorEstimator(gpu, one.lightmap, 16)
+        error = run_to_end(estimator.parts(one.book.returned, np.inf))
         assert error is not None
         errors.append(error.rms)
-        expectation.release()
+        estimator.release()
         one.release()
     assert true / 2 < errors[0] < 2 * true, f"{errors[0]:.2%} for {true:.2%}"
     assert errors[1] < 0.7 * errors[0]
