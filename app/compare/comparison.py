@@ -1,28 +1,25 @@
-"""How far the solution is from a reference, measured at random points a few times a second while light is being shot.
+"""The solution beside a reference: its error, measured at random points a few times a second while it is being solved.
 
     relative RMS = √(mean (H - R)²) / mean R      local error = |H - R| / |R|, of which median and 90 % are quantiles
 
-over the points where the reference R is not dark; see app/metrics.py. No frame waits for a measurement: it is asked for in one
-and read some frames later.
+over the points where the reference R is not dark; see app/reference/metrics.py. No frame waits for a measurement: it is
+asked for in one and read some frames later.
 """
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import NamedTuple
-
-import numpy as np
 
 from app.atlas.points import Points
-from app.compare.light import ReferenceLight
-from app.compare.texels import ReferenceTexels
+from app.compare.reference_light import ReferenceLight
+from app.compare.reference_texels import ReferenceTexels
 from app.gpu import Gpu, ReadBack
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.probe import Probe
 from app.lightmap.tile_pool import TilePool
-from app.reference.metrics import DARK, bias, lit_points, median_local, quantile_local, relative_rms
-from app.scene.model import F32, F64
+from app.reference.metrics import DARK, PointErrors, lit_points, point_errors
+from app.scene.model import F32
 from app.util.rows import Rows
 
 POINTS = 4096
@@ -31,18 +28,10 @@ SECONDS = 0.25  # between two measurements, at least
 FRAMES = 3  # after which a measurement has arrived: drivers keep two or three frames on their way
 
 
-class ErrorNow(NamedTuple):
-    """Over lit points: relative RMS, bias of the mean, median and 90 % quantile of local errors [-]."""
-
-    rms: float
-    bias: float
-    median: float
-    q90: float
-
-
 @dataclass(frozen=True, eq=False)
-class Found:
-    """A reference, random points to measure at, and what the texels of a tile pool, none of a quadtree, have of it."""
+class PreparedReference:
+    """A reference with what is looked up once: random points to measure at, and its light on the texels of a tile pool,
+    None for those of a quadtree."""
 
     light: ReferenceLight
     points: Points
@@ -51,43 +40,43 @@ class Found:
 
 
 class Comparison:
-    """Of one lightmap with a reference. Whoever makes it releases it.
+    """Compares one lightmap with a reference. Whoever makes it releases it.
 
-    light: the reference; error: the last one measured; errors: rows of it over shots and seconds; lit: points that are measured.
+    light: the reference; error: the last one measured; errors: rows of it over work and seconds; lit: points that are measured.
     """
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, found: Found) -> None:
-        """Of the points found, those that are dark in the reference are left out."""
-        light, points = found.light, found.points
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, prepared: PreparedReference) -> None:
+        """Points that are dark in the reference are left out."""
+        light, points = prepared.light, prepared.points
         values = light.at(points)
         lit = lit_points(values)
         self.light, self.lit = light, int(lit.sum())
         self.dark = DARK * float(values.mean())
         self._reference = values[lit]
         self._probe = Probe(gpu, lightmap, points.only(lit))
-        self.texels = ReferenceTexels(gpu, lightmap, light, found.tiles if found.pool is lightmap.pool else None)
-        self.error: ErrorNow | None = None
+        self.texels = ReferenceTexels(gpu, lightmap, light, prepared.tiles if prepared.pool is lightmap.pool else None)
+        self.error: PointErrors | None = None
         self._asked: tuple[ReadBack, int, float, object] | None = None
         self._frames, self._due = 0, 0.0
         self.begin()
 
     def notes(self, lightmap: Lightmap) -> list[str]:
         """What to bear in mind when the error is read."""
-        found, others = [], self.light.other_materials(lightmap.scene.materials)
+        notes, others = [], self.light.other_materials(lightmap.scene.materials)
         if others:
-            found.append(f"the reference was solved with other materials: {', '.join(others)}")
+            notes.append(f"the reference was solved with other materials: {', '.join(others)}")
         if self.light.texels is not None and self.light.texels < lightmap.texel_count:
             texels = f"{self.light.texels:,} texels are fewer than the {lightmap.texel_count:,} here"
-            found.append(f"the reference's {texels}: the error may be its own")
-        return found
+            notes.append(f"the reference's {texels}: the error may be its own")
+        return notes
 
     def begin(self) -> None:
-        """All light is unshot again: another curve begins."""
+        """Solving begins again: another curve begins."""
         self.errors = Rows(("work", "seconds", "rms", "median"))
         self._measured: object = None
 
-    def measure(self, shots: int, seconds: float, state: object, *, wait: bool = False) -> bool:
-        """Once per frame: read what was asked for, and ask anew if it is time. shots, seconds: of the solve so far; state: what
+    def measure(self, work: int, seconds: float, state: object, *, wait: bool = False) -> bool:
+        """Once per frame: read what was asked for, and ask anew if it is time. work, seconds: of the solve so far; state: what
         the light depends on, compared with what was measured last. Whether all that is to be known is known; with ``wait``
         it is."""
         if self._asked is not None:
@@ -95,7 +84,7 @@ class Comparison:
             if wait or self._frames >= FRAMES:
                 self._take()
         if self._asked is None and state != self._measured and (wait or time.perf_counter() >= self._due):
-            self._asked = self._probe.look(), shots, seconds, state
+            self._asked = self._probe.look(), work, seconds, state
             self._frames, self._due = 0, time.perf_counter() + SECONDS
             if wait:
                 self._take()
@@ -103,25 +92,13 @@ class Comparison:
 
     def _take(self) -> None:
         assert self._asked is not None
-        looked, shots, seconds, self._measured = self._asked
+        looked, work, seconds, self._measured = self._asked
         self._asked = None
-        self.error = error_of(self._probe.irradiance(looked), self._reference)
-        self.errors.append(shots, seconds, self.error.rms, self.error.median)
+        self.error = point_errors(self._probe.irradiance(looked), self._reference)
+        self.errors.append(work, seconds, self.error.rms, self.error.median)
 
     def release(self) -> None:
         if self._asked is not None:
             self._asked[0].take()
         self._probe.release()
         self.texels.release()
-
-
-def error_of(irradiance: F64, reference: F64) -> ErrorNow:
-    """Of values (n, 3) at lit points; NaN where there are none, or where they are not finite."""
-    if not len(reference) or not np.isfinite(irradiance).all():
-        return ErrorNow(*[float("nan")] * 4)
-    return ErrorNow(
-        relative_rms(irradiance, reference),
-        bias(irradiance, reference),
-        median_local(irradiance, reference),
-        quantile_local(irradiance, reference, 0.9),
-    )

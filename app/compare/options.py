@@ -1,4 +1,4 @@
-"""How fine the reference is that is solved in the background."""
+"""Options of a reference that is solved in the background: how fine it is, and when it is done."""
 
 from __future__ import annotations
 

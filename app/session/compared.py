@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from app.atlas.options import MAX_TEXELS, AtlasOptions
-from app.compare.comparison import Comparison, Found
-from app.compare.fetching import Fetching, bake_light, looked_up
+from app.compare.comparison import Comparison, PreparedReference
 from app.compare.options import ReferenceOptions
+from app.compare.reference_task import ReferenceTask, bake_light, prepare_reference
 from app.errors import UserError
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
@@ -34,8 +34,8 @@ class Compared:
         self._lightmap: Lightmap
         self._unedited: Scene
         self.comparison: Comparison | None = None
-        self.fetching: Fetching | None = None
-        self._found: Found | None = None
+        self.fetching: ReferenceTask | None = None
+        self._found: PreparedReference | None = None
         self._measured = True
 
     def begin(self, lightmap: Lightmap, unedited: Scene) -> bool:
@@ -61,12 +61,12 @@ class Compared:
 
     def open(self, path: Path) -> None:
         """Read a bake in the background."""
-        self._fetch(Fetching(self._lightmap.pool, partial(bake_light, path, self._unedited)))
+        self._fetch(ReferenceTask(self._lightmap.pool, partial(bake_light, path, self._unedited)))
 
     def open_now(self, path: Path) -> None:
         """Read a bake and wait. Raises UserError."""
         light = bake_light(path, self._unedited, lambda stage, share: None)
-        self._compare_with(looked_up(light, self._lightmap.pool))
+        self._compare_with(prepare_reference(light, self._lightmap.pool))
 
     def solve(self, options: ReferenceOptions) -> None:
         """Solve the scene as it is now in the background, with closed forms and full storage. Raises UserError."""
@@ -75,7 +75,7 @@ class Compared:
             raise UserError(f"{scene.name}: {NO_LIGHT}")
         texels = options.texels or self.reference_texels
         atlas = AtlasOptions(texels=texels)
-        self._fetch(Fetching(self._lightmap.pool, lambda tell: solved_light(scene, atlas, options.residual, tell)))
+        self._fetch(ReferenceTask(self._lightmap.pool, lambda tell: solved_light(scene, atlas, options.residual, tell)))
 
     @property
     def reference_texels(self) -> int:
@@ -94,11 +94,11 @@ class Compared:
         self._release_comparison()
         self._found = None
 
-    def _fetch(self, fetching: Fetching) -> None:
+    def _fetch(self, fetching: ReferenceTask) -> None:
         self.stop_fetching()
         self.fetching = fetching
 
-    def _compare_with(self, found: Found) -> None:
+    def _compare_with(self, found: PreparedReference) -> None:
         self._release_comparison()
         self._found = found
         self._begin_comparison()

@@ -18,7 +18,7 @@ import numpy as np
 
 from app import __version__
 from app.atlas.options import AtlasOptions
-from app.compare.light import ReferenceLight
+from app.compare.reference_light import ReferenceLight
 from app.errors import UserError
 from app.scene.arrays import arrays_of
 from app.scene.model import Scene

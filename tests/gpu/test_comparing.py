@@ -25,10 +25,10 @@ from solver_scenes import table_room
 from app.atlas.options import AtlasOptions
 from app.atlas.points import random_points
 from app.bake import write_bake
-from app.compare.comparison import POINTS, POINTS_SEED, error_of
-from app.compare.light import ReferenceLight
+from app.compare.comparison import POINTS, POINTS_SEED
 from app.compare.options import ReferenceOptions
-from app.compare.texels import ReferenceTexels
+from app.compare.reference_light import ReferenceLight
+from app.compare.reference_texels import ReferenceTexels
 from app.errors import UserError
 from app.gpu import Gpu
 from app.lightmap.at_points import irradiance_of
@@ -38,7 +38,7 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
 from app.lightmap.probe import Probe
 from app.lightmap.tile_pool import TilePool
-from app.reference.metrics import lit_points
+from app.reference.metrics import lit_points, point_errors
 from app.render.false_colour import ERRORS, colour_map
 from app.render.resolve import Reference
 from app.scene.model import F32, F64, Scene
@@ -152,7 +152,7 @@ def test_the_error_against_a_bake_is_that_of_its_light(session: Session, tmp_pat
     points = random_points(session.scene, POINTS, POINTS_SEED)
     reference = session.compared.comparison.light.at(points)
     lit = lit_points(reference)
-    expected = error_of(irradiance_of(session.lightmap, points)[lit], reference[lit])
+    expected = point_errors(irradiance_of(session.lightmap, points)[lit], reference[lit])
     assert session.compared.comparison.error == pytest.approx(expected, abs=1e-3)
 
 
@@ -308,10 +308,10 @@ def test_a_node_set_that_is_resized_is_not_looked_up_at_once(
     light = light_of(lightmap, lightmap.irradiance())
     texels = ReferenceTexels(gpu, lightmap, light)
     texels.follow(whole=True)
-    look_up, looked_up = ReferenceLight.on_tiles, []
+    look_up, prepare_reference = ReferenceLight.on_tiles, []
 
     def on_tiles(self: ReferenceLight, pool: TilePool, slots: NDArray[np.int64]) -> F32:
-        looked_up.append(len(slots))
+        prepare_reference.append(len(slots))
         return look_up(self, pool, slots)
 
     def complete() -> bool:
@@ -324,15 +324,15 @@ def test_a_node_set_that_is_resized_is_not_looked_up_at_once(
     moves = trees.tree.resize(len(trees.tree) + 5)
     lightmap.resize(moves)
     texels.follow(whole=False)
-    assert len(moves.old) > 20 and sum(looked_up) == 0 and complete()
-    monkeypatch.setattr("app.compare.texels.TEXELS_PER_FRAME", 20 * pool.tile**2)
+    assert len(moves.old) > 20 and sum(prepare_reference) == 0 and complete()
+    monkeypatch.setattr("app.compare.reference_texels.TEXELS_PER_FRAME", 20 * pool.tile**2)
     rows = pool.rows
     trees.grow(0.3, rng)
     texels.follow(whole=False)
-    assert pool.rows > rows and sum(looked_up) == 20 and not complete()
+    assert pool.rows > rows and sum(prepare_reference) == 20 and not complete()
     for _ in range(-(-pool.tiles // 20)):
         texels.follow(whole=False)
-    assert complete() and max(looked_up) == 20 and sum(looked_up) < len(trees.tree)
+    assert complete() and max(prepare_reference) == 20 and sum(prepare_reference) < len(trees.tree)
     texels.release()
 
 

@@ -17,11 +17,11 @@ from app.atlas.parametrize import parametrize
 from app.atlas.points import Points, barycentric, bilinear
 from app.bake import write_bake
 from app.bake.read import read_bake
-from app.compare.comparison import error_of
-from app.compare.fetching import Fetching
-from app.compare.light import ReferenceLight, light_of_bake
+from app.compare.reference_light import ReferenceLight, light_of_bake
+from app.compare.reference_task import ReferenceTask
 from app.errors import UserError
 from app.lightmap.tile_pool import TilePool
+from app.reference.metrics import point_errors
 from app.scene.model import F32, Material, Scene
 from app.util.background import Progress
 
@@ -128,9 +128,9 @@ def test_a_full_disk_is_said() -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/somewhere")
 
     scene = sheet_in_a_room()
-    fetching = Fetching(TilePool(scene, charts_of(scene)), work)
+    task = ReferenceTask(TilePool(scene, charts_of(scene)), work)
     with pytest.raises(UserError, match="the reference: No space left on device"):
-        assert fetching.result
+        assert task.result
 
 
 def test_barycentric_weights_make_the_point() -> None:
@@ -145,8 +145,8 @@ def test_barycentric_weights_make_the_point() -> None:
 
 def test_errors_of_light_that_is_broken_are_no_numbers() -> None:
     reference = np.ones((4, 3))
-    error = error_of(reference * [[1.1], [1.1], [1.1], [1.3]], reference)
+    error = point_errors(reference * [[1.1], [1.1], [1.1], [1.3]], reference)
     assert error.rms == pytest.approx(np.sqrt((3 * 0.01 + 0.09) / 4))
     assert (error.bias, error.median, error.q90) == pytest.approx((0.15, 0.1, 0.3))
-    assert np.isnan(error_of(np.full((4, 3), np.inf), reference)).all()
-    assert np.isnan(error_of(reference[:0], reference[:0])).all()
+    assert np.isnan(point_errors(np.full((4, 3), np.inf), reference)).all()
+    assert np.isnan(point_errors(reference[:0], reference[:0])).all()

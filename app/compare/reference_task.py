@@ -1,4 +1,4 @@
-"""A reference on its way, in a thread of its own: the window never waits for it."""
+"""The task that reads or solves a reference in a thread of its own: the window never waits for it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from app.atlas.points import random_points
 from app.bake.read import read_bake
-from app.compare.comparison import POINTS, POINTS_SEED, Found
-from app.compare.light import ReferenceLight, light_of_bake
+from app.compare.comparison import POINTS, POINTS_SEED, PreparedReference
+from app.compare.reference_light import ReferenceLight, light_of_bake
 from app.errors import UserError
 from app.lightmap.tile_pool import TilePool
 from app.scene.model import Scene
@@ -28,8 +28,8 @@ def bake_light(path: Path, scene: Scene, tell: Progress) -> ReferenceLight:
     return light_of_bake(bake, scene)
 
 
-def looked_up(light: ReferenceLight, pool: TilePool) -> Found:
-    """With all that can be known of it in any thread: the leaves of a quadtree may change meanwhile. Raises UserError for a
+def prepare_reference(light: ReferenceLight, pool: TilePool) -> PreparedReference:
+    """Look up all that can be known of it in any thread: the leaves of a quadtree may change meanwhile. Raises UserError for a
     reference without light."""
     points = random_points(pool.scene, POINTS, POINTS_SEED)
     if not light.at(points).max() > 0:
@@ -38,12 +38,12 @@ def looked_up(light: ReferenceLight, pool: TilePool) -> Found:
     if not pool.adaptive:
         parts = np.array_split(np.arange(pool.tiles), -(-pool.tiles // TILES_AT_ONCE))
         tiles = np.concatenate([light.on_tiles(pool, part) for part in parts])
-    return Found(light, points, pool, tiles)
+    return PreparedReference(light, points, pool, tiles)
 
 
-class Fetching(BackgroundTask[Found]):
-    """A reference on its way, for the lightmap of ``pool``."""
+class ReferenceTask(BackgroundTask[PreparedReference]):
+    """A reference on its way, to be compared with the lightmap of ``pool``."""
 
     def __init__(self, pool: TilePool, work: Work) -> None:
         self.pool = pool
-        super().__init__("the reference", lambda tell: looked_up(work(tell), pool))
+        super().__init__("the reference", lambda tell: prepare_reference(work(tell), pool))

@@ -1,11 +1,11 @@
-"""The reference on every texel of a lightmap: what pictures of it, and of the error, are made from."""
+"""A texture with the reference's light on every texel of a lightmap: what pictures of it, and of the error, are made from."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.compare.light import ReferenceLight
+from app.compare.reference_light import ReferenceLight
 from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.tile_pool import Moves
