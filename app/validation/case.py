@@ -1,4 +1,4 @@
-"""What a hard case is: a scene, how it is solved, and what its light must be, within what and for which reason."""
+"""A hard case: a scene, how it is solved, and the checks that its light must pass, each with a tolerance and its reason."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ from numpy.typing import NDArray
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
 from app.lightmap.options import STORAGE, LightmapOptions
+from app.options import Options, specs
 from app.scene.model import F32, F64, Scene
-from app.session.batch import opened, solve_until
-from app.solvers import DEFAULT_SOLVER, SOLVERS, EnergyBalance, ShootingOptions
+from app.session.batch import opened
+from app.solvers import DEFAULT_SOLVER, SOLVERS, EnergyBalance, Family
+from app.solvers.run import solve_until
 from app.solvers.shooting.options import MAX_LEVEL
 from app.solvers.shooting.stages import LEVEL, ROOT_LEVEL
-from app.visibility.projections import PROJECTIONS
 
 SIZES = ("small", "large")
-ENOUGH = 2_000_000  # shots: a solve that needs more does not converge
-FULL = "rgba32f"
+ENOUGH = 2_000_000  # units of work: a solve that needs more does not converge
+FULL, HEMICUBE = "rgba32f", "hemicube"
 LEAST = 1e-9  # residual that can be asked for
-BOOK = "of single shots' sums, on average: a texel is sampled at its centroid, its shooter's sight at one point"
+IMBALANCE = "of single shots' sums, on average: a texel is sampled at its centroid, its shooter's sight at one point"
 EACH = "and each bounce may lose what grazes, (4/R)²"
 NO_NUMBER = "every texel holds a finite number"
 NEGATIVE = (
@@ -37,31 +38,55 @@ STORED = (
 
 
 @dataclass(frozen=True)
-class Way:
-    """One way to solve."""
+class Method:
+    """One way to solve a case: by which solver, on uniform texels or quadtrees, by which projection if any, stored how."""
 
     solver: str = DEFAULT_SOLVER
     adaptive: bool = False
-    projection: str = "hemicube"
+    projection: str | None = HEMICUBE
     storage: str = FULL
 
     @property
     def name(self) -> str:
-        return f"{self.solver} {'adaptive' if self.adaptive else 'uniform'} {self.projection}" + (
-            "" if self.storage == FULL else f" {self.storage}"
-        )
+        words = (self.solver, "adaptive" if self.adaptive else "uniform", self.projection)
+        return " ".join(word for word in words if word) + ("" if self.storage == FULL else f" {self.storage}")
+
+    @property
+    def family(self) -> Family:
+        return SOLVERS[self.solver]
+
+    def options(self, map_size: int, threshold: float) -> Options:
+        """Of the solver, as far as it has such: pixels of its visibility maps, and how little may remain."""
+        wanted = {"projection": self.projection, "resolution": map_size, self.family.threshold: threshold}
+        if self.adaptive:  # levels count from the root, whose texels are those of a uniform lightmap
+            wanted["level"] = min(LEVEL + ROOT_LEVEL, MAX_LEVEL)
+        known = {spec.name for spec in specs(self.family.options)}
+        return self.family.options().replace(**{name: value for name, value in wanted.items() if name in known})
 
 
-WAYS = tuple(Way(s, a, p) for s in SOLVERS for a in (False, True) for p in PROJECTIONS) + tuple(
-    Way(storage=storage) for storage in STORAGE if storage != FULL
+def projections_of(solver: str) -> tuple[str | None, ...]:
+    """Those that it can draw its maps by, the hemicube first; (None,) where it draws none."""
+    choices = (spec.choices for spec in specs(SOLVERS[solver].options) if spec.name == "projection")
+    return tuple(str(name) for name in next(choices, ())) or (None,)
+
+
+def methods_of(solver: str) -> tuple[Method, ...]:
+    """Every lightmap by every projection."""
+    lightmaps = False, True
+    return tuple(Method(solver, adaptive, by) for adaptive in lightmaps for by in projections_of(solver))
+
+
+METHODS = (
+    *(method for solver in SOLVERS for method in methods_of(solver)),
+    *(Method(storage=storage) for storage in STORAGE if storage != FULL),
 )
-# Where how a shooter sees, and how light is stored, plays no part
-SOLVERS_ONLY = tuple(Way(s, a) for s in SOLVERS for a in (False, True))
+# where how a shooter sees, and how light is stored, plays no part
+ONE_PROJECTION = tuple(m for m in METHODS if m.projection == projections_of(m.solver)[0] and m.storage == FULL)
 
 
 @dataclass(frozen=True)
-class Claim:
-    """That a measured number is the expected one, but for what the reason allows: from expected - less to expected + more.
+class Check:
+    """One number of the solution, and what it must be but for what the reason allows: from expected - less to expected + more.
 
     exact: whether only storage in 32 bits is held to it."""
 
@@ -78,41 +103,43 @@ class Claim:
         return self.expected - self.less <= self.measured <= self.expected + self.more  # never, if it is no number
 
 
-def near(what: str, measured: float, expected: float, tolerance: float, reason: str) -> Claim:
-    return Claim(what, measured, expected, tolerance, tolerance, reason)
+def near(what: str, measured: float, expected: float, tolerance: float, reason: str) -> Check:
+    return Check(what, measured, expected, tolerance, tolerance, reason)
 
 
-def dark(what: str, measured: float, most: float, reason: str) -> Claim:
+def dark(what: str, measured: float, most: float, reason: str) -> Check:
     """No light, or no more than so much, in every format."""
-    return Claim(what, measured, 0.0, 0.0, most, reason, exact=False)
+    return Check(what, measured, 0.0, 0.0, most, reason, exact=False)
 
 
 @dataclass(frozen=True, eq=False)
-class Light:
-    """A solution. map: pixels of visibility maps. position (n, 3) [m], normal (n, 3), area (n,) [m²], object (n,), and H
-    and r (n,) [W/m²] of the texels that cover a surface; the scenes are grey."""
+class Solution:
+    """The light of a solved case.
+
+    map: pixels of visibility maps. position (n, 3) [m], normal (n, 3), area (n,) [m²], object (n,), and H (n,) [W/m²] of the
+    texels that cover a surface; the scenes are grey.
+    """
 
     scene: Scene
-    way: Way
+    method: Method
     map: int
     position: F64
     normal: F32
     area: F64
     object: NDArray[np.int32]
     H: F64
-    r: F64
-    book: EnergyBalance
-    shots: int
+    energy: EnergyBalance
+    work: int
     seconds: float
 
     @property
     def emitted(self) -> float:
         """[W]"""
-        return float(self.book.emitted[0])
+        return float(self.energy.emitted[0])
 
     def share(self, part: str) -> float:
-        """A part of the energy book over the emitted power."""
-        return float(getattr(self.book, part)[0]) / self.emitted
+        """A part of the energy balance over the emitted power."""
+        return float(getattr(self.energy, part)[0]) / self.emitted
 
     def on(self, *names: str) -> NDArray[np.bool_]:
         """(n,) whether texels are of these objects."""
@@ -137,48 +164,52 @@ class Light:
         return float((self.H * self.area)[where].sum()) / self.emitted
 
 
-Twins = dict[object, Light]
+Controls = dict[object, Solution]
 
 
 @dataclass(frozen=True, eq=False)
 class HardCase:
-    """scene: of a size. claims: of a solution and of its twin's, if it has one: another scene, solved alike. density: texels/m
-    by size, of quadtrees the roots', for a scene that is ``scale`` times as large as its twin; map: pixels of visibility maps by
-    size. Solved until no more than ``residual`` of the emitted power is unshot, or for so many shots. book: imbalance that the
-    energy book may show either way, and why; grazes: whether each bounce may lose a little more."""
+    """A scene that is hard to solve, and what is known of its light.
+
+    scene: of a size. control: a clean scene, solved alike, whose answer it must have. checks: of a solution and of its control's,
+    or of the same one twice where there is none. density: texels/m by size, of quadtrees the roots', for a scene that is
+    ``scale`` times as large as its control; map: pixels of visibility maps by size. Solved until no more than ``residual``
+    remains, or for so much ``work`` in the solver's unit. imbalance: of energy that there may be either way, and why; grazes:
+    whether each bounce may lose a little more.
+    """
 
     name: str
     about: str
     scene: Callable[[str], Scene]
-    claims: Callable[[Light, Light], list[Claim]]
-    twin: Callable[[str], Scene] | None = None
+    checks: Callable[[Solution, Solution], list[Check]]
+    control: Callable[[str], Scene] | None = None
     density: tuple[float, float] = (8, 32)
     scale: float = 1.0
     map: tuple[int, int] = (64, 256)
     residual: tuple[float, float] = (0.05, 2e-3)
-    shots: tuple[int, int] | None = None
-    book: float = 0.01
-    book_reason: str = BOOK
+    work: tuple[int, int] | None = None
+    imbalance: float = 0.01
+    imbalance_reason: str = IMBALANCE
     grazes: bool = True
-    ways: tuple[Way, ...] = WAYS
+    methods: tuple[Method, ...] = METHODS
 
-    def run(self, gpu: Gpu, way: Way, size: str, twins: Twins) -> tuple[Light, list[Claim]]:
-        """Solve it this way; its light, and its claims, after those that every case makes. twins: solved so far, by cases that
+    def run(self, gpu: Gpu, method: Method, size: str, controls: Controls) -> tuple[Solution, list[Check]]:
+        """Solve it by this method; its light, and the checks of every case before its own. controls: solved so far, by cases that
         share them."""
-        light = twin = self.solve(gpu, self.scene(size), way, size, self.scale)
-        if self.twin and way.storage == FULL:
-            key = self.twin, way, size, self.density, self.map
-            if key not in twins:
-                twins[key] = self.solve(gpu, self.twin(size), way, size, 1.0)
-            twin = twins[key]
-        claims = [*self.always(light, way), *self.claims(light, twin)]
-        return light, [claim for claim in claims if way.storage == FULL or not claim.exact]
+        light = control = self.solve(gpu, self.scene(size), method, size, self.scale)
+        if self.control and method.storage == FULL:
+            key = self.control, method, size, self.density, self.map
+            if key not in controls:
+                controls[key] = self.solve(gpu, self.control(size), method, size, 1.0)
+            control = controls[key]
+        checks = [*self.common_checks(light, method), *self.checks(light, control)]
+        return light, [check for check in checks if method.storage == FULL or not check.exact]
 
-    def always(self, light: Light, way: Way) -> Iterator[Claim]:
-        broken = np.count_nonzero(~np.isfinite(light.H) | ~np.isfinite(light.r))
-        yield Claim("texels without a finite number", float(broken), 0.0, 0.0, 0.0, NO_NUMBER, exact=False)
+    def common_checks(self, light: Solution, method: Method) -> Iterator[Check]:
+        broken = np.count_nonzero(~np.isfinite(light.H)) + (not np.isfinite(light.energy.unshot).all())
+        yield Check("texels without a finite number", float(broken), 0.0, 0.0, 0.0, NO_NUMBER, exact=False)
         brightest = max(float(light.H.max()), 1e-300)
-        yield Claim(
+        yield Check(
             "darkest texel / brightest",
             float(light.H.min()) / brightest,
             0.0,
@@ -187,44 +218,37 @@ class HardCase:
             NEGATIVE,
             exact=False,
         )
-        gained, lost, reason = self.book, self.book, self.book_reason
+        gained, lost, reason = self.imbalance, self.imbalance, self.imbalance_reason
         if self.grazes:
             lost, reason = lost + light.grazing * light.bounces, f"{reason}; {EACH}"
-        if way.storage != FULL:
+        if method.storage != FULL:
             gained, lost, reason = gained + ROUNDED * light.bounces, 1.0, STORED
-        yield Claim("energy lost", light.book.imbalance_share, 0.0, gained, lost, reason, exact=False)
+        yield Check("energy lost", light.energy.imbalance_share, 0.0, gained, lost, reason, exact=False)
 
-    def solve(self, gpu: Gpu, scene: Scene, way: Way, size: str, scale: float) -> Light:
-        """Shoot until converged and settled, or so many shots."""
+    def solve(self, gpu: Gpu, scene: Scene, method: Method, size: str, scale: float) -> Solution:
+        """Until converged, or for so much work."""
         i = SIZES.index(size)
-        last, least = (self.shots[i], 0.0) if self.shots else (ENOUGH, self.residual[i])
-        options = ShootingOptions(
-            projection=way.projection,
-            resolution=self.map[i],
-            residual=max(least, LEAST),  # quadtrees shoot no further
-        )
-        if way.adaptive:  # levels count from the root, whose texels are those of a uniform lightmap
-            options = options.replace(level=min(LEVEL + ROOT_LEVEL, MAX_LEVEL))
+        last, least = (self.work[i], 0.0) if self.work else (ENOUGH, self.residual[i])
         start = time.perf_counter()
         atlas = AtlasOptions(density=self.density[i] / scale)
-        light = LightmapOptions(adaptive=way.adaptive, depth=1, storage=way.storage)
-        with opened(gpu, scene, atlas, light, options, way.solver) as (lightmap, solver):
-            batch = SOLVERS[way.solver].batch
-            solve_until(solver, batch, lambda now: now.done >= last or (now.remaining <= least and now.converged))
-            shots, book = solver.poll(wait=True).done, solver.energy()
+        light = LightmapOptions(adaptive=method.adaptive, depth=1, storage=method.storage)
+        options = method.options(self.map[i], max(least, LEAST))
+        with opened(gpu, scene, atlas, light, options, method.solver) as (lightmap, solver):
+            batch = method.family.batch
+            solve_until(solver, batch, lambda now: now.done >= last or (now.converged and now.remaining <= least))
+            done, energy = solver.poll(wait=True).done, solver.energy()
             surfaces = lightmap.pool.surfaces
             covered = surfaces.area > 0
-            return Light(
+            return Solution(
                 scene=scene,
-                way=way,
+                method=method,
                 map=self.map[i],
                 position=surfaces.position[covered],
                 normal=surfaces.normal[covered],
                 area=surfaces.area[covered],
                 object=scene.object_ids[lightmap.charts.face_triangle[surfaces.face[covered]]],
                 H=lightmap.irradiance()[covered][:, 0].astype(np.float64),
-                r=lightmap.residual()[covered][:, 0].astype(np.float64),
-                book=book,
-                shots=shots,
+                energy=energy,
+                work=done,
                 seconds=time.perf_counter() - start,
             )

@@ -1,4 +1,4 @@
-"""The hard cases, each with the answer that it must give: one line of CASES for each; hard_claims says why it may be off."""
+"""The hard cases, each with the answer that it must give: one row of CASES for each; checks.py says why it may be off."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 from app.scene.model import Scene
 from app.scene.shapes import transform
 from app.validation import scenes
-from app.validation.case import LEAST, SOLVERS_ONLY, WAYS, HardCase, Way
+from app.validation.case import HEMICUBE, LEAST, METHODS, ONE_PROJECTION, HardCase, Method
 from app.validation.checks import (
     BRIGHT,
     SAME,
-    as_twin,
     ever_darker,
     faint_room,
     glows,
     like_a_point,
+    like_control,
     near_ceiling,
     one_room_lit,
     plates,
@@ -52,12 +52,12 @@ def _sized(factor: float) -> HardCase:
         f"size-{factor:g}",
         about,
         scene,
-        as_twin(0.01, SAME),
-        twin=PLAIN,
+        like_control(0.01, SAME),
+        control=PLAIN,
         scale=factor,
-        ways=SOLVERS_ONLY,
-        book=0.02,
-        book_reason=PAST,
+        methods=ONE_PROJECTION,
+        imbalance=0.02,
+        imbalance_reason=PAST,
     )
 
 
@@ -78,7 +78,9 @@ CASES: tuple[HardCase, ...] = (
         density=(4, 8),
         map=(128, 256),
         residual=(2e-2, 1e-2),
-        ways=tuple(way for way in WAYS if way.storage != "fixed8"),  # which ends at the brightest lamp, as below
+        methods=tuple(
+            method for method in METHODS if method.storage != "fixed8"
+        ),  # which ends at the brightest lamp, as below
     ),
     HardCase(
         "furnace-0.999",
@@ -89,7 +91,9 @@ CASES: tuple[HardCase, ...] = (
         map=(128, 256),
         residual=(2e-2, 1e-3),
         # 8 bits end at the brightest lamp, a thousandth of this light
-        ways=tuple(way for way in WAYS if way.projection == "hemicube" and way.storage != "fixed8"),
+        methods=tuple(
+            method for method in METHODS if method.projection in (None, HEMICUBE) and method.storage != "fixed8"
+        ),
     ),
     HardCase(
         "bright-and-faint",
@@ -99,7 +103,7 @@ CASES: tuple[HardCase, ...] = (
         density=(4, 16),
         map=(256, 256),
         residual=(1e-18, 1e-18),
-        ways=tuple(way for way in WAYS if not way.adaptive),
+        methods=tuple(method for method in METHODS if not method.adaptive),
     ),
     HardCase(
         "bright-and-dim",
@@ -109,7 +113,7 @@ CASES: tuple[HardCase, ...] = (
         density=(4, 16),
         map=(256, 256),
         residual=(LEAST, LEAST),
-        ways=tuple(way for way in WAYS if way.adaptive),
+        methods=tuple(method for method in METHODS if method.adaptive),
     ),
     HardCase(
         "small-lamp",
@@ -123,15 +127,15 @@ CASES: tuple[HardCase, ...] = (
         "a lamp 10⁻⁴ of the room below its ceiling, against one in the ceiling",
         of(lambda: scenes.lamp_near_ceiling(scenes.GAP)),
         near_ceiling,
-        twin=of(lambda: scenes.lamp_near_ceiling(0.0)),
+        control=of(lambda: scenes.lamp_near_ceiling(0.0)),
     ),
     HardCase(
         "boxes-on-floor",
         "boxes that stand on a floor, touch a wall, and pierce the floor",
         of(scenes.boxes_on_floor),
         under_boxes,
-        book=0.02,
-        book_reason=STANDING,
+        imbalance=0.02,
+        imbalance_reason=STANDING,
     ),
     HardCase(
         "thin-walls",
@@ -144,51 +148,51 @@ CASES: tuple[HardCase, ...] = (
         "slivers",
         "a floor cut by strips of 1 m by 0.1 mm",
         of(scenes.slivers),
-        as_twin(0.01, SAME),
-        twin=PLAIN,
-        book=0.02,
-        book_reason=PAST,
-        ways=SOLVERS_ONLY,
+        like_control(0.01, SAME),
+        control=PLAIN,
+        imbalance=0.02,
+        imbalance_reason=PAST,
+        methods=ONE_PROJECTION,
     ),
     HardCase(
         "degenerate-duplicate",
         "triangles without area, floor and table twice",
         of(scenes.spoiled),
-        as_twin(0.01, SAME),
-        twin=PLAIN,
-        book=0.02,
-        book_reason=PAST,
-        ways=SOLVERS_ONLY,
+        like_control(0.01, SAME),
+        control=PLAIN,
+        imbalance=0.02,
+        imbalance_reason=PAST,
+        methods=ONE_PROJECTION,
     ),
     HardCase(
         "winding",
         "double-sided walls, every other triangle wound the other way",
         of(lambda: scenes.double_sided(True)),
-        as_twin(0.03, HALVES),
+        like_control(0.03, HALVES),
         density=(16, 32),
-        book=0.02,
-        book_reason=HALVES,
-        twin=of(lambda: scenes.double_sided(False)),
-        ways=SOLVERS_ONLY,
+        imbalance=0.02,
+        imbalance_reason=HALVES,
+        control=of(lambda: scenes.double_sided(False)),
+        methods=ONE_PROJECTION,
     ),
     HardCase(
         "t-junctions",
         "floor tiles whose corners lie within their neighbours' edges, turned",
         of(scenes.t_junctions),
         tight,
-        twin=of(lambda: scenes.turned(scenes.furnished())),
-        book=0.02,
-        book_reason=PAST,
+        control=of(lambda: scenes.turned(scenes.furnished())),
+        imbalance=0.02,
+        imbalance_reason=PAST,
     ),
     HardCase(
         "far-away",
         "a furnished room millions of metres from the origin",
         of(lambda: scenes.transformed(scenes.furnished(), AWAY)),
-        as_twin(0.01, SAME),
-        twin=PLAIN,
-        book=0.02,
-        book_reason=PAST,
-        ways=SOLVERS_ONLY,
+        like_control(0.01, SAME),
+        control=PLAIN,
+        imbalance=0.02,
+        imbalance_reason=PAST,
+        methods=ONE_PROJECTION,
     ),
     _sized(1e-6),
     _sized(1e6),
@@ -214,8 +218,8 @@ CASES: tuple[HardCase, ...] = (
         "a ball of 1280 triangles (large: 81 920) in a glowing room",
         scenes.furnace_with_ball,
         glows(0.5, 0.02, FACETS),
-        book=0.03,
-        book_reason=FACETS,
+        imbalance=0.03,
+        imbalance_reason=FACETS,
     ),
     HardCase(
         "many-shots",
@@ -225,8 +229,8 @@ CASES: tuple[HardCase, ...] = (
         density=(4, 4),
         map=(128, 128),
         grazes=False,
-        shots=(4000, 100_000),
-        ways=(Way(), Way(storage="rgba16f")),
+        work=(4000, 100_000),
+        methods=(Method(), Method(storage="rgba16f")),
     ),
     *map(_corner, ANGLES),
 )

@@ -1,4 +1,4 @@
-"""What a hard case claims of its light: a closed form, the answer of a clean scene beside it (its twin), darkness, or an
+"""The checks of a hard case's light: a closed form, the answer of a clean scene beside it (its control), darkness, or an
 order of brightness, each with the reason why it may be off.
 """
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from app.reference.form_factors import point_to_polygon
 from app.scene.shapes import FACES
 from app.validation import scenes
-from app.validation.case import EACH, Claim, Light, dark, near
+from app.validation.case import EACH, Check, Solution, dark, near
 
-Claims = Callable[[Light, Light], list[Claim]]
+Checks = Callable[[Solution, Solution], list[Check]]
 
 BRIGHT = 1e6  # W/m²
 SUMS = "form factors of a shooter sum to 1 within 0.5 %, on average far better, and errors repeat at each bounce"
@@ -36,10 +36,10 @@ SAME = "which of two equal patches shoots first is chance, and as much as the re
 # -- closed forms ------------------------------------------------------------------------------------------------------
 
 
-def glows(albedo: float, tolerance: float, reason: str = SUMS, *, grazes: bool = True) -> Claims:
+def glows(albedo: float, tolerance: float, reason: str = SUMS, *, grazes: bool = True) -> Checks:
     """B = E / (1 - ρ), here of E = 1. What is unshot makes as much more, at every moment: H = (E - r) / (1 - ρ) on average."""
 
-    def claims(light: Light, _: Light) -> list[Claim]:
+    def checks(light: Solution, _: Solution) -> list[Check]:
         mean = light.mean(light.area > 0) * (1 - albedo) + light.share("unshot")
         B = 1.0 + albedo * light.H
         lost, why = (light.grazing * light.bounces, f"{reason}; {EACH}") if grazes else (0.0, reason)
@@ -54,25 +54,25 @@ def glows(albedo: float, tolerance: float, reason: str = SUMS, *, grazes: bool =
             near("spread of B", float(B.std() / B.mean()), 0.0, 0.03, "some patches have shot once more than others"),
         ]
 
-    return claims
+    return checks
 
 
-def faint_room(span: float) -> Claims:
+def faint_room(span: float) -> Checks:
     """As in the bright room but for the lamps' ratio."""
 
-    def claims(light: Light, _: Light) -> list[Claim]:
+    def checks(light: Solution, _: Solution) -> list[Check]:
         ratios = [light.mean(light.on(f"faint {f}")) / light.mean(light.on(f"bright {f}")) / span for f in FACES]
-        if light.way.projection == "stereographic":
+        if light.method.projection == "stereographic":
             return [dark("faint over bright room", max(ratios) * span, span + 2 / light.map**2, RIM)]
         return [
             near(f"faint over bright room, as their lamps, {w.__name__}", w(ratios), 1.0, 0.01, ORDER)
             for w in (min, max)
         ]
 
-    return claims
+    return checks
 
 
-def like_a_point(light: Light, _: Light) -> list[Claim]:
+def like_a_point(light: Solution, _: Solution) -> list[Check]:
     floor = light.on("bottom")
     offset = light.position[floor] - [0.5, 0.5, 0.5]
     flux = BRIGHT * scenes.LAMP_SHARE * 6
@@ -81,46 +81,46 @@ def like_a_point(light: Light, _: Light) -> list[Claim]:
     return [near("floor, RMS of H over Φ cosθ cosθ'/(π r²) - 1", float(np.sqrt((error**2).mean())), 0.0, 0.005, LAMP)]
 
 
-def plates(degrees: float) -> Claims:
+def plates(degrees: float) -> Checks:
     """Between plates of 1 m² at an angle: Lambert's closed form at points of the dark one that crowd towards the hinge. For
     plates without end along the hinge F = 1 - sin(θ/2), the crossed strings' rule; of these, light leaves at both ends."""
 
-    def claims(light: Light, _: Light) -> list[Claim]:
+    def checks(light: Solution, _: Solution) -> list[Check]:
         edges, angle = np.linspace(0, 1, 401) ** 2, np.radians(degrees)
         away, z = (edges[1:] + edges[:-1]) / 2, (np.arange(40) + 0.5) / 40
         points = np.stack(np.broadcast_arrays(away[:, None] * np.cos(angle), away[:, None] * np.sin(angle), z), -1)
         normals = np.broadcast_to([np.sin(angle), -np.cos(angle), 0.0], points.shape)
         F = float((point_to_polygon(points, normals, light.scene.positions[:4]).mean(1) * np.diff(edges)).sum())
-        endless = Claim("F of the plates / of endless ones", F / (1 - np.sin(angle / 2)), 1.0, 0.6, 1e-3, ENDS)
+        endless = Check("F of the plates / of endless ones", F / (1 - np.sin(angle / 2)), 1.0, 0.6, 1e-3, ENDS)
         return [near("light received / F", light.flux(light.on("plate")) / F, 1.0, 0.05, HINGE), endless]
 
-    return claims
+    return checks
 
 
-def through_slit(light: Light, _: Light) -> list[Claim]:
+def through_slit(light: Solution, _: Solution) -> list[Check]:
     heights, n = (np.arange(200) + 0.5) / 200, np.array([-1.0, 0.0, 0.0])
     points = np.stack([np.ones(200), heights, np.full(200, 0.5)], 1)
     lamp = np.array([[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1.0]])
     share = float(point_to_polygon(points, np.broadcast_to(n, points.shape), lamp).mean()) * scenes.SLIT
-    return [Claim("light through the slit / closed form", light.flux(behind(light)) / share, 1.0, 1.0, 20.0, MISSED)]
+    return [Check("light through the slit / closed form", light.flux(behind(light)) / share, 1.0, 1.0, 20.0, MISSED)]
 
 
-def behind(light: Light) -> NDArray[np.bool_]:
+def behind(light: Solution) -> NDArray[np.bool_]:
     """(n,) texels of the second room."""
     return (light.position[:, 0] > 1 + 1e-6) | (light.on("between") & (light.normal[:, 0] > 0))
 
 
-def shut(light: Light, _: Light) -> list[Claim]:
+def shut(light: Solution, _: Solution) -> list[Check]:
     return [dark("light behind the wall / emitted", light.flux(behind(light)), light.grazing, GRAZING)]
 
 
 # -- the same as a clean scene -----------------------------------------------------------------------------------------
 
 
-def as_twin(tolerance: float, reason: str, *names: str) -> Claims:
-    def claims(light: Light, twin: Light) -> list[Claim]:
-        shown = names or [n for n in twin.scene.objects if twin.mean(twin.on(n)) > 0 and n != "lamp"]
-        ratios = {n: light.mean(light.on(n)) / twin.mean(twin.on(n)) for n in shown}
+def like_control(tolerance: float, reason: str, *names: str) -> Checks:
+    def checks(light: Solution, control: Solution) -> list[Check]:
+        shown = names or [n for n in control.scene.objects if control.mean(control.on(n)) > 0 and n != "lamp"]
+        ratios = {n: light.mean(light.on(n)) / control.mean(control.on(n)) for n in shown}
         worst = max(ratios, key=lambda n: abs(ratios[n] - 1))
         return [
             near(
@@ -132,20 +132,20 @@ def as_twin(tolerance: float, reason: str, *names: str) -> Claims:
             )
         ]
 
-    return claims
+    return checks
 
 
-def tight(light: Light, twin: Light) -> list[Claim]:
-    rim = 2 / light.map**2 * light.bounces if light.way.projection == "stereographic" else 0.0
+def tight(light: Solution, control: Solution) -> list[Check]:
+    rim = 2 / light.map**2 * light.bounces if light.method.projection == "stereographic" else 0.0
     most, reason = 1e-4 + rim, f"{CRACKS}; {RIM}" if rim else CRACKS
-    leaves = Claim("light that leaves / emitted", light.share("escaped"), 0.0, most, most, reason, exact=False)
-    return [*as_twin(0.01, SAME)(light, twin), leaves]
+    leaves = Check("light that leaves / emitted", light.share("escaped"), 0.0, most, most, reason, exact=False)
+    return [*like_control(0.01, SAME)(light, control), leaves]
 
 
-def near_ceiling(light: Light, twin: Light) -> list[Claim]:
+def near_ceiling(light: Solution, control: Solution) -> list[Check]:
     over = light.on("top") & (np.abs(light.position[:, [0, 2]] - 0.5).max(1) < 0.125)
     return [
-        *as_twin(0.01, SAME, *[f for f in FACES if f != "top"])(light, twin),
+        *like_control(0.01, SAME, *[f for f in FACES if f != "top"])(light, control),
         dark(
             "ceiling over the lamp / its mean",
             float(light.H[over].max(initial=0.0)) / light.mean(light.on("top")),
@@ -158,20 +158,20 @@ def near_ceiling(light: Light, twin: Light) -> list[Claim]:
 # -- darkness ----------------------------------------------------------------------------------------------------------
 
 
-def under_boxes(light: Light, _: Light) -> list[Claim]:
-    claims, mean = [], light.mean(light.on("bottom"))
+def under_boxes(light: Solution, _: Solution) -> list[Check]:
+    checks, mean = [], light.mean(light.on("bottom"))
     for name, middle in {"stands": (0.75, 1.5), "touches": (0.25, 0.5), "pierces": (1.5, 0.75)}.items():
         inside = np.abs(light.position[:, [0, 2]] - middle).max(1) < 0.25 - 1 / 16
         floor, bottom = (
             inside & light.on("bottom"),
             light.on(name) & (light.position[:, 1] < 1e-6) & (light.normal[:, 1] < -0.5),
         )
-        claims.append(dark(f"floor under what {name} / floor", light.mean(floor) / mean, light.grazing, GRAZING))
-        claims.append(dark(f"bottom of what {name} / floor", light.mean(bottom) / mean, light.grazing, GRAZING))
-    return claims
+        checks.append(dark(f"floor under what {name} / floor", light.mean(floor) / mean, light.grazing, GRAZING))
+        checks.append(dark(f"bottom of what {name} / floor", light.mean(bottom) / mean, light.grazing, GRAZING))
+    return checks
 
 
-def one_room_lit(light: Light, _: Light) -> list[Claim]:
+def one_room_lit(light: Solution, _: Solution) -> list[Check]:
     x, nx = light.position[:, 0], light.normal[:, 0]
     left = (x < 1 - 1e-6) | (light.on("sheet") & (nx < 0))
     right = (x > 2 + scenes.THICKNESS / 4) & ~(light.on("slab") & (nx < 0))
@@ -181,11 +181,11 @@ def one_room_lit(light: Light, _: Light) -> list[Claim]:
     ]
 
 
-def ever_darker(light: Light, _: Light) -> list[Claim]:
+def ever_darker(light: Solution, _: Solution) -> list[Check]:
     cells = [light.mean(light.on("bottom") & (np.floor(light.position[:, 0]) == i)) for i in range(5)]
     steps = [b / a if a > 0 else 0.0 for a, b in itertools.pairwise(cells[:4])]
     return [
-        Claim(
+        Check(
             "floor of a cell / of that before, most",
             max(steps),
             0.0,
@@ -194,7 +194,7 @@ def ever_darker(light: Light, _: Light) -> list[Claim]:
             "doors let a quarter through",
             exact=False,
         ),
-        Claim(
+        Check(
             "floor of a cell / of that before, least",
             min(steps),
             1.0,

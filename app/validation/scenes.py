@@ -1,4 +1,4 @@
-"""Scenes that are hard on a light solver, each of few parts: rooms, plates, slits, boxes, slivers.
+"""The scenes of the hard cases, each of few parts: rooms, plates, slits, boxes, slivers.
 
 Every part is an object, so that light can be asked for by its name. Edges are multiples of 1/16 m where texels should end there.
 """

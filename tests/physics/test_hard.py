@@ -1,4 +1,4 @@
-"""The hard cases in their small size: see app/bench/hard_cases.py for what is expected and why. Quadtrees with the hemicube only:
+"""The hard cases in their small size: see app/validation/cases.py for what is expected and why. Quadtrees with the hemicube only:
 ``glowtree bench hard`` solves them with the hemispheres too."""
 
 from __future__ import annotations
@@ -6,49 +6,66 @@ from __future__ import annotations
 import dataclasses
 import json
 
+import numpy as np
 import pytest
+from constant_solver import FAMILY
 
 from app.cli import run
 from app.gpu import Gpu
-from app.solvers import DEFAULT_SOLVER
+from app.solvers import SOLVERS
 from app.validation import run as hard
-from app.validation.case import HardCase, Twins, Way, near
+from app.validation.case import HEMICUBE, Controls, HardCase, Method, methods_of, near
 from app.validation.cases import CASES
 from app.validation.run import allowed
 
 
 @pytest.fixture(scope="module")
-def twins() -> Twins:
+def controls() -> Controls:
     """Solved so far."""
     return {}
 
 
 @pytest.mark.parametrize(
-    ("case", "way"),
+    ("case", "method"),
     [
-        pytest.param(case, way, id=f"{case.name} {way.name}", marks=() if way == Way() else pytest.mark.long)
+        pytest.param(
+            case, method, id=f"{case.name} {method.name}", marks=() if method == Method() else pytest.mark.long
+        )
         for case in CASES
-        for way in case.ways
-        if way.solver == DEFAULT_SOLVER or way.projection == "hemicube"
+        for method in case.methods
+        if not method.adaptive or method.projection in (None, HEMICUBE)
     ],
 )
-def test_hard_case(gpu: Gpu, twins: Twins, case: HardCase, way: Way) -> None:
-    _, claims = case.run(gpu, way, "small", twins)
-    broken = [c for c in claims if not c.holds]
+def test_hard_case(gpu: Gpu, controls: Controls, case: HardCase, method: Method) -> None:
+    _, checks = case.run(gpu, method, "small", controls)
+    broken = [c for c in checks if not c.holds]
     assert not broken, "; ".join(f"{c.what}: {c.measured:.6g}, not {c.expected:.4g} {allowed(c)}" for c in broken)
+
+
+def test_any_family_of_solvers_has_its_methods(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One without projections is solved on uniform texels and quadtrees, by options that it has, and its light is checked."""
+    monkeypatch.setitem(SOLVERS, "constant", FAMILY)
+    uniform, adaptive = methods_of("constant")
+    assert (uniform.name, adaptive.name) == ("constant uniform", "constant adaptive")
+    case = next(c for c in CASES if c.name == "furnace-0.99")
+    solution, checks = case.run(gpu, uniform, "small", {})
+    assert solution.work == 6 and np.allclose(solution.H, 2.0), "until a fiftieth remains"
+    assert [c.what for c in checks if not c.holds] == ["mean B, once all is shot, x (1 - ρ) / E"], "as dark as it is"
 
 
 def test_command_prints_what_holds_and_fails_where_one_does_not(
     gpu: Gpu, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    case = dataclasses.replace(next(c for c in CASES if c.name == "corner-90"), ways=(Way(), Way(storage="fixed8")))
+    case = dataclasses.replace(
+        next(c for c in CASES if c.name == "corner-90"), methods=(Method(), Method(storage="fixed8"))
+    )
     monkeypatch.setattr(hard, "CASES", (case,))
     assert run(["bench", "hard", "--only", "corner-90"]) == 0
     text = capsys.readouterr().out
     assert "| corner-90 |" in text and "FAILED" not in text
     assert case.about in text and "of the light here" in text
     wrong = dataclasses.replace(
-        case, ways=(Way(),), claims=lambda light, twin: [near("light", 1.0, 2.0, 0.5, "no reason")]
+        case, methods=(Method(),), checks=lambda light, control: [near("light", 1.0, 2.0, 0.5, "no reason")]
     )
     monkeypatch.setattr(hard, "CASES", (wrong,))
     assert run(["bench", "hard", "--json"]) == 1
