@@ -1,4 +1,4 @@
-"""What measurements were made on."""
+"""The machine that measurements are made on: its processor, its system, how busy it is."""
 
 from __future__ import annotations
 

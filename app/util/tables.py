@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 Row = dict[str, Any]
-FLIP = "flip_evaluator"  # see flip.py
+FLIP = "flip_evaluator"  # see app/bench/flip.py
 
 
 @dataclass(frozen=True)

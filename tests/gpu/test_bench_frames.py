@@ -7,9 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from app.bench.speed import drag as drags
-from app.bench.speed import frames
-from app.bench.speed.drag import DECADES, DEPTHS, DRAGGED, SWEEP, SWEEPS, drag
+from app.bench.speed import frames, slider_drag
+from app.bench.speed.slider_drag import DECADES, DEPTHS, DRAGGED, SWEEP, SWEEPS, drag
 from app.cli import run
 from app.lightmap.options import LightmapOptions
 
@@ -28,7 +27,7 @@ def test_a_hand_goes_there_and_back_in_small_steps() -> None:
 
 
 def test_drags_are_measured(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(drags, "SWEEP", 4)
+    monkeypatch.setattr(slider_drag, "SWEEP", 4)
     monkeypatch.setattr(frames, "WARM_UP", 2)
     command = ["bench", "frames", "cornell-box", "--adaptive", "--drag", "--texels", "2000", "--depth", "3"]
     assert run([*command, "--json"]) == 0

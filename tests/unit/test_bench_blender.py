@@ -19,7 +19,7 @@ from app.bench.peers.blender import Baked
 from app.errors import UserError
 from app.lightmap.at_points import light_at
 from app.lightmap.tile_pool import TilePool
-from app.reference.truth import truth_of
+from app.reference.irradiance import reference_irradiance
 from app.scene.load import load_scene
 from app.scene.model import Scene
 from app.session.loading import read_and_unfold
@@ -120,7 +120,7 @@ def test_a_bake_that_fails_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path
 @pytest.mark.parametrize("name", ["cycles", "cycles-oidn"])
 def test_samples_double_until_the_time_is_over(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     scene = load_scene("furnace")
-    truth, asked = truth_of(scene, "closed-form", 1, silent), []
+    reference, asked = reference_irradiance(scene, "closed-form", 1, silent), []
 
     def bake(scene: Scene, charts: object, samples: int, *, denoise: bool) -> Baked:
         asked.append(denoise)
@@ -129,7 +129,7 @@ def test_samples_double_until_the_time_is_over(monkeypatch: pytest.MonkeyPatch, 
         return Baked(image, 1.0 * samples, 2.0 * samples, "Blender 0")
 
     monkeypatch.setattr(peers, "bake", bake)
-    rows = peers.PEERS[name].curve(peers.Task(scene, truth, None, AtlasOptions(texels=600), 8.0))
+    rows = peers.PEERS[name].curve(peers.Task(scene, reference, None, AtlasOptions(texels=600), 8.0))
     assert [row["paths"] for row in rows] == [1, 2, 4, 8] and set(asked) == {name == "cycles-oidn"}
     assert [row["rms"] for row in rows] == pytest.approx([1, 0.5, 0.25, 0.125])
     assert [row["cpu_seconds"] for row in rows] == [2.0, 4.0, 8.0, 16.0]

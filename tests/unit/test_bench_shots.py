@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from app.atlas.options import AtlasOptions
-from app.bench.speed.copy import Copy
-from app.bench.speed.shots import bounds, passes_ms
-from app.bench.speed.stream import Stream, texel_bytes
+from app.bench.speed.memory_copy import MemoryCopy
+from app.bench.speed.receiver_traffic import ReceiverTraffic, texel_bytes
+from app.bench.speed.shots import bounds
+from app.bench.timing import BATCH, passes_ms
 from app.gpu import Gpu
 from app.lightmap.options import LightmapOptions
 from app.session.batch import opened
 from app.solvers import ShootingOptions
 from app.solvers.shooting.solver import Shooting
-from app.solvers.shooting.stages import BATCH
 from app.util.parts import run_to_end
 
 GB = 1e9
@@ -42,32 +42,31 @@ def test_what_bounds_the_receiver_pass(receive_ms: float, stream_ms: float, copy
 
 @pytest.mark.parametrize(("storage", "light"), [("rgba32f", 2 * 2 * 16), ("rgba16f", 2 * 2 * 8), ("fixed8", 2 * 2 * 4)])
 def test_bytes_of_a_texel_follow_from_its_formats(gpu: Gpu, storage: str, light: int) -> None:
-    with opened(
-        gpu, "textured-room", AtlasOptions(texels=600), LightmapOptions(storage=storage), ShootingOptions()
-    ) as (lightmap, _):
+    held = LightmapOptions(storage=storage)
+    with opened(gpu, "textured-room", AtlasOptions(texels=600), held, ShootingOptions()) as (lightmap, _):
         albedo = 4 * np.dtype(lightmap.pool.arrays["t_albedo"].dtype).itemsize
         assert texel_bytes(lightmap, flat=True) == light + albedo
         assert texel_bytes(lightmap, flat=False) == light + albedo + 16 + 8
 
 
 @pytest.mark.parametrize("visibility", ["item-id", "combined"])
-def test_the_stream_draws_the_texels_of_the_receiver_pass_and_changes_no_light(gpu: Gpu, visibility: str) -> None:
+def test_the_traffic_draws_the_texels_of_the_receiver_pass_and_changes_no_light(gpu: Gpu, visibility: str) -> None:
     options = ShootingOptions(visibility=visibility)
     with opened(gpu, "cornell-box", AtlasOptions(texels=8_000), LightmapOptions(), options) as (lightmap, solver):
         assert isinstance(solver, Shooting) and set(lightmap.receivers) == {True, False}
         solver.reset()
         run_to_end(solver.work(BATCH))
-        stream, steps = Stream(gpu, solver), solver.passes(BATCH)
+        traffic, steps = ReceiverTraffic(gpu, solver), solver.passes(BATCH)
         steps["choose"]()
         before = lightmap.irradiance(), lightmap.residual()
-        stream.run()
+        traffic.run()
         for was, now in zip(before, (lightmap.irradiance(), lightmap.residual()), strict=True):
             # what is read is below 2^32, and 1e-30 of it is added
             np.testing.assert_allclose(was, now, rtol=0, atol=1e-20 * lightmap.unit * BATCH)
         query = gpu.ctx.query(samples=True)
         with query:
             steps["receive"]()
-        moved = stream.moved()
+        moved = traffic.moved()
         maps = moved["see"] / 2 * (1 if visibility == "item-id" else 2)
         received = (moved["receive"] - maps) * BATCH
         least, most = (query.samples * texel_bytes(lightmap, flat=flat) for flat in (True, False))
@@ -76,7 +75,7 @@ def test_the_stream_draws_the_texels_of_the_receiver_pass_and_changes_no_light(g
 
 def test_all_of_it_is_timed_in_turns(gpu: Gpu) -> None:
     with opened(gpu, "furnace", AtlasOptions(texels=600), LightmapOptions(), ShootingOptions()) as (lightmap, solver):
-        copy, runs = Copy(gpu, lightmap.size), list[Any]()
+        copy, runs = MemoryCopy(gpu, lightmap.size), list[Any]()
 
         def run() -> None:
             runs.append(None)

@@ -13,8 +13,11 @@ import pytest
 
 from app.atlas.options import AtlasOptions
 from app.atlas.points import random_points
-from app.bench.papers import equal, measure, published, tables
-from app.bench.papers.rooms import FEWEST, room_of
+from app.bench.papers import convergence, coombe_subdivision, equal_error, published, scaling, tables
+from app.bench.papers.sphere_rooms import FEWEST, room_of
+from app.bench.papers.table import Measure, Table
+from app.bench.solves import timed_solve
+from app.bench.timing import BATCH
 from app.cli import run
 from app.errors import UserError
 from app.gpu import Gpu
@@ -22,7 +25,6 @@ from app.lightmap.at_points import irradiance_of
 from app.lightmap.options import LightmapOptions
 from app.session.batch import opened
 from app.solvers import ShootingOptions
-from app.solvers.shooting.stages import BATCH
 from app.util.parts import run_to_end
 from app.util.tables import Column, csv_text, markdown_table
 
@@ -30,10 +32,8 @@ COLUMNS = (Column("scene", "scene"), Column("n", "texels", ","), Column("ms", "m
 ROWS = [{"scene": "a", "n": 31_000, "ms": 0.123456}, {"scene": "long name", "n": None, "other": 1}]
 
 
-def table(name: str, *jobs: tables.Measure) -> tables.Table:
-    return tables.Table(
-        name, name, "nobody", ("note",), COLUMNS, tuple((f"job {k}", job) for k, job in enumerate(jobs))
-    )
+def table(name: str, *jobs: Measure) -> Table:
+    return Table(name, name, "nobody", ("note",), COLUMNS, tuple((f"job {k}", job) for k, job in enumerate(jobs)))
 
 
 def test_markdown_is_aligned_and_empty_where_nothing_is() -> None:
@@ -75,14 +75,14 @@ def test_exponents_within_a_sweep_only() -> None:
         {"sweep": "triangles", "n": 100, "shot_ms": 10.0, "receive_ms": 5.0},
         {"sweep": "texels", "n": 1000, "shot_ms": 1.0, "receive_ms": 1.0},
     ]
-    measure.exponents(rows)
+    scaling.add_exponents(rows)
     assert rows[1]["shot_power"] == pytest.approx(1.0) and rows[1]["receive_power"] == pytest.approx(0.0)
     assert "shot_power" not in rows[0] and "shot_power" not in rows[2]
 
 
 def test_first_below() -> None:
     curve = [(0, 1.0), (8, 0.4), (16, 0.1)]
-    assert [measure.first_below(curve, level) for level in (0.5, 0.1, 0.05)] == [8, 16, None]
+    assert [convergence.first_below(curve, level) for level in (0.5, 0.1, 0.05)] == [8, 16, None]
 
 
 def test_columns_of_all_tables_differ() -> None:
@@ -189,7 +189,7 @@ def test_without_an_extra_all_but_its_columns_is_measured(
 
 
 def test_flip_sees_what_has_changed(rng: np.random.Generator) -> None:
-    flip = pytest.importorskip("app.bench.accuracy.flip", reason="of the extra bench", exc_type=ImportError).flip
+    flip = pytest.importorskip("app.bench.flip", reason="of the extra bench", exc_type=ImportError).flip
     picture = rng.uniform(0.2, 0.8, (24, 32, 3))
     assert flip(picture, picture) == 0.0
     slightly, clearly = picture.copy(), picture.copy()
@@ -202,27 +202,28 @@ def test_curve_is_of_the_state_after_its_shots(gpu: Gpu) -> None:
     """The first point again with exactly so many shots: an off-by-one batch is 10 % and more at the start."""
     options = ShootingOptions(residual=0.5)
     with opened(gpu, room_of(37), AtlasOptions(texels=1_500), LightmapOptions(), options) as (_, solver):
-        run = measure.shoot(gpu, solver, 60.0)
-        shots, residual = run.curve[1]
+        solve = timed_solve(gpu, solver, BATCH, 60.0)
+        shots, residual = solve.curve[1]
         solver.reset()
         while solver.poll(wait=True).done < shots:
             run_to_end(solver.work(BATCH))
-        assert solver.poll().done == shots
-        assert solver.settle().remaining == pytest.approx(residual, rel=1e-4)  # sums of 32-bit floats
-        assert [s for s, _ in run.curve] == sorted({s for s, _ in run.curve}) and run.settled
-        assert run.curve[-1] == (run.shots, run.residual)
+        again = solver.settle()
+        assert again.done == shots
+        assert again.remaining == pytest.approx(residual, rel=1e-4)  # sums of 32-bit floats
+        assert [s for s, _ in solve.curve] == sorted({s for s, _ in solve.curve}) and solve.converged
+        assert solve.curve[-1] == (solve.done, solve.remaining)
 
 
 def test_a_row_is_measured(gpu: Gpu) -> None:
     """Small and short: that numbers come out, not which."""
-    row = measure.scaling_row(gpu, 0.1, "triangles", 100, 2_000)
+    row = scaling.measure_row(gpu, 0.1, "triangles", 100, 2_000)
     assert row["triangles"] == row["n"] == 100
     assert 1_500 < row["texels"] < 2_500, "a number of texels is met roughly"
     assert 0 < row["see_ms"] and 0 < row["receive_ms"] and 0 < row["shot_ms"] < 1e3
 
 
 def test_uniform_and_adaptive_are_measured(gpu: Gpu) -> None:
-    row = measure.coombe_row(gpu, 0.1, published.COOMBE_TABLE_1[0], texels=4_000)
+    row = coombe_subdivision.measure_row(gpu, 0.1, published.COOMBE_TABLE_1[0], texels=4_000)
     assert 3_000 < row["uniform_texels"] < 5_000 and 0 < row["adaptive_texels"] < 2 * row["uniform_texels"]
     assert row["uniform_shots"] > 0 and row["uniform_s"] > 0 and row["adaptive_s"] > 0
     assert row["their_uniform_s"] == 0.25
@@ -235,7 +236,7 @@ def test_equal_error_is_read_between_uniform_rows() -> None:
         {"subdivision": "uniform", "texels": texels, "seconds": s, "rms": rms} for texels, s, rms in uniform
     ]
     rows += [{"subdivision": "adaptive", "texels": 2e3, "seconds": 2.0, "rms": rms} for rms in (0.02, 0.005)]
-    equal.compared(rows)
+    equal_error.add_equal_uniform(rows)
     assert rows[2]["equal_texels"] == pytest.approx(1e4) and rows[2]["texels_share"] == pytest.approx(0.2)
     assert rows[2]["equal_seconds"] == pytest.approx(10) and rows[2]["seconds_share"] == pytest.approx(0.2)
     assert "equal_texels" not in rows[3] and "equal_texels" not in rows[0]

@@ -1,4 +1,4 @@
-"""What ``glowtree bench error`` compares: the solvers, and one choice at a time besides the default."""
+"""The methods that ``glowtree bench error`` compares: the default, and one choice at a time besides it."""
 
 from __future__ import annotations
 
@@ -9,55 +9,74 @@ from typing import Any
 
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import ROOT_SHARE
+from app.bench.choices import chosen_names
 from app.lightmap.options import LightmapOptions
-from app.solvers import ShootingOptions
+from app.options import Options, from_flags
+from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
+
+
+@dataclass(frozen=True)
+class Setup:
+    """How a scene is cut, how its light is held, and which solver finds it."""
+
+    atlas: AtlasOptions
+    light: LightmapOptions
+    solver: str
+    options: Options
+
+    @property
+    def family(self) -> Family:
+        return SOLVERS[self.solver]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For reports: options of the solver under its name."""
+        return {
+            "atlas": self.atlas.as_dict(),
+            "lightmap": self.light.as_dict(),
+            self.solver: self.options.as_dict(),
+        }
 
 
 @dataclass(frozen=True)
 class Method:
-    """axis: what is chosen. adaptive: whether the lightmap is. shooting, light: options that differ from those that were asked
-    for."""
+    """axis: what is chosen. solver: of SOLVERS. options, light: those of the solver and of the lightmap that differ from what was
+    asked for."""
 
     axis: str
-    adaptive: bool = False
-    shooting: Mapping[str, Any] = field(default_factory=dict)
-    light: Mapping[str, Any] = field(default_factory=dict)
+    solver: str = DEFAULT_SOLVER
+    options: Mapping[str, Any] = field(default_factory=dict)
+    light: dict[str, Any] = field(default_factory=dict)
 
-    def options(
-        self, texels: int | None, light: LightmapOptions, shooting: ShootingOptions
-    ) -> tuple[AtlasOptions, LightmapOptions, ShootingOptions]:
-        """texels: uniform ones; quadtrees begin with a sixteenth, so that some of their leaves become as fine or finer."""
+    @property
+    def adaptive(self) -> bool:
+        return bool(self.light.get("adaptive", False))
+
+    def setup(self, texels: int | None, flags: argparse.Namespace) -> Setup:
+        """texels: uniform ones; quadtrees begin with a sixteenth, so that some of their leaves become as fine or finer. flags:
+        all other options that were asked for. Raises UserError."""
         if self.adaptive and texels is not None:
             texels = max(texels // ROOT_SHARE, 1)
-        held = light.replace(adaptive=self.adaptive, **self.light)
-        return AtlasOptions(texels=texels), held, shooting.replace(**self.shooting)
+        light = from_flags(LightmapOptions, flags).replace(**({"adaptive": False} | self.light))
+        options = from_flags(SOLVERS[self.solver].options, flags).replace(**self.options)
+        return Setup(AtlasOptions(texels=texels), light, self.solver, options)
 
 
 METHODS = {
-    "uniform": Method("solver"),
-    "adaptive": Method("solver", adaptive=True),
-    "disc": Method("form factor", shooting={"form_factor": "disc"}),
-    "item-id": Method("visibility", shooting={"visibility": "item-id"}),
-    "depth": Method("visibility", shooting={"visibility": "depth"}),
-    "stereographic": Method("projection", shooting={"projection": "stereographic"}),
-    "nonlinear": Method("projection", shooting={"projection": "nonlinear"}),
+    "uniform": Method("lightmap"),
+    "adaptive": Method("lightmap", light={"adaptive": True}),
+    "disc": Method("form factor", options={"form_factor": "disc"}),
+    "item-id": Method("visibility", options={"visibility": "item-id"}),
+    "depth": Method("visibility", options={"visibility": "depth"}),
+    "stereographic": Method("projection", options={"projection": "stereographic"}),
+    "nonlinear": Method("projection", options={"projection": "nonlinear"}),
     "rgba16f": Method("storage", light={"storage": "rgba16f"}),
     "fixed8": Method("storage", light={"storage": "fixed8"}),
-    "level-1": Method("shooting level", shooting={"level": 1}),
-    "level-3": Method("shooting level", shooting={"level": 3}),
+    "level-1": Method("shooting level", options={"level": 1}),
+    "level-3": Method("shooting level", options={"level": 3}),
 }
 DEFAULT_METHODS = ("uniform", "adaptive", "disc", "item-id", "level-1", "level-3")
 
 
 def method_names(text: str) -> tuple[str, ...]:
     """Of ``--methods``: names with commas between them, or all."""
-    return names_of(text, METHODS)
-
-
-def names_of(text: str, known: Mapping[str, object]) -> tuple[str, ...]:
-    """Each once, in the order given. Raises ArgumentTypeError for one that is not known."""
-    names = tuple(known) if text == "all" else tuple(dict.fromkeys(text.split(",")))
-    for name in names:
-        if name not in known:
-            raise argparse.ArgumentTypeError(f"{name}: must be all, or some of {', '.join(known)}")
-    return names
+    return chosen_names(text, METHODS)

@@ -1,1 +1,1 @@
-"""The tables of the papers, ours beside theirs."""
+"""The tables of [Coombe03] and [Wallner10], measured on this machine and beside the published numbers: a file for each table."""

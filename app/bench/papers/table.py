@@ -1,4 +1,4 @@
-"""What a table of a paper is here: its columns, the jobs that measure its rows, and how it is plotted."""
+"""What a table of the papers is: its columns, the jobs that measure its rows, and perhaps a plot of them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from app.gpu import Gpu
 from app.util.tables import Column, Row
 
+SOLVE = 10  # times as long as another measurement a solve may take
 Measure = Callable[[Gpu, float], Row]
 
 

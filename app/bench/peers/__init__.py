@@ -1,1 +1,1 @@
-"""Other programs on the same plot."""
+"""Other programs that solve the same scene on the same machine: Mitsuba, and Blender's Cycles with and without a denoiser."""

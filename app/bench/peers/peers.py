@@ -1,4 +1,4 @@
-"""Other programs on the same plot: same scene, same points, same machine."""
+"""The table of other programs, and the error curve of each: same scene, same points, same machine."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from functools import partial
 import numpy as np
 
 from app.atlas.options import AtlasOptions
-from app.bench.accuracy.curve import Stopwatch, errors
-from app.bench.accuracy.methods import names_of
-from app.bench.accuracy.view import View
+from app.bench.accuracy.error_curve import errors
+from app.bench.accuracy.reference_picture import ReferencePicture
+from app.bench.choices import chosen_names
 from app.bench.peers.blender import bake, no_cycles
+from app.bench.stopwatch import Stopwatch
 from app.lightmap.at_points import light_at
-from app.reference.truth import PATHS_SEED, Truth, no_tracer
+from app.reference.irradiance import PATHS_SEED, ReferenceIrradiance, no_tracer
 from app.scene.model import Scene
 from app.session.loading import read_and_unfold
 from app.util.tables import Row
@@ -28,8 +29,8 @@ class Task:
     """What a peer is to do, within about so many seconds. atlas: for one that bakes."""
 
     scene: Scene
-    truth: Truth
-    view: View | None
+    reference: ReferenceIrradiance
+    picture: ReferencePicture | None
     atlas: AtlasOptions
     seconds: float
 
@@ -47,11 +48,11 @@ def _mitsuba(task: Task) -> list[Row]:
     Raises UserError."""
     from app.reference import path_tracer as tracer
 
-    scene, truth, view = task.scene, task.truth, task.view
+    scene, reference, picture = task.scene, task.reference, task.picture
     traced = tracer.Tracer(scene)
-    place = truth.points.positions_normals(scene)
+    place = reference.points.positions_normals(scene)
     rows: list[Row] = []
-    total, paths, batch, nth = np.zeros_like(truth.E), 0, 1, 0
+    total, paths, batch, nth = np.zeros_like(reference.E), 0, 1, 0
     traced.irradiance(*place, batch, PEER_SEED)  # kernels are compiled when they first run
     watch, cpu = Stopwatch(), Stopwatch(time.process_time)
     while not rows or 2 * watch.seconds <= task.seconds:
@@ -60,17 +61,17 @@ def _mitsuba(task: Task) -> list[Row]:
         paths += batch
         with watch.held(), cpu.held():
             rows.append({"seconds": watch.seconds, "cpu_seconds": cpu.seconds, "paths": paths})
-            rows[-1] |= errors(total / paths, truth)
+            rows[-1] |= errors(total / paths, reference)
         batch = paths
-    if view is not None:
-        each = max(round(paths * len(truth.points) / len(view.points)), 1)
-        rows[-1]["flip"] = view.flip(traced.irradiance(*view.points.positions_normals(scene), each, PEER_SEED))
+    if picture is not None:
+        each = max(round(paths * len(reference.points) / len(picture.points)), 1)
+        rows[-1]["flip"] = picture.flip(traced.irradiance(*picture.points.positions_normals(scene), each, PEER_SEED))
     return rows
 
 
 def _cycles(task: Task, *, denoise: bool) -> list[Row]:
     """Lightmaps with 1, 2, 4 … samples of each texel, each baked by itself; building the scene is not timed. Raises UserError."""
-    truth, view = task.truth, task.view
+    reference, picture = task.reference, task.picture
     _, charts, _ = read_and_unfold(task.scene, task.atlas, False, lambda text, share: None)
     sides = np.diff(charts.face_uv, axis=1)
     texels = round(np.abs(np.linalg.det(sides)).sum() / 2)
@@ -79,9 +80,9 @@ def _cycles(task: Task, *, denoise: bool) -> list[Row]:
         baked = bake(task.scene, charts, 1 << len(rows), denoise=denoise)
         row: Row = {"seconds": baked.seconds, "cpu_seconds": baked.cpu_seconds, "paths": 1 << len(rows)}
         row |= {"texels": texels, "made": baked.made}
-        rows.append(row | errors(light_at(baked.irradiance, charts, truth.points), truth))
-    if view is not None:
-        rows[-1]["flip"] = view.flip(light_at(baked.irradiance, charts, view.points))
+        rows.append(row | errors(light_at(baked.irradiance, charts, reference.points), reference))
+    if picture is not None:
+        rows[-1]["flip"] = picture.flip(light_at(baked.irradiance, charts, picture.points))
     return rows
 
 
@@ -94,4 +95,4 @@ PEERS = {
 
 def peer_names(text: str) -> tuple[str, ...]:
     """Of ``--peers``: names with commas between them, or all."""
-    return names_of(text, PEERS)
+    return chosen_names(text, PEERS)

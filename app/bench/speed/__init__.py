@@ -1,1 +1,1 @@
-"""Milliseconds: of shots, passes and frames."""
+"""Milliseconds: of a shot and its passes, beside the memory they move, and of the viewer's frames."""

@@ -1,11 +1,11 @@
-"""``glowtree bench frames``: milliseconds per frame of the viewer at 1280×720 while it shoots, by part.
+"""``glowtree bench frames``: milliseconds per frame of the viewer at 1280×720 while it solves, by part.
 
-The scene opens as in the window, beside the first frames. A frame is the window's own, drawn into a texture instead: hear and
-shoot, build the interface and draw it with the view, wait until the GPU has done it. Every part ends with glFinish, so that its
+The scene opens as in the window, beside the first frames. A frame is the window's own, drawn into a texture instead: poll and
+solve, build the interface and draw it with the view, wait until the GPU has done it. Every part ends with glFinish, so that its
 time is its own. CPU time is that of the whole process over all cores: on a software rasteriser it includes the GPU's work, and
 other programs on the machine do not change it.
 
-With ``--drag`` a hand moves the sliders of the quadtrees meanwhile, a little in each frame: see drag.py.
+With ``--drag`` a hand moves the sliders of the quadtrees meanwhile, a little in each frame: see slider_drag.py.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from app.bench.speed.drag import DRAGGED, drag
+from app.bench.speed.slider_drag import DRAGGED, drag
 from app.commands.steps import session_options
 from app.errors import UserError
 from app.gpu import Gpu, gpu_context
@@ -31,7 +31,7 @@ from app.util.console import Console
 from app.viewer.ui_frame import UiFrame
 
 SIZE = (1280, 720)
-PARTS = ("hear", "shoot", "draw")
+PARTS = ("poll", "solve", "draw")
 WARM_UP = 30  # frames: shaders are compiled, the panels stand
 FRAMES = 300
 SLOW = 1e3 / 30  # ms

@@ -3,32 +3,29 @@
 The Cornell box is cut three times, then a museum and a grotto of the paper's sizes. A shot is timed alone, as the viewer shoots,
 and in batches, as the headless solver does (means over the shots made); the passes of a batch one by one, each to the end of its
 GPU work, for the shooters that the solve chooses (medians, divided by the shots of a batch). Audits, of the first strong shots of
-a solve only, are timed by themselves. What bounds them is measured beside
-them, in turns: the bytes that they must move (stream.py) against a plain copy, and the receiver pass without its arithmetic.
+a solve only, are timed by themselves. What bounds them is measured beside them, in turns: the bytes that they must
+move (receiver_traffic.py) against a plain copy, and the receiver pass without its arithmetic.
 """
 
 from __future__ import annotations
 
 import argparse
-import statistics
-import time
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Generator, Mapping
 from typing import Any
 
 from app.atlas.options import AtlasOptions
-from app.bench.speed.copy import Copy
-from app.bench.speed.stream import Stream
+from app.bench.speed.memory_copy import MemoryCopy
+from app.bench.speed.receiver_traffic import ReceiverTraffic
+from app.bench.timing import BATCH, ms_per_shot, passes_ms
 from app.gpu import Gpu, gpu_context
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
 from app.options import from_flags
 from app.session.loading import load
-from app.solvers import ShootingOptions, Solver
+from app.solvers import ShootingOptions
 from app.solvers.shooting.shot import AuditTargets
 from app.solvers.shooting.solver import Shooting
-from app.solvers.shooting.stages import BATCH
 from app.util.console import Console
-from app.util.parts import run_to_end
 from app.util.tables import Column, Row, markdown, markdown_table
 
 SIZES = (
@@ -108,8 +105,8 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions, light: 
     single_ms = ms_per_shot(gpu, solver, 1, SECONDS)
     ms_per_shot(gpu, solver, BATCH, WARM_UP)
     shot_ms = ms_per_shot(gpu, solver, BATCH, SECONDS)
-    stream, copy = Stream(gpu, solver), Copy(gpu, lightmap.size)
-    beside = {"stream": stream.run, "copy": copy.run, "audit": lambda: try_one(solver)}
+    traffic, copy = ReceiverTraffic(gpu, solver), MemoryCopy(gpu, lightmap.size)
+    beside = {"stream": traffic.run, "copy": copy.run, "audit": lambda: try_one(solver)}
     times = passes_ms(gpu, solver, SECONDS, beside)
     stream_ms, copy_ms, audit_ms = (times.pop(name) for name in beside)
     row = {
@@ -121,45 +118,11 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions, light: 
         "pass_ms": times,
         "audit_ms": audit_ms * BATCH,
     }
-    row |= bounds(times, stream.moved(), stream_ms, copy.moved / (BATCH * copy_ms * 1e-3))
+    row |= bounds(times, traffic.moved(), stream_ms, copy.moved / (BATCH * copy_ms * 1e-3))
     copy.release()
     solver.release()
     lightmap.release()
     return row
-
-
-def ms_per_shot(gpu: Gpu, solver: Solver[ShootingOptions], batch: int, seconds: float) -> float:
-    """Mean wall time of a shot that was made [ms]; a batch leaves out those too weak beside its best."""
-    before = solver.poll(wait=True).done
-    gpu.ctx.finish()
-    start = time.perf_counter()
-    while time.perf_counter() < start + seconds:
-        run_to_end(solver.work(batch))
-        solver.poll()
-    gpu.ctx.finish()
-    elapsed = time.perf_counter() - start
-    return elapsed * 1e3 / max(solver.poll(wait=True).done - before, 1)
-
-
-def _ms(gpu: Gpu, run: Callable[[], object]) -> float:
-    start = time.perf_counter()
-    run()
-    gpu.ctx.finish()
-    return (time.perf_counter() - start) * 1e3
-
-
-def passes_ms(
-    gpu: Gpu, solver: Solver[ShootingOptions], seconds: float, beside: Mapping[str, Callable[[], None]] | None = None
-) -> dict[str, float]:
-    """Median milliseconds of each pass per shot of a batch, over the shooters of a solve; ``beside``: more to run and time after
-    each batch. Leaves the light wrong."""
-    times: dict[str, list[float]] = {label: [] for label in (*solver.passes(BATCH), *(beside or {}))}
-    end, batches = time.perf_counter() + seconds, 0
-    while time.perf_counter() < end or batches < 5:
-        for label, run in (solver.passes(BATCH) | dict(beside or {})).items():
-            times[label].append(_ms(gpu, run))
-        batches += 1
-    return {label: statistics.median(values) / BATCH for label, values in times.items()}
 
 
 def bounds(pass_ms: Mapping[str, float], moved: Mapping[str, float], stream_ms: float, copy_rate: float) -> Row:

@@ -1,7 +1,7 @@
-"""What a scene's first camera sees by the light that there should be, and how different it looks by another (FLIP).
+"""The picture that a scene's first camera should see, and how different it looks by a solution's light (FLIP).
 
 A pixel is the point of a surface behind its middle, of radiance L + ρE/π. The picture is exposed for its mean logarithm
-[Reinhard02, eq. 1] as the viewer's is, by the reference alone, cut at white, and sRGB. A view is there where the irradiance of so
+[Reinhard02, eq. 1] as the viewer's is, by the reference alone, cut at white, and sRGB. There is one where the irradiance of so
 many points is soon known: by a closed form, or by as many paths altogether as judge the random points.
 """
 
@@ -18,7 +18,7 @@ from app.atlas.points import Points, barycentric
 from app.atlas.sides import lit_sides
 from app.gpu import Gpu, Mesh, Pass
 from app.lightmap.tile_pool import SolverSpace
-from app.reference.truth import CACHE_FILES, Truth
+from app.reference.irradiance import CACHE_FILES, ReferenceIrradiance
 from app.render.camera import CameraView
 from app.render.exposure import KEY
 from app.render.false_colour import LUMINANCE
@@ -37,9 +37,12 @@ VERTEX = {"in_position": "3f", "in_uv_front": "2f", "in_uv_back": "2f"}  # see r
 
 
 @dataclass(frozen=True, eq=False)
-class View:
-    """emission (height, width, 3): radiance of each pixel; lit (height, width): where points are that reflect, row by row, with
-    their albedo (n, 3) and the irradiance E (n, 3) [W/m²] that they should have; noise: FLIP between two halves of the paths."""
+class ReferencePicture:
+    """What the camera sees by the reference's light.
+
+    emission (height, width, 3): radiance of each pixel; lit (height, width): where points are that reflect, row by row, with
+    their albedo (n, 3) and the irradiance E (n, 3) [W/m²] that they should have; noise: FLIP between two halves of the paths.
+    """
 
     emission: F64
     lit: NDArray[np.bool_]
@@ -55,7 +58,7 @@ class View:
         seen = luminance > 0
         return float(KEY / np.exp(np.log(luminance[seen]).mean())) if seen.any() else 1.0
 
-    def picture(self, E: F64) -> F64:
+    def by_light(self, E: F64) -> F64:
         """(height, width, 3) sRGB from 0 to 1, by irradiance (n, 3) at the points."""
         radiance = self.emission.copy()
         radiance[self.lit] += self.albedo * E / np.pi
@@ -63,7 +66,7 @@ class View:
 
     def flip(self, E: F64) -> float | None:
         """Between the pictures by the right irradiance and by this; None where it is not finite."""
-        return flip_of(self.picture(self.E), self.picture(E)) if np.isfinite(E).all() else None
+        return flip_of(self.by_light(self.E), self.by_light(E)) if np.isfinite(E).all() else None
 
     def as_dict(self) -> dict[str, Any]:
         """For reports."""
@@ -72,16 +75,18 @@ class View:
 
 
 def flip_of(reference: F64, picture: F64) -> float:
-    """See flip.py, which only an extra can import."""
-    from app.bench.accuracy.flip import flip
+    """See app/bench/flip.py, which only an extra can import."""
+    from app.bench.flip import flip
 
     return flip(reference, picture)
 
 
-def view_of(gpu: Gpu, scene: Scene, truth: Truth, paths: int, tell: Tell) -> View | None:
-    """By the same reference; paths: from each of the truth's points. None where it has no view, or FLIP is not installed. Raises
-    UserError."""
-    if truth.reference not in ("closed-form", "path-traced") or missing(FLIP):
+def reference_picture(
+    gpu: Gpu, scene: Scene, reference: ReferenceIrradiance, paths: int, tell: Tell
+) -> ReferencePicture | None:
+    """By the same reference; paths: from each of the reference's points. None where that would take too long, or FLIP is
+    not installed. Raises UserError."""
+    if reference.name not in ("closed-form", "path-traced") or missing(FLIP):
         return None
     shown, points = _seen(gpu, scene)
     own = points.only(_reflecting(scene, points))
@@ -90,14 +95,14 @@ def view_of(gpu: Gpu, scene: Scene, truth: Truth, paths: int, tell: Tell) -> Vie
     lit[shown] = _reflecting(scene, points)
     image = SIZE[1], SIZE[0]
     albedo = _colours(scene, own, "albedo")
-    halves = [np.tile(truth.E[:1], (len(own), 1))]
-    if truth.reference == "path-traced":
-        halves = list(_traced(scene, own, paths * len(truth.points), tell))
-    view = View(emission.reshape(*image, 3), lit.reshape(image), own, albedo, np.mean(halves, axis=0))
+    halves = [np.tile(reference.E[:1], (len(own), 1))]
+    if reference.name == "path-traced":
+        halves = list(_traced(scene, own, paths * len(reference.points), tell))
+    picture = ReferencePicture(emission.reshape(*image, 3), lit.reshape(image), own, albedo, np.mean(halves, axis=0))
     if len(halves) == 1:
-        return view
-    noise = flip_of(*(view.picture(half) for half in halves))
-    return View(view.emission, view.lit, own, albedo, view.E, noise)
+        return picture
+    noise = flip_of(*(picture.by_light(half) for half in halves))
+    return ReferencePicture(picture.emission, picture.lit, own, albedo, picture.E, noise)
 
 
 def _traced(scene: Scene, points: Points, paths: int, tell: Tell) -> F64:
@@ -113,7 +118,7 @@ def _traced(scene: Scene, points: Points, paths: int, tell: Tell) -> F64:
         traced, place = tracer.Tracer(scene), points.positions_normals(scene)
         halves = []
         for k in range(2):
-            tell("path-traced view", k / 2)
+            tell("path-traced picture", k / 2)
             halves.append(traced.irradiance(*place, side * side, VIEW_SEED + k))
         found = {"halves": np.array(halves)}
         cache.store(cache.content(found), path, CACHE_FILES)

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.bench.accuracy import view
+from app.bench.accuracy import reference_picture as pictures
 from app.gpu import Gpu
 from app.lightmap.tile_pool import SolverSpace
-from app.reference.truth import Truth, no_tracer, truth_of
+from app.reference.irradiance import ReferenceIrradiance, no_tracer, reference_irradiance
 from app.render.camera import CameraView
 from app.render.exposure import KEY
 from app.render.tone_mapping import encode_srgb
@@ -30,10 +30,10 @@ def silent(text: str, share: float) -> None:
     pass
 
 
-def seen_from(gpu: Gpu, scene: Scene) -> view.View:
+def seen_from(gpu: Gpu, scene: Scene) -> pictures.ReferencePicture:
     """By a closed form."""
-    truth = truth_of(scene, "closed-form", 1, silent)
-    found = view.view_of(gpu, scene, truth, 1, silent)
+    known = reference_irradiance(scene, "closed-form", 1, silent)
+    found = pictures.reference_picture(gpu, scene, known, 1, silent)
     assert found is not None
     return found
 
@@ -42,7 +42,7 @@ def seen_from(gpu: Gpu, scene: Scene) -> view.View:
 def test_a_furnace_is_one_colour(gpu: Gpu) -> None:
     found = seen_from(gpu, load_scene("furnace"))
     assert found.lit.all() and found.noise is None
-    picture = found.picture(found.E)
+    picture = found.by_light(found.E)
     # what is reflected is exposed to mid grey, and the walls emit as much again
     np.testing.assert_allclose(picture, encode_srgb(np.array(2 * KEY)), atol=1e-9)
     assert found.flip(found.E) == 0.0
@@ -53,8 +53,8 @@ def test_a_furnace_is_one_colour(gpu: Gpu) -> None:
 
 def test_points_lie_behind_their_pixels(gpu: Gpu) -> None:
     """Row by row from the top, of the first camera."""
-    scene, (width, height) = load_scene("textured-room"), view.SIZE
-    shown, points = view._seen(gpu, scene)
+    scene, (width, height) = load_scene("textured-room"), pictures.SIZE
+    shown, points = pictures._seen(gpu, scene)
     space, camera = SolverSpace.of(scene), scene.cameras[0]
     away = float(np.linalg.norm(np.asarray(camera.world_from_camera)[:3, 3] - space.centre))
     local = space.local_from_world(points.positions_normals(scene)[0])
@@ -72,8 +72,8 @@ def test_points_lie_behind_their_pixels(gpu: Gpu) -> None:
 
 def test_points_have_the_colours_of_their_textures(gpu: Gpu) -> None:
     scene = load_scene("textured-room")
-    _, points = view._seen(gpu, scene)
-    albedo = view._colours(scene, points, "albedo")
+    _, points = pictures._seen(gpu, scene)
+    albedo = pictures._colours(scene, points, "albedo")
     checked = 0
     for k, material in enumerate(scene.materials):
         mine = scene.material_ids[points.triangle] == k
@@ -89,24 +89,26 @@ def test_points_have_the_colours_of_their_textures(gpu: Gpu) -> None:
 
 def test_the_back_of_one_side_is_black(gpu: Gpu) -> None:
     scene = load_scene("furnace")
-    points = view._seen(gpu, scene)[1]
+    points = pictures._seen(gpu, scene)[1]
     points.back[:] = True
-    assert not view._colours(scene, points, "albedo").any() and not view._colours(scene, points, "emission").any()
-    assert not view._reflecting(scene, points).any()
+    assert (
+        not pictures._colours(scene, points, "albedo").any() and not pictures._colours(scene, points, "emission").any()
+    )
+    assert not pictures._reflecting(scene, points).any()
 
 
 @needs_flip
-def test_paths_make_the_view_once(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_paths_make_the_picture_once(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     if (reason := no_tracer()) is not None:
         pytest.skip(reason)
     from app.reference import path_tracer as tracer
 
     scene = load_scene("furnace")
-    known = truth_of(scene, "closed-form", 1, silent)
-    traced = Truth("path-traced", known.points, known.E, None, "", 0.0)
-    first = view.view_of(gpu, scene, traced, 200, silent)
+    known = reference_irradiance(scene, "closed-form", 1, silent)
+    traced = ReferenceIrradiance("path-traced", known.points, known.E, None, "", 0.0)
+    first = pictures.reference_picture(gpu, scene, traced, 200, silent)
     monkeypatch.setattr(tracer.Tracer, "irradiance", None)
-    again = view.view_of(gpu, scene, traced, 200, silent)
+    again = pictures.reference_picture(gpu, scene, traced, 200, silent)
     assert first is not None and again is not None and first.noise == again.noise
     np.testing.assert_array_equal(first.E, again.E)
     # 200 paths from 2000 points are 8 for a pixel, whose mean over 49,152 of them is within 1 %
@@ -114,7 +116,12 @@ def test_paths_make_the_view_once(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> 
     assert first.noise is not None and 0 < first.noise < 1
 
 
-def test_there_is_no_view_where_it_would_take_too_long(gpu: Gpu) -> None:
+def test_there_is_no_picture_where_it_would_take_too_long(gpu: Gpu) -> None:
     scene = load_scene("furnace")
-    known = truth_of(scene, "closed-form", 1, silent)
-    assert view.view_of(gpu, scene, Truth("dense", known.points, known.E, None, "", 0.0), 1, silent) is None
+    known = reference_irradiance(scene, "closed-form", 1, silent)
+    assert (
+        pictures.reference_picture(
+            gpu, scene, ReferenceIrradiance("dense", known.points, known.E, None, "", 0.0), 1, silent
+        )
+        is None
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.gpu import Gpu
 
 
-class Copy:
+class MemoryCopy:
     """An RGBA32F texture of ``size`` copied to another. moved: bytes that a run reads and writes."""
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:

@@ -1,4 +1,4 @@
-"""What the passes of a shot must move at least, and the receiver pass without its arithmetic.
+"""Memory traffic of a shot: what its passes must move at least, and the receiver pass without its arithmetic.
 
 A texel that gets light has H and r read and written once in a draw, and is read itself where it does not follow from its tile's
 corner and edges. Maps of visibility are written once and read once. Choosing reads area,
@@ -17,7 +17,7 @@ SHAPED = ("t_position_area", "t_normal_ids")  # of tiles of any shape
 CHOSEN = ("t_position_area", "t_normal_ids", "t_irradiance", "t_residual")
 
 
-class Stream:
+class ReceiverTraffic:
     """Reads and blends for the same texels and shots what the receiver pass of a solver does, and computes nothing."""
 
     def __init__(self, gpu: Gpu, shooting: Shooting) -> None:

@@ -1,4 +1,4 @@
-"""``glowtree bench frames --drag``: the sliders of the quadtrees, dragged back and forth as a hand does."""
+"""A hand at the sliders of the quadtrees, for ``glowtree bench frames --drag``: back and forth, a little in each frame."""
 
 from __future__ import annotations
 
