@@ -40,7 +40,7 @@ _BYTES = {"f4": 4, "u4": 4, "f2": 2, "f1": 1}
 
 
 class Lightmap:
-    """Texel surfaces, irradiance H and residual r of one scene. Whoever makes it clears it before use, and releases it.
+    """Texel surfaces, irradiance H and residual r of one scene. It is made without light. Whoever makes it releases it.
 
     Made from a TilePool, or at once from a scene and its charts. tiles: leaf tiles; columns, rows: of the tile pool in tiles;
     size: in texels; unit: W/m² per stored unit of H and r.
@@ -73,13 +73,12 @@ class Lightmap:
         self._options = options
         self.refinement = Refinement(options) if pool.adaptive else None
         self.set_storage(options.storage)
+        self.clear()
 
     @staticmethod
     def of(gpu: Gpu, scene: Scene, charts: Charts, *, storage: str = "rgba32f") -> Lightmap:
         """With no light yet."""
-        lightmap = Lightmap(gpu, TilePool(scene, charts), LightmapOptions(storage=storage))
-        lightmap.clear()
-        return lightmap
+        return Lightmap(gpu, TilePool(scene, charts), LightmapOptions(storage=storage))
 
     # -- what passes bind ----------------------------------------------------------------------------------------------
 
