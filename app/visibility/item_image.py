@@ -10,7 +10,7 @@ class ItemImage:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._pass = Pass(gpu, "render/items")
+        self._pass = Pass(gpu, "visibility/items")
         self._image: Texture | None = None
 
     def draw(self, items: Texture, depth: Texture, size: tuple[int, int]) -> Texture:

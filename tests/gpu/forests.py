@@ -12,9 +12,10 @@ from solver_scenes import table_room
 from app.atlas.charts import DEFAULT_TILE, TILES
 from app.atlas.parametrize import parametrize
 from app.gpu import Gpu
-from app.lightmap.lightmap import LIGHT, Lightmap
+from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import Quadtree, quadtree_pool
+from app.lightmap.textures import LIGHT
 from app.lightmap.transfer import Regrowth
 from app.render.options import INTERPOLATIONS
 from app.render.resolve import DisplayTexels
