@@ -25,6 +25,7 @@ from app.solvers.shooting.choose import ROOT_LEVEL
 from app.solvers.shooting.coarse_to_fine import LEVEL
 from app.solvers.shooting.options import MAX_LEVEL
 from app.solvers.shooting.records import BATCH
+from app.solvers.shooting.shot_by_shot import ShotByShot
 from app.solvers.shooting.solver import Shooting
 from app.util.parts import run_to_end
 from app.visibility.projections import PROJECTIONS
@@ -101,7 +102,7 @@ class Solution:
     surface, and ``H`` and ``r`` (n, 3) [W/m²], read from the GPU anew: of the leaves that there are now."""
 
     lightmap: Lightmap
-    solver: Shooting
+    solver: ShotByShot
 
     @property
     def _covered(self) -> NDArray[np.bool_]:

@@ -1,4 +1,5 @@
-"""The light on every texel, on the GPU: what solvers write and everything else reads. See textures.py for what is where."""
+"""A lightmap is the light on every texel, on the GPU: solvers write it, everything else reads it. textures.py says what is
+where."""
 
 from __future__ import annotations
 

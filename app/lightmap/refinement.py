@@ -22,7 +22,7 @@ from app.lightmap.options import QUADTREE, LightmapOptions
 from app.lightmap.quadtree import FIRST_ROOM, Change, Quadtree, Tile
 from app.lightmap.textures import LightTextures
 from app.lightmap.tile_pool import Moves
-from app.lightmap.transfer import Regrowth
+from app.lightmap.transfer import LightTransfer
 
 # A second difference of smooth light grows fourfold when texels double: leaves merge below a quarter of the threshold, and half
 # of that again, so that what was merged is not split at once.
@@ -63,7 +63,7 @@ class Refinement:
         self.follower: LeafFollower | None = None
         self.stable, self.looked_at = False, 0
         self.note: str | None = None
-        self._regrowth = Regrowth(light.gpu, light)
+        self._transfer = LightTransfer(light.gpu, light)
         self._judge = Pass(light.gpu, "lightmap/judge", defines=light.defines("TILE"))
         self._judged: tuple[int, ReadBack] | None = None  # on its way, and the version of the leaves that it is of
         self._split_at: dict[Tile, int] = {}  # the clock when a leaf was split
@@ -183,7 +183,7 @@ class Refinement:
 
     def _apply(self, change: Change) -> None:
         follower = self.follower
-        self._regrowth.apply(change, () if follower is None else follower.carried)
+        self._transfer.apply(change, () if follower is None else follower.carried)
         if follower is not None:
             follower.leaves_changed(change)
 

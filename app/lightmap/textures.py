@@ -1,4 +1,4 @@
-"""The textures of a lightmap on the GPU: what lies where in the tile pool, and the light of its texels.
+"""The textures of a lightmap hold, on the GPU, what lies where in the tile pool, and the light of its texels.
 
 Tile pool textures hold the leaf tiles of t×t texels side by side [Coombe03, 4.2]:
 

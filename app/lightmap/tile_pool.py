@@ -1,4 +1,5 @@
-"""A scene cut into leaf tiles, ready for the GPU: plain arrays, made in any thread. See lightmap.py for what they mean."""
+"""A tile pool is a scene cut into leaf tiles, ready for the GPU: plain arrays, made in any thread. textures.py says what they
+mean."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The shape of a tile: whether its texels lie in one plane, on a grid, so that a corner and two edges say where each of them is.
+"""The shape of a tile tells whether its texels lie in one plane, on a grid, so that a corner and two edges say where each is.
 
 Most texels of a room lie on rectangles: whoever visits all of them need not look their position and normal up.
 """

@@ -1,4 +1,4 @@
-"""Light that moves with the leaves of a lightmap: pushed down to children, pulled up to parents [Coombe03, 4.2]."""
+"""Light moves with the leaves of a lightmap: it is pushed down to children and pulled up to parents [Coombe03, 4.2]."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from app.scene.model import F32
 LIFTED_COLUMNS = 32  # tiles side by side among those that are lifted
 
 
-class Regrowth:
-    """The passes; what a change needs besides goes with it."""
+class LightTransfer:
+    """The passes that push and pull the light of one lightmap."""
 
     def __init__(self, gpu: Gpu, lightmap: LightTextures) -> None:
         self._gpu, self._lightmap = gpu, lightmap

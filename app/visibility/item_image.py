@@ -1,4 +1,4 @@
-"""The visibility map as a picture: one colour per facet, darker with distance."""
+"""The visibility image is a visibility map as a picture: one colour per facet, darker with distance."""
 
 from __future__ import annotations
 

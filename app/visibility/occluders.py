@@ -1,4 +1,4 @@
-"""What casts shadows, as the projections draw it.
+"""Occluders are the scene's triangles as the projections draw them: what casts shadows.
 
 Straight edges [Wallner10, 5]. In the stereographic map an edge is an arc of a circle at least as large as the disc. Drawn
 straight, it misses an arc of length s by at most s²/8. An edge of length l at a distance d has s <= l/d: it is right within a
@@ -25,13 +25,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.gpu import Gpu, Mesh, Texture
+from app.gpu import Gpu, Mesh, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.tile_pool import TilePool
 
 NEAR = 0.25  # solver space: an eighth of the scene's diagonal
 TRIANGLES_A_ROW = 512  # see visibility/projections/triangles.glsl
-UNCHARTED = 16777215.0  # item of a side that has no texels, see common/item.glsl
+UNCHARTED = glsl_constant("common/item.glsl", "UNCHARTED")  # item of a side that has no texels
 OCCLUDER = np.dtype([("in_position", "f4", 3), ("in_sides", "f4", 2)])
 OCCLUDER_FORMAT = {"in_position": "3f", "in_sides": "2f"}
 CASTER = np.dtype([("in_position", "f4", 3), ("in_sides", "f4", 2), ("in_normal", "f4", 3)])

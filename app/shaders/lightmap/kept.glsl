@@ -1,6 +1,6 @@
-// What stays as it is when leaves split and merge: the exitance that a texel has shot already, S = E + ρH - r. Its new leaves keep S,
-// so that r = E + ρH - S. What 8 bits hold cannot be negative, as r then may become: there r itself is kept. In a, the power that a
-// texel would have got without occluders, see app/lightmap/textures.py.
+// What stays as it is when leaves split and merge: the exitance that a texel has shot already, S = E + ρH - r. Its new leaves
+// keep S, so that r = E + ρH - S. What 8 bits hold cannot be negative, as r then may become: there r itself is kept. In a, the
+// power that a texel would have got without occluders, see app/lightmap/textures.py.
 #include "common/albedo.glsl"
 #include "common/exitance.glsl"
 

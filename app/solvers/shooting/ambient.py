@@ -1,4 +1,4 @@
-"""The ambient term: the irradiance that all unshot light will make on average [Cohen88, section 5].
+"""The ambient term is the irradiance that all unshot light will make on average [Cohen88, section 5].
 
 It is shown and baked with H, and where the storage can hold a residual below zero it is overshot [Feda92]: a patch shoots, with
 its residual, what it will reflect of the ambient light.

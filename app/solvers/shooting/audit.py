@@ -1,4 +1,4 @@
-"""Audits: a shot is tried before it is made, and its patch divided where it would make or lose light.
+"""An audit tries a shot before it is made; where it would make or lose light, its patch is divided.
 
 Σ_j A_j F_ji V_ji plus what leaves the scene should be A_i. Where a patch sees from its middle what its edges do not, in a coffer
 or beside a box, it is not. Most light is shot by few patches, so only strong ones are audited, each once.

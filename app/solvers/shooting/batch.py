@@ -1,4 +1,4 @@
-"""One batch of shots [Coombe03, 3; Cohen88].
+"""A batch of shots is made by parts, one after the other [Coombe03, 3; Cohen88].
 
     i = patch with the largest power to shoot, R_i A_i: its residual and the overshoot      choose.py, ambient.py
     r_i -= R_i                                                                              ledger.py

@@ -1,4 +1,4 @@
-"""Choosing the shooters of a batch: the patches with the largest |Σ R A| [Coombe03, 3.4].
+"""Choosing finds the shooters of a batch: the patches with the largest |Σ R A| [Coombe03, 3.4].
 
     texels -> blocks of 4×4 -> cells of 8×8 -> bins of cells -> the batch
 
@@ -27,7 +27,8 @@ def band_of(size: tuple[int, int], band: int, bands: int) -> tuple[int, int, int
 
 
 class Bins:
-    """Reduction bins: the strongest candidate of each, and what is unshot in it. Whoever makes it releases it."""
+    """Reduction bins hold the strongest candidate of some cells each, and what is unshot in them. Whoever makes them releases
+    them."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
         self._gpu = gpu

@@ -1,4 +1,4 @@
-"""From coarse to fine: large patches shoot first, and finer ones what those leave.
+"""Patches shoot from coarse to fine: large ones first, and finer ones what those leave.
 
 First as few patches as show all of the light soon; then, where emitters are divided, all members of their groups settle; then the
 finest. What is left then is more here and less there: light that hardly leaves its corner.

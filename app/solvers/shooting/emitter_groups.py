@@ -1,8 +1,8 @@
-"""Emitter groups: a strong lamp is divided into many patches, of which one of four shoots for all at first.
+"""An emitter group is four patches of a strong lamp, of which one, its representative, shoots for all at first.
 
-The shadows of many patches add up to soft ones, but the room should be lit long before all of them have shot. So a representative
-of each group shoots what the group has to shoot; later, all members shoot at once what they have to, and what was shot for them
-is negative then: the group settles.
+A strong lamp is divided into many patches, so that their shadows add up to soft ones; but the room should be lit long before all
+of them have shot. So a representative shoots what its whole group has to shoot. Later, all members shoot at once what they have
+to, which is less than nothing where it was shot for them: the group settles.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The ledger of energy: what shooters give away, where it goes, and the balance of both.
+"""The ledger says where the energy is: what shooters gave away, where that went, and the balance of both.
 
     emitted = absorbed + escaped + unshot + imbalance
 

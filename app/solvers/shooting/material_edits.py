@@ -1,4 +1,4 @@
-"""Edits of emission and albedo: the light that is there stays, and the difference is shot, negative too [Chen90]."""
+"""An edit of emission or albedo keeps the light that is there, and lets the difference be shot, negative too [Chen90]."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Marks of patches that are finer than others: of strong emitters, of contacts, and of those that failed their audit.
+"""Marks make patches finer than others: those of strong emitters, those at contacts, and those that failed their audit.
 
 One mark for each block of 4×4 texels: 0, or 1 + by how many levels patches there are finer than the finest of others; plus
 EMITTER where they make groups of an emitter. The same on the host, and on the GPU for patch_level.glsl.

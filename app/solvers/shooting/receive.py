@@ -1,4 +1,4 @@
-"""Receiving: the light of some shots on every texel that sees them, blended into H and r [Coombe03, eq. 1].
+"""Receiving adds the light of some shots to H and r of every texel that sees them [Coombe03, eq. 1].
 
 H_j += R_i F_ji V_ji,   r_j += ρ_j R_i F_ji V_ji
 """

@@ -1,4 +1,4 @@
-"""What the host and the shaders of a shot share, declared once: sizes, and the records of shooters, ledger and report."""
+"""Sizes and records are shared by the host and the shaders of a shot, and declared here once."""
 
 from __future__ import annotations
 

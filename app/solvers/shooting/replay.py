@@ -1,4 +1,4 @@
-"""Replay: earlier shots are made again into leaves that came later.
+"""Replay makes earlier shots again, into leaves that came later.
 
 A leaf that has just split off inherits interpolated light. The shots whose light is in it are made again, into such fresh leaves
 only, a batch per piece of work, and their sum takes the place of what was inherited:

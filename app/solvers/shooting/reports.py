@@ -1,4 +1,4 @@
-"""Reports of batches: the host polls them a few batches late, so that nothing waits for the GPU."""
+"""A report tells the host what became of a batch, a few batches late: nothing waits for the GPU."""
 
 from __future__ import annotations
 

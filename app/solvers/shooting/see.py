@@ -1,4 +1,4 @@
-"""Seeing the scene from the shooters of a batch: item and depth in every direction of a hemisphere [Coombe03, 3.2; Cohen85].
+"""Seeing draws what the shooters of a batch see: item and depth in every direction of a hemisphere [Coombe03, 3.2; Cohen85].
 
 The maps of several shooters lie above each other in one texture, all drawn at once.
 """

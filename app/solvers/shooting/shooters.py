@@ -1,4 +1,4 @@
-"""The shooters of a batch, on the GPU: ``choose`` writes them there, and every later pass reads them there."""
+"""The shooters of a batch never leave the GPU: choosing writes them there, and every later pass reads them there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The log of all shots so far, on the GPU: one row for each, as t_shooters has them."""
+"""The log keeps all shots so far, on the GPU: one row for each, as t_shooters has them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The solver: progressive refinement radiosity by shooting [Cohen88; Coombe03, 3], on uniform texels and on quadtrees.
+"""Shooting is progressive refinement radiosity [Cohen88; Coombe03, 3], on uniform texels and on quadtrees.
 
 A piece of work is one batch of shots (batch.py), or on quadtrees another step of what their leaves ask for. The host learns a few
 batches late how much is unshot.

@@ -1,4 +1,5 @@
-// The irradiance that all unshot light will make on average, after all its reflections [Cohen88, eq. 9], in an open scene:
+// The ambient term is the irradiance that all unshot light will make on average, after all its reflections [Cohen88, eq. 9]; in
+// an open scene:
 //
 //   Φ f (1 + ρf + ρ²f² + …) / A = Φ f / (A (1 - ρf))
 //

@@ -1,5 +1,5 @@
-// The correction C takes the place of what a leaf inherited: H += C, r += ρ C. C is what the shots so far give to the leaf, summed
-// anew, minus what it held of them. Blended.
+// The correction C takes the place of what a leaf inherited: H += C, r += ρ C. C is what the shots so far give to the leaf,
+// summed anew, minus what it held of them. Blended.
 #include "common/atlas.glsl"
 #include "common/albedo.glsl"
 

@@ -1,4 +1,4 @@
-// Reduction bins: the strongest candidate of the cells in each, and the sum of what these hold. One texel per bin.
+// A reduction bin holds the strongest candidate of its cells, and the sum of what these hold. One texel per bin.
 //
 // The cells of a tile fall into as many bins, each tile's beginning elsewhere, so that a lamp in one tile fills half a batch.
 #define TILE_CELLS 2

@@ -1,5 +1,5 @@
-// A candidate is a patch that may shoot: (power, x, LEVELS y + level, power of all candidates that it is the strongest of), with x, y
-// its lower corner [texels]. A block that is part of a larger patch has a negative a instead, and its flux in rgb.
+// A candidate is a patch that may shoot: (power, x, LEVELS y + level, power of all candidates that it is the strongest of), with
+// x, y its lower corner [texels]. A block that is part of a larger patch has a negative a instead, and its flux in rgb.
 #include "solvers/shooting/block.glsl"
 
 #define LEVELS  // of patches, at most

@@ -1,8 +1,8 @@
 // The shooters of a batch: row k describes the k-th strongest of the bins' strongest patches. [Coombe03, 3.4]
 //
 // The polygon is the patch's own parallelogram, so that neighbouring patches tile their surface exactly. Visibility is
-// sampled from the middle of what is shot; where part of the patch is dark (something stands on it), or the patch is not flat, from
-// its leading texel.
+// sampled from the middle of what is shot; where part of the patch is dark (something stands on it), or the patch is not flat,
+// from its leading texel.
 #include "common/atlas.glsl"
 #include "common/tile.glsl"
 #include "common/albedo.glsl"
@@ -15,7 +15,7 @@
 
 const float WEAKEST = 0.1;       // a shot under a tenth of the batch's best waits for a later batch
 const float MOST_REPRESENTED = 8.0;    // times its own area, a patch may represent
-const float CANCELS = 1.0 / 256;  // under this share of Σ |R| A, Σ R A is what rounding leaves: no mean is taken from texels for it
+const float CANCELS = 1.0 / 256;  // under this share of Σ |R| A, Σ R A is what rounding leaves: texels give no mean for it
 
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
@@ -172,8 +172,8 @@ bool can_represent(ivec2 corner_px, int size, Shooter part, out vec3 flux) {
     return all && part.area * MOST_REPRESENTED >= area && !partly_covered(lit);
 }
 
-// One member of a group that settles: the others have their turn in the same batch, so that none of its light is missing, or there
-// twice, for long.
+// One member of a group that settles: the others have their turn in the same batch, so that none of its light is missing, or
+// there twice, for long.
 Shooter member_of_group(ivec2 corner_px, int level, int member) {
     int one = min(level, patch_levels(corner_px).shoots);
     if (one < level) return shooter_from_patch(corner_px + (ivec2(member % GROUP, member / GROUP) << one), 1 << one);

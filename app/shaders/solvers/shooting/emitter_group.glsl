@@ -1,5 +1,5 @@
-// Groups of an emitter's patches. One of each, its representative, shoots for all at first: another one in neighbouring groups, and
-// in those of neighbouring cells, which shoot in step.
+// Groups of an emitter's patches. One of each, its representative, shoots for all at first: another one in neighbouring groups,
+// and in those of neighbouring cells, which shoot in step.
 #include "solvers/shooting/cell.glsl"
 #define GROUP  // patches along the edge of a group: 2
 

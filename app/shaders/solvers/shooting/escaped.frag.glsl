@@ -1,5 +1,6 @@
-// How much of what the shooters send out escapes from the scene (r), or ends on black sides without texels (g), in pieces: each texel
-// sums the weights of such samples in one block of the map. The four in the middle of every 4×4 samples stand for these.
+// This sums how much of what the shooters send out escapes from the scene (r), or ends on black sides without texels (g), in
+// pieces: each texel sums the weights of such samples in one block of the map. The four in the middle of every 4×4 samples stand
+// for these.
 #include "common/item.glsl"
 #define BLOCK 8
 

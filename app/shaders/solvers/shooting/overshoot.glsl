@@ -1,5 +1,5 @@
-// Overshoot: a patch shoots its residual r, and with it the light that this will make come back [Feda92]: about the ambient irradiance,
-// but no more than a texel has received until now.
+// Overshoot: a patch shoots its residual r, and with it the light that this will make come back [Feda92]: about the ambient
+// irradiance, but no more than a texel has received until now.
 uniform sampler2D t_ambient;  // irradiance, stored units: see ambient.frag.glsl
 
 // H: of the texel

@@ -1,6 +1,6 @@
-// Mip levels of the patches that may shoot at a place, the largest and the finest. In a quadtree, patches of all leaves are about as
-// large in the scene: a leaf that is split shoots from as many texels more. Strong emitters, and patches whose shot would make or
-// lose light, are divided into finer ones, see app/solvers/shooting/patch_marks.py. While large patches shoot, one patch of an
+// Mip levels of the patches that may shoot at a place, the largest and the finest. In a quadtree, patches of all leaves are about
+// as large in the scene: a leaf that is split shoots from as many texels more. Strong emitters, and patches whose shot would make
+// or lose light, are divided into finer ones, see app/solvers/shooting/patch_marks.py. While large patches shoot, one patch of an
 // emitter represents all of its group; later all of a group shoot at once, each for itself, and settle what that was off by.
 #define LEVEL 2
 #define FINEST 2   // where LEVEL will end

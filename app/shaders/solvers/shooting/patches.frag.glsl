@@ -1,8 +1,8 @@
 // What blocks of 4×4 texels hold, one texel for each: what is to be shot and what is unshot [stored units · solver area], and how
 // lit they are. Of groups that settle, the sum of what each texel is off by, whatever its sign.
 //
-// A patch that is partly covered is divided into the finest: the light of its middle would pass through what stands on it, or none
-// would leave it.
+// A patch that is partly covered is divided into the finest: the light of its middle would pass through what stands on it, or
+// none would leave it.
 #include "common/atlas.glsl"
 #include "common/tile.glsl"
 #include "common/albedo.glsl"

@@ -1,4 +1,4 @@
-// The light of some shots on every texel, blended into H and r:
+// The light of some shots is blended into H and r of every texel:
 //
 //   ΔH_j = Σ_i R_i F_ji V_ji,   Δr_j = ρ_j ΔH_j      [Coombe03, eq. 1; F_ji from the texel to the shooter's polygon]
 #define PLANAR 1
@@ -57,7 +57,8 @@ void main() {
         Shooter s = shooter_of(shot);
         vec2 FV = received(position, normal, facet, s, shot);
 #if !PLANAR
-        // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it. Another chart in it is no part of it.
+        // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it. Another chart in it is no part of
+        // it.
         bool within = u_own != 0 && all(lessThan(uvec2(texel_px - patch_px(s)), uvec2(size_px(s))));
         FV = within && chart == s.chart || texel.area <= 0.0 ? vec2(0.0) : FV;
 #endif

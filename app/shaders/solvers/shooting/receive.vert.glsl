@@ -1,5 +1,5 @@
-// One quad per receiver: a row of planar tiles, whose texels follow from its corner and edges, or a general tile, whose texels are
-// read. Shots that its own plane or the shooter's hides entirely are left out;
+// One quad per receiver: a row of planar tiles, whose texels follow from its corner and edges, or a general tile, whose texels
+// are read. Shots that its own plane or the shooter's hides entirely are left out;
 // so are, in the near-field pass, those in whose far field it lies, and the other way round.
 #define PLANAR 1
 #define NEAR_FIELD 0

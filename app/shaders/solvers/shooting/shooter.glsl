@@ -2,8 +2,10 @@
 #include <shooter>
 
 int size_px(Shooter s) { return abs(s.signed_size); }  // edge of the patch [texels]; 0: no shot
-bool is_even(Shooter s) { return s.signed_size > 0; }  // whether all its texels shoot the mean, and keep what they have above or below
 ivec2 patch_px(Shooter s) { return ivec2(s.patch_x, s.patch_y); }  // lower corner of the patch in the tile pool [texels]
+
+// Whether all its texels shoot the mean, and keep what they have above or below it.
+bool is_even(Shooter s) { return s.signed_size > 0; }
 
 Shooter load_shooter(sampler2D shooters, int shot) {
     vec4 rows[SHOOTER_ROWS];

@@ -1,5 +1,5 @@
-// The strongest patch that begins in each cell of 8×8 texels: one texel per cell. Patches are as large as they may be, see
-// patches.frag.glsl.
+// Each cell of 8×8 texels keeps the strongest patch that begins in it: one texel per cell. Patches are as large as they may be,
+// see patches.frag.glsl.
 #define TILE_CELLS 2
 #define HIGHEST 4
 

@@ -1,8 +1,8 @@
 // What is about to be shot is no longer unshot: before the batch shoots, or what one of its shooters gives to another would be
 // erased. Blended: r_i = r_i a + rgb.
 //
-// A patch shoots its mean. Where its texels are alike but for their light, they keep what they have above or below the mean, which
-// finer patches shoot later; else nothing is left of r_i. What was overshot leaves a negative residual.
+// A patch shoots its mean. Where its texels are alike but for their light, they keep what they have above or below the mean,
+// which finer patches shoot later; else nothing is left of r_i. What was overshot leaves a negative residual.
 #include "common/atlas.glsl"
 #include "common/albedo.glsl"
 #include "solvers/shooting/shooter.glsl"

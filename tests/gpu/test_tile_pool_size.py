@@ -63,8 +63,8 @@ def scattered(trees: Forest, rng: np.random.Generator) -> None:
     """Leaves and holes all over the tile pool."""
     for _ in range(2):
         trees.grow()
-    families = trees.tree.merges(np.flatnonzero(trees.pool.used))
-    trees.regrowth.apply(trees.tree.merge([family for family in families if rng.random() < 0.7]))
+    siblings = trees.tree.merges(np.flatnonzero(trees.pool.used))
+    trees.transfer.apply(trees.tree.merge([family for family in siblings if rng.random() < 0.7]))
 
 
 @pytest.mark.parametrize(("name", "storage"), [*(("table", storage) for storage in STORAGE), ("textured", "rgba32f")])
