@@ -26,7 +26,7 @@ from app.lightmap.tile_pool import Moves
 from app.scene.model import F64
 from app.solvers.shooting.ambient import Ambient
 from app.solvers.shooting.audit import Audit, Auditor
-from app.solvers.shooting.choose import ROOT_LEVEL, Bins
+from app.solvers.shooting.choose import ROOT_LEVEL, Bins, Choice
 from app.solvers.shooting.coarse_to_fine import Phases
 from app.solvers.shooting.emitter_groups import EmitterGroups
 from app.solvers.shooting.ledger import Ledger
@@ -70,11 +70,11 @@ class Batch:
 
     # -- the batch -----------------------------------------------------------------------------------------------------
 
-    def shoot(self, shots: int, bands: int) -> Generator[None, None, int]:
+    def shoot(self, choice: Choice, shots: int, bands: int) -> Generator[None, None, int]:
         """Make so many shots, in parts: the longest passes in so many bands. How many: of groups that settle, whole ones."""
-        if self.phases.now.settles:
+        if choice.settles:
             shots = self.groups.whole_groups(shots)
-        yield from self.choose(shots, bands)
+        yield from self.choose(choice, shots, bands)
         self.ledger.take(self.ambient.overshoot, shots)
         yield
         for first, some in self.see.groups(shots):
@@ -87,22 +87,26 @@ class Batch:
         self.enter(shots)
         return shots
 
-    def choose(self, shots: int, bands: int) -> Iterator[None]:
+    def choose(self, choice: Choice, shots: int, bands: int) -> Iterator[None]:
         """The strongest patches; those that fail their audit are divided, and others chosen. [Coombe03, 3.4]"""
-        yield from self.choose_once(shots, bands)
+        yield from self.choose_once(choice, shots, bands)
         while self.auditor.wanted and (failed := (yield from self.auditor.failed(self.see, self.receive, shots))):
             self.marks.divide_patches(self._patch_of(shot_of(self._lightmap, shooter)) for shooter in failed)
-            yield from self.choose_once(shots, bands)
+            yield from self.choose_once(choice, shots, bands)
         if self.replay is not None:
             self.replay.keep_strong()
 
-    def choose_once(self, shots: int, bands: int = 1) -> Generator[None, None, None]:
+    def choose_once(self, choice: Choice, shots: int, bands: int = 1) -> Generator[None, None, None]:
         """The strongest patches, all texels read in so many bands."""
         for band in range(bands):
-            self.phases.now.sum_blocks(self.marks.texture, self.ambient.overshoot, band, bands)
+            choice.sum_blocks(self.marks.texture, self.ambient.overshoot, band, bands)
             yield
-        self.phases.now.reduce(self.bins)
-        self.phases.now.choose(self.bins, self.marks.texture, self.ambient.overshoot, shots, self._least_power)
+        choice.reduce(self.bins)
+        self._write_shooters(choice, shots)
+
+    def _write_shooters(self, choice: Choice, shots: int) -> None:
+        least = self.groups.settled if choice.settles else 0.0
+        choice.choose(self.bins, self.marks.texture, self.ambient.overshoot, shots, least)
 
     def enter(self, shots: int) -> None:
         """Enter in the ledger what the batch shot, and see what that leaves to come."""
@@ -116,11 +120,6 @@ class Batch:
         self.phases.now.sum_blocks(self.marks.texture, self.ambient.overshoot)
         self.phases.now.reduce(self.bins)
         return float(np.frombuffer(self.bins.unshot.read(), np.float32).reshape(-1, 4)[:, 3].astype(np.float64).sum())
-
-    @property
-    def _least_power(self) -> float:
-        """That is worth a shot [stored units · solver area]."""
-        return self.groups.settled if self.phases.now.settles else 0.0
 
     def _patch_of(self, shot: Shot) -> tuple[int, int, int, int]:
         """Its patch, and the finest level of patches there."""
@@ -210,9 +209,8 @@ class Batch:
         """What becomes of a shot from the patch with this lower corner [texels of the tile pool] if it shot now. Changes no
         light. The patch must hold some residual."""
         level = self.phases.patch_edge(corner, self.marks).bit_length() - 1
-        choice = self.phases.choices[0] if self.phases.now.settles else self.phases.now
         self.bins.fill(corner, level)
-        choice.choose(self.bins, self.marks.texture, self.ambient.overshoot, 1, self._least_power)
+        self._write_shooters(self.phases.choices[0] if self.phases.now.settles else self.phases.now, 1)
         shooter = self.shooters.read(1)[0]
         shares = self.auditor.once(self.see, self.receive, 0, float(powers_of(shooter)))
         return Audit(*shares, shot_of(self._lightmap, shooter))
@@ -226,7 +224,7 @@ class Batch:
                 part(first, some)
 
         passes: dict[str, Callable[[], None]] = {
-            "choose": lambda: run_to_end(self.choose_once(shots)),
+            "choose": lambda: run_to_end(self.choose_once(self.phases.now, shots)),
             "zero": lambda: self.ledger.take(self.ambient.overshoot, shots),
             "see": lambda: for_maps(self.see.draw),
             "receive": lambda: for_maps(self.receive.draw),

@@ -67,7 +67,7 @@ class Shooting:
     def _shoot(self, shots: int, bands: int) -> Generator[None, None, int]:
         """A batch, and the report of it."""
         choice = self.batch.phases.now
-        made = yield from self.batch.shoot(shots, bands)
+        made = yield from self.batch.shoot(choice, shots, bands)
         self.issued += made
         self._reports.send(choice, self.batch.bins, self.batch.ledger, self.batch.shooters)
         return made
@@ -309,9 +309,8 @@ class Shooting:
             run()
             self.gpu.ctx.finish()
             yield
-        for phase in range(1, len(self.batch.phases.choices)):
-            self.batch.phases.index = phase
-            run_to_end(self.batch.choose_once(1))
+        for choice in self.batch.phases.choices[1:]:
+            run_to_end(self.batch.choose_once(choice, 1))
             self.gpu.ctx.finish()
             yield
 
