@@ -70,4 +70,4 @@ def rng() -> np.random.Generator:
 @pytest.fixture
 def undivided(monkeypatch: pytest.MonkeyPatch) -> None:
     """A lamp shoots from patches as large as any other: as one of so many lamps that none holds much of the light."""
-    monkeypatch.setattr("app.solvers.shooting.uniform.MOST", 1.0)
+    monkeypatch.setattr("app.solvers.shooting.emitter_groups.MOST", 1.0)

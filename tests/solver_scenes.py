@@ -20,10 +20,13 @@ from app.lightmap.tile_pool import TilePool
 from app.options import specs
 from app.scene.model import F32, F64, Material, Scene
 from app.solvers import EnergyBalance, ShootingOptions
+from app.solvers.shooting.audit import Audit
+from app.solvers.shooting.choose import ROOT_LEVEL
+from app.solvers.shooting.coarse_to_fine import LEVEL
 from app.solvers.shooting.options import MAX_LEVEL
-from app.solvers.shooting.shot import Audit
+from app.solvers.shooting.records import BATCH
+from app.solvers.shooting.shot_by_shot import ShotByShot
 from app.solvers.shooting.solver import Shooting
-from app.solvers.shooting.stages import BATCH, LEVEL, ROOT_LEVEL
 from app.util.parts import run_to_end
 from app.visibility.projections import PROJECTIONS
 
@@ -99,7 +102,7 @@ class Solution:
     surface, and ``H`` and ``r`` (n, 3) [W/m²], read from the GPU anew: of the leaves that there are now."""
 
     lightmap: Lightmap
-    solver: Shooting
+    solver: ShotByShot
 
     @property
     def _covered(self) -> NDArray[np.bool_]:
@@ -206,6 +209,7 @@ def begin(
     density: float | None = None,
     tile: int = DEFAULT_TILE,
     adaptive: bool = False,
+    audits: bool = True,
     **options: object,
 ) -> Solution:
     """The scene before the first shot. options: of ShootingOptions and LightmapOptions. Where leaves come and go, texels and
@@ -219,7 +223,7 @@ def begin(
             level=min((LEVEL if shooting.level is None else shooting.level) + ROOT_LEVEL, MAX_LEVEL)
         )
     lightmap = Lightmap(gpu, pool, LightmapOptions(adaptive=adaptive, depth=1).replace(**held))
-    return Solution(lightmap, Shooting(gpu, lightmap, shooting))
+    return Solution(lightmap, Shooting(gpu, lightmap, shooting, audits=audits))
 
 
 def solve(gpu: Gpu, scene: Scene, **options: object) -> Solution:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.gpu.context import Gpu
-from app.gpu.shader import FULLSCREEN, ShaderError
+from app.gpu.shader import FULLSCREEN, Glsl, ShaderError
 
 GL_CLIP_DISTANCE0 = 0x3000
 BLEND: dict[str, Any] = {
@@ -35,7 +35,7 @@ class Pass:
         name: str,
         *,
         defines: Mapping[str, object] | None = None,
-        slots: Mapping[str, str] | None = None,
+        slots: Mapping[str, str | Glsl] | None = None,
         vertex: str = FULLSCREEN,
         label: str | None = None,
     ) -> None:

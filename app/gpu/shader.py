@@ -4,13 +4,15 @@ The host keeps the map from flattened to source lines itself: Mesa attributes ty
 when ``#line`` tells it the file.
 
 ``#include "common/atlas.glsl"`` is a file below ``app/shaders``; ``#include <projection>`` is a slot that the host fills with a
-file. A define of the host overrides a ``#define NAME value`` that the shader declares, never adds one.
+file, or with GLSL that it makes. A define of the host overrides a ``#define NAME value`` that the shader declares, never adds
+one; where the shader declares it without a value, the host must give it: it is known to the host first.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,7 @@ import moderngl
 SHADERS = Path(__file__).parent.parent / "shaders"
 VERSION = "#version 410 core"
 _INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
-_DEFINE = re.compile(r"^\s*#define\s+(\w+)(?:\s+(.*?))?\s*$")
+_DEFINE = re.compile(r"^\s*#define\s+(\w+)(?:\s+(.*?))?\s*(?://.*)?$")
 _LOCATION = re.compile(r"\b0[:(](\d+)\)?")  # Mesa: 0:line(column), NVIDIA: 0(line)
 MEMBERS: dict[type, str] = {
     moderngl.UniformBlock: "block",
@@ -31,6 +33,22 @@ FULLSCREEN = "common/fullscreen"
 
 class ShaderError(Exception):
     """A shader that does not compile, link or bind: our mistake, with the file and line."""
+
+
+@dataclass(frozen=True)
+class Glsl:
+    """GLSL that the host makes, to fill a slot in place of a file. name: in errors."""
+
+    name: str
+    text: str
+
+
+def glsl_constant(path: str, name: str) -> float:
+    """A number that a shader declares, for the host to use too: ``const float NAME = 4.0;``."""
+    text = (SHADERS / path).read_text(encoding="utf-8")
+    found = re.search(rf"^const \w+ {name} = ([^;]+);", text, re.MULTILINE)
+    assert found, f"app/shaders/{path} declares no constant {name}"
+    return float(found[1])
 
 
 class ShaderLibrary:
@@ -48,7 +66,7 @@ class ShaderLibrary:
         self,
         name: str,
         defines: Mapping[str, object] | None = None,
-        slots: Mapping[str, str] | None = None,
+        slots: Mapping[str, str | Glsl] | None = None,
         vertex: str = FULLSCREEN,
     ) -> moderngl.Program:
         """The program ``name`` with these defines and slots; vertex: the shader to take if it has none of its own. Raises
@@ -89,12 +107,14 @@ class ShaderLibrary:
         self._programs.clear()
 
     def _compile(
-        self, name: str, defines: Mapping[str, object], slots: Mapping[str, str], shared: str
+        self, name: str, defines: Mapping[str, object], slots: Mapping[str, str | Glsl], shared: str
     ) -> moderngl.Program:
         own = self._root / f"{name}.vert.glsl"
         vertex = f"{name if own.exists() else shared}.vert.glsl"
         unused = set(defines)
         stages = [Source(self._root, stage, defines, slots, unused) for stage in (vertex, f"{name}.frag.glsl")]
+        if missing := stages[0].missing + stages[1].missing:
+            raise ShaderError(missing[0])
         if unused:
             raise ShaderError(f"{name}: no shader declares #define {', '.join(sorted(unused))}")
         try:
@@ -130,10 +150,11 @@ class Source:
     """One stage's text, flattened; remembers which line came from which file."""
 
     def __init__(
-        self, root: Path, name: str, defines: Mapping[str, object], slots: Mapping[str, str], unused: set[str]
+        self, root: Path, name: str, defines: Mapping[str, object], slots: Mapping[str, str | Glsl], unused: set[str]
     ) -> None:
         self._root, self._defines, self._slots, self._unused = root, defines, slots, unused
         self._included: set[str] = set()
+        self.missing: list[str] = []  # defines that the host must give, and does not
         self._places = ["version"]  # file and line that each flattened line came from
         lines = [VERSION]
         self._flatten(name, self._read(name), lines)
@@ -150,6 +171,8 @@ class Source:
                 self._unused.discard(define[1])
                 value = self._defines[define[1]]
                 line = f"#define {define[1]} {int(value) if isinstance(value, bool) else value}"
+            elif define and not define[2]:
+                self.missing.append(f"app/shaders/{place}: the host gives no {define[1]}")
             lines.append(line)
             self._places.append(place)
 
@@ -157,7 +180,12 @@ class Source:
         if slot is not None:
             if slot not in self._slots:
                 raise ShaderError(f"app/shaders/{place}: nothing fills the slot <{slot}>")
-            path = self._slots[slot]
+            filling = self._slots[slot]
+            if isinstance(filling, Glsl):
+                if filling.name not in self._included:
+                    self._flatten(filling.name, filling.text, lines)
+                return
+            path = filling
         assert path is not None
         if path in self._included:
             return

@@ -1,4 +1,4 @@
-"""The irradiance that a lightmap has at points of the surfaces.
+"""Irradiance at points of the surfaces is read from a lightmap as it is drawn.
 
 What is read is the flat lightmap that a bake writes, bilinearly, as it is drawn.
 """

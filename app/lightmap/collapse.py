@@ -1,4 +1,4 @@
-"""The collapse of texture quadtrees to one flat texture, smooth across leaves of different levels [Coombe03, 4.4].
+"""Collapsing makes one flat texture of texture quadtrees, smooth across leaves of different levels [Coombe03, 4.4].
 
 From the finest level up, every level takes the means of the finer one where that holds leaves; from the root down, every level is
 interpolated from the coarser one where it holds none. Interpolation thus meets, next to a finer leaf, the mean of its texels.

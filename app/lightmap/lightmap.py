@@ -1,49 +1,29 @@
-"""The light on every texel, on the GPU: what solvers write and everything else reads.
-
-Tile pool textures hold the leaf tiles of t×t texels side by side [Coombe03, 4.2]:
-
-    t_position_area  RGBA32F  centroid p (solver space), area A (solver space; 0 = nothing here)
-    t_normal_ids     RG32UI   unit normal (octahedral, 2×snorm16), facet << MATERIAL_BITS | material (facet from 1)
-    t_irradiance     storage  H [W/m²]: light received so far, so that radiosity B = E + ρH at any ρ, also 0
-    t_residual       storage  r [W/m²]: exitance not yet shot
-    t_ambient        RGBA32F  one texel, a: what the rest of the solve will about add to H, and pictures and bakes show with it
-    t_albedo, t_emission      only where a material has such a texture: the factor is in the material table
-
-and tables: t_pages and t_leaves (where a place of the virtual atlas is in the tile pool, and what its slots hold), t_facets,
-t_materials.
-The solver space is centred on the scene and scaled by its half diagonal, so answers do not depend on unit or origin. H and r
-are stored relative to the largest exitance, which keeps half floats in range and is what 8-bit fixed point needs.
-"""
+"""A lightmap is the light on every texel, on the GPU: solvers write it, everything else reads it. textures.py says what is
+where."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
-from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
+from app.gpu import Gpu, Texture, glsl_constant
 from app.lightmap.options import STORAGE, LightmapOptions
-from app.lightmap.receivers import RECEIVER_FORMAT
 from app.lightmap.refinement import Refinement
-from app.lightmap.tile_pool import OCCLUDER_FORMAT, Array, Moves, SolverSpace, TilePool
-from app.scene.model import F32, F64, Material, Scene
+from app.lightmap.textures import LightTextures
+from app.lightmap.tile_pool import TilePool
+from app.scene.model import F32, F64, Scene
 
-SHARES = np.float32(4.0)  # of what is still to come, that a texel may have, see common/ambient.glsl
-HALF_HEADROOM = 64.0  # of 65504, the largest half float: H may be many times the largest exitance
-LIGHT = ("t_irradiance", "t_residual")
-QUAD_FORMAT = {"in_rect": "4f", "in_from": "2f"}  # see common/rects.vert.glsl
+SHARES = np.float32(glsl_constant("common/ambient.glsl", "SHARES"))  # of what is still to come, that a texel may have
 DEFAULT = LightmapOptions()
 _DTYPES = {"f4": np.float32, "f2": np.float16, "f1": np.uint8}
-_BYTES = {"f4": 4, "u4": 4, "f2": 2, "f1": 1}
 
 
-class Lightmap:
-    """Texel surfaces, irradiance H and residual r of one scene. It is made without light. Whoever makes it releases it.
+class Lightmap(LightTextures):
+    """Texel surfaces, irradiance H and pending exitance r of one scene. It is made without light. Whoever makes it releases it.
 
-    Made from a TilePool, or at once from a scene and its charts. tiles: leaf tiles; columns, rows: of the tile pool in tiles;
-    size: in texels; unit: W/m² per stored unit of H and r.
+    Made from a TilePool, or at once from a scene and its charts. refinement: of its quadtrees, where leaves may come and go.
     """
 
     def __init__(
@@ -55,61 +35,15 @@ class Lightmap:
         textures: Mapping[str, Texture] | None = None,
     ) -> None:
         """textures: of ``pool.arrays``, where they were made before; they are the lightmap's from now on."""
-        self.gpu, self.pool, self.scene, self.charts = gpu, pool, pool.scene, pool.charts
-        self.space: SolverSpace = pool.space
-        self._textures = dict(textures or {name: upload(gpu, array) for name, array in pool.arrays.items()})
-        self._emit = Pass(gpu, "lightmap/emit", defines=self.defines("MATERIAL_BITS", "EMISSION_TEXTURE"))
-        self._edit = Pass(
-            gpu, "lightmap/edit", defines=self.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
-        )
-        self._scale = Pass(gpu, "lightmap/scale")
-        corners, triangles = pool.occluders
-        self.occluders = Mesh(gpu, corners.tobytes(), OCCLUDER_FORMAT, indices=triangles.tobytes())
-        self.receivers = receiver_meshes(gpu, pool.flat_spans, pool.shaped_tiles)
-        self._textures["t_ambient"] = gpu.texture((1, 1), 4, "f4")
-        self.ambient_target = gpu.target(self._textures["t_ambient"])
-        self.version = 0  # counts changes of the leaves
-        self._targets: list[Framebuffer] = []
+        super().__init__(gpu, pool, options.storage, textures)
         self._options = options
-        self.refinement = Refinement(options) if pool.adaptive else None
-        self.set_storage(options.storage)
+        self.refinement = Refinement(self, options) if pool.adaptive else None
         self.clear()
 
     @staticmethod
     def of(gpu: Gpu, scene: Scene, charts: Charts, *, storage: str = "rgba32f") -> Lightmap:
         """With no light yet."""
         return Lightmap(gpu, TilePool(scene, charts), LightmapOptions(storage=storage))
-
-    # -- what passes bind ----------------------------------------------------------------------------------------------
-
-    def defines(self, *names: str) -> dict[str, object]:
-        """Those shader defines that follow from the scene: look-ups exist only where a texture does."""
-        values: dict[str, object] = {
-            "TILE": self.pool.tile,
-            "MATERIAL_BITS": self.pool.material_bits,
-            "ALBEDO_TEXTURE": "t_albedo" in self._textures,
-            "EMISSION_TEXTURE": "t_emission" in self._textures,
-        }
-        return {name: values[name] for name in names}
-
-    def texture(self, name: str) -> Texture:
-        return self._textures[name]
-
-    def textures(self, *names: str) -> dict[str, Texture]:
-        """The named textures, to bind; ``t_albedo`` and ``t_emission`` are left out where the scene has none."""
-        optional = {"t_albedo", "t_emission"}
-        return {n: self._textures[n] for n in names if n in self._textures or n not in optional}
-
-    @property
-    def light_target(self) -> Framebuffer:
-        """Attachment 0: irradiance, 1: residual."""
-        return self._targets[0]
-
-    @property
-    def residual_target(self) -> Framebuffer:
-        return self._targets[1]
-
-    # -- state ---------------------------------------------------------------------------------------------------------
 
     @property
     def options(self) -> LightmapOptions:
@@ -125,143 +59,20 @@ class Lightmap:
         if options.storage != self.storage:
             self.set_storage(options.storage)
 
-    def set_storage(self, storage: str) -> None:
-        """Choose how H and r are stored (a key of STORAGE). What they hold then is undefined: clear."""
-        self.gpu.release_all(*self._targets, *(self._textures.pop(name) for name in LIGHT if name in self._textures))
-        self.storage = storage
-        for name in LIGHT:
-            self._textures[name] = self.gpu.texture(self.size, 4, STORAGE[self.storage])
-        self._make_targets()
-
-    def _make_targets(self) -> None:
-        irradiance, residual = self._textures["t_irradiance"], self._textures["t_residual"]
-        self._targets = [self.gpu.target(irradiance, residual), self.gpu.target(residual)]
-        self._targets[1].color_mask = (True, True, True, False)  # of alpha, see receive.frag.glsl
-
-    def set_materials(self, materials: tuple[Material, ...]) -> None:
-        """Use other albedos and emissions (factors; textures stay) from now on. The light stays as it is: clear, or edit."""
-        self.scene = self.scene.with_materials(materials)
-        self._textures["t_materials"].write(self.pool.material_table(self.scene).tobytes())
-
-    def edit_materials(self, materials: tuple[Material, ...], factor: F64) -> None:
-        """Use other albedos and emissions, and enter in r what is to be shot for it: r += ΔE + Δρ·H [Chen90].
-
-        factor (3,): of the emissions until now, by which the light that is there was scaled."""
-        table = self.pool.material_table(self.scene)
-        table[:, 1, :3] *= factor
-        before = upload(self.gpu, table)
-        self.set_materials(materials)
-        self._edit.draw(
-            self.residual_target,
-            textures={"t_before": before}
-            | self.textures("t_position_area", "t_normal_ids", "t_materials", "t_irradiance", "t_albedo", "t_emission"),
-            uniforms={"u_unit": self.unit},
-            blend="add",
-        )
-        self.gpu.release_all(before)
-
-    def exceeds_half(self, materials: tuple[Material, ...]) -> bool:
-        """Whether these emit so much more than what H and r are stored relative to that half floats would soon end."""
-        return np.pi * max((max(m.emission) for m in materials), default=0.0) > HALF_HEADROOM * self.unit
-
-    def scale(self, factor: F64, target: Framebuffer | None = None) -> None:
-        """Multiply H and r, or what ``target`` holds, by a factor (3,) for each channel."""
-        shares = 1.0 if target else float(factor.mean())  # light's alpha sums power, see receive.frag.glsl
-        self._scale.draw(target or self.light_target, uniforms={"u_factor": (*factor, shares)}, blend="multiply")
-
-    def common_factor(self, materials: tuple[Material, ...]) -> F64:
-        """(3,) a: of all factors for the light that is there, the one that leaves least to shoot for other emissions, min over a
-        of Σ |E' - a E| A for each channel: the median of E'/E, weighted with E A. 1 where a channel emits nothing."""
-        before, after = (np.array([m.emission for m in ms]) for ms in (self.scene.materials, materials))
-        factor = np.ones(3)
-        for c in range(3):
-            emits = before[:, c] > 0
-            ratio, weight = after[emits, c] / before[emits, c], (before * self.pool.emission_weights)[emits, c]
-            order = np.argsort(ratio)
-            if weight.sum() > 0:
-                factor[c] = ratio[order][np.searchsorted(np.cumsum(weight[order]), weight.sum() / 2)]
-        return factor
-
-    @property
-    def emitted(self) -> F64:
-        """Power that the scene's emitters send out, RGB [W]: Σ E A."""
-        weights = self.pool.emission_weights
-        return np.asarray(np.pi * (np.array([m.emission for m in self.scene.materials]) * weights).sum(0))
-
-    def write_tiles(self, slots: NDArray[np.int64]) -> None:
-        """Take over these slots of the tile pool, and the tables and receivers that follow. Their light stays as it is."""
-        edge = self.pool.tile
-        for name, tiles in self.pool.tile_arrays(slots).items():
-            texture = self._textures[name]
-            for slot, tile in zip(slots.tolist(), tiles, strict=True):
-                texture.write(np.ascontiguousarray(tile).tobytes(), viewport=(*self.pool.corner(slot), edge, edge))
-        self._follow(slots)
-
-    def _follow(self, slots: NDArray[np.int64]) -> None:
-        """Take over what follows from the leaves; other ones than before are in these slots."""
-        tables = self._textures
-        tables["t_leaves"] = write_table(self.gpu, tables["t_leaves"], self.pool.slot_tables["t_leaves"])
-        tables["t_pages"] = write_pages(self.gpu, tables["t_pages"], self.pool, slots)
-        self.gpu.release_all(*self.receivers.values())
-        self.receivers = receiver_meshes(self.gpu, self.pool.flat_spans, self.pool.shaped_tiles)
-        self.version += 1
-
-    def resize(self, moves: Moves) -> None:
-        """Take over a tile pool that has got another number of slots. The light goes with its leaves."""
-        self.gpu.release_all(*self._targets)
-        for name in (*self.pool.tile_arrays(np.empty(0, np.int64)), *LIGHT):
-            self._textures[name] = self.moved(self._textures[name], moves)
-        self._make_targets()
-        self._follow(moves.new)
-
-    def moved(self, texture: Texture, moves: Moves) -> Texture:
-        """With the texels of all leaves where they are now, and nothing in new slots, in place of the texture."""
-        pool, kind = self.pool, {"INTEGER": texture.dtype == "u4"}
-        empty = bytes(self.size[0] * self.size[1] * texture.components * _BYTES[texture.dtype])
-        fresh = self.gpu.texture(self.size, texture.components, texture.dtype, empty)
-        target = self.gpu.target(fresh)
-        whole, rest = (pool.tile * part for part in divmod(moves.staying, pool.columns))  # rows, and a part of one
-        staying = [(0, 0, self.size[0], whole, 0, 0), (0, whole, rest, pool.tile, 0, whole)]
-        moved = quads(pool.corners(moves.new), pool.tile, pool.corners(moves.old))
-        rects = np.concatenate([np.array(staying, np.float32), moved])
-        mesh = Mesh(self.gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)
-        Pass(self.gpu, "lightmap/move", defines=kind, vertex="common/rects").draw(
-            target, textures={"t_source": texture}, uniforms={"u_size": self.size}, mesh=mesh
-        )
-        self.gpu.release_all(target, mesh, texture)
-        return fresh
-
-    @property
-    def columns(self) -> int:
-        return self.pool.columns
-
-    @property
-    def rows(self) -> int:
-        return self.pool.rows
-
-    @property
-    def size(self) -> tuple[int, int]:
-        return self.pool.size
-
     @property
     def tiles(self) -> int:
         """Leaves."""
         return int(self.pool.used.sum())
 
-    def clear(self) -> None:
-        """H = 0, r = E: nothing has been shot [Coombe03, 3]."""
-        self.unit = max((np.pi * max(m.emission) for m in self.scene.materials), default=0.0) or 1.0
-        self.light_target.clear()
-        self.ambient_target.clear()
-        self._emit.draw(
-            self.residual_target,
-            textures=self.textures("t_position_area", "t_normal_ids", "t_materials", "t_emission"),
-            uniforms={"u_unit": self.unit},
-        )
+    @property
+    def texel_count(self) -> int:
+        """Texels that cover a surface."""
+        return self.pool.texel_count
 
     def release(self) -> None:
-        self.gpu.release_all(*self._targets, self.ambient_target, *self._textures.values())
-        self.gpu.release_all(self.occluders, *self.receivers.values())
+        if self.refinement is not None:
+            self.refinement.release()
+        super().release()
 
     # -- read-back -----------------------------------------------------------------------------------------------------
 
@@ -301,16 +112,6 @@ class Lightmap:
         """B = E + ρH of every texel (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""
         return self.emission() + self.albedo() * self.irradiance()
 
-    @property
-    def texel_count(self) -> int:
-        """Texels that cover a surface."""
-        return self.pool.texel_count
-
-    @property
-    def memory(self) -> dict[str, int]:
-        """Bytes on the GPU, by texture."""
-        return {n: t.width * t.height * t.components * _BYTES[t.dtype] for n, t in self._textures.items()}
-
     def _read(self, name: str) -> F32:
         texture = self._textures[name]
         raw = np.frombuffer(texture.read(), _DTYPES[texture.dtype]).reshape(*self.size[::-1], 4)
@@ -322,43 +123,3 @@ class Lightmap:
         material = self.scene.material_ids[self.charts.face_triangle[surfaces.face]]
         out = np.where((surfaces.face >= 0)[..., None], np.array(factors, np.float32)[material], np.float32(0))
         return out if colours is None else out * colours
-
-
-def upload(gpu: Gpu, array: Array) -> Texture:
-    """(height, width, components) as a texture of the same type."""
-    height, width, components = array.shape
-    dtype = {"float32": "f4", "float16": "f2", "uint32": "u4"}[array.dtype.name]
-    return gpu.texture((width, height), components, dtype, np.ascontiguousarray(array).tobytes())
-
-
-def write_table(gpu: Gpu, texture: Texture, table: Array) -> Texture:
-    """The table (height, width, components) in place of what the texture holds: the same texture, or another of its size."""
-    if texture.size != table.shape[1::-1]:
-        gpu.release_all(texture)
-        return upload(gpu, table)
-    texture.write(np.ascontiguousarray(table).tobytes())
-    return texture
-
-
-def write_pages(gpu: Gpu, texture: Texture, pool: TilePool, slots: NDArray[np.int64]) -> Texture:
-    """The page table after leaves came into these slots: the same texture, or another where pages are of another level now."""
-    pages = pool.slot_tables["t_pages"]
-    if texture.size != pages.shape[1::-1]:
-        return write_table(gpu, texture, pages)
-    for rect, block in pool.page_blocks(slots):
-        texture.write(block.tobytes(), viewport=rect)
-    return texture
-
-
-def quads(corner: NDArray[np.int64], edge: int, source: NDArray[np.int64]) -> F32:
-    """(n, 6) f32 instances of QUAD_FORMAT: squares at ``corner`` (n, 2) that come from ``source`` (n, 2) [texels]."""
-    return np.column_stack([corner, np.full((len(corner), 2), edge), source]).astype(np.float32)
-
-
-def receiver_meshes(gpu: Gpu, flat_spans: F32, shaped_tiles: F32) -> dict[bool, Mesh]:
-    """What light falls on, see receivers.py: by whether it is flat; what there is none of is left out."""
-    return {
-        flat: Mesh(gpu, quads.tobytes(), RECEIVER_FORMAT, per_instance=True)
-        for flat, quads in ((True, flat_spans), (False, shaped_tiles))
-        if len(quads)
-    }

@@ -1,4 +1,4 @@
-"""How light is held on texels: whether quadtrees refine them, where, and in which format."""
+"""These options say how light is held on texels: whether quadtrees refine them, where, and in which format."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Irradiance at the same random points again and again, without anyone waiting for the GPU."""
+"""A probe reads irradiance at the same points again and again, without anyone waiting for the GPU."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Texture quadtrees over the charts: one leaf of t×t texels for each square of the atlas that is smooth [Coombe03, 4.1].
+"""A texture quadtree has one leaf of t×t texels for each square of the atlas that is smooth [Coombe03, 4.1].
 
 A tile (level, x, y) splits into the four of the next level that it covers; those that meet no surface do not exist. Leaves that
 share a chart and an edge differ by one level at most, so that interpolation across the edge meets two texels with one.
@@ -109,29 +109,29 @@ class Quadtree:
         return Change(parents.repeat(4)[exists], fresh, np.stack([dx, dy], 1)[exists], split=True)
 
     def merges(self, slots: NDArray[np.int64]) -> list[list[int]]:
-        """Families of leaves, all of them among ``slots``, whose parent would not be coarser than its neighbours allow."""
-        families: dict[Tile, list[int]] = {}
+        """Siblings, all of them among ``slots``, whose parent would not be coarser than its neighbours allow."""
+        siblings: dict[Tile, list[int]] = {}
         for slot in slots:
             level, x, y = self.tile(int(slot))
             if level > 0:
-                families.setdefault((level - 1, x // 2, y // 2), []).append(int(slot))
-        return [f for parent, f in families.items() if self._below_first(parent) and self._may_merge(parent, f)]
+                siblings.setdefault((level - 1, x // 2, y // 2), []).append(int(slot))
+        return [s for parent, s in siblings.items() if self._below_first(parent) and self._may_merge(parent, s)]
 
-    def merge(self, families: list[list[int]]) -> Change:
-        """Replace families of leaves by their parents."""
-        children = np.array([slot for family in families for slot in family], np.int64)
-        first = np.array([family[0] for family in families], np.int64)
+    def merge(self, siblings: list[list[int]]) -> Change:
+        """Replace siblings by their parents."""
+        children = np.array([slot for leaves in siblings for slot in leaves], np.int64)
+        first = np.array([leaves[0] for leaves in siblings], np.int64)
         leaves = self.pool.leaves.only(first)
         corner = np.stack([self.pool.leaves.x[children] % 2, self.pool.leaves.y[children] % 2], 1).astype(np.int64)
         parents = Leaves(leaves.level - 1, leaves.x // 2, leaves.y // 2)
         tiles = Tiles.cut(self.pool.scene, self.pool.charts, parents, self._faces_near(parents))
         fresh = self._replace(children, tiles)
-        return Change(fresh.repeat([len(family) for family in families]), children, corner, split=False)
+        return Change(fresh.repeat([len(slots) for slots in siblings]), children, corner, split=False)
 
     # -- inside --------------------------------------------------------------------------------------------------------
 
     def _replace(self, old: NDArray[np.int64], tiles: Tiles) -> NDArray[np.int64]:
-        """Slots of the new tiles, the old ones' among them: merging needs no room. Regrowth reads their light first."""
+        """Slots of the new tiles, the old ones' among them: merging needs no room. LightTransfer reads their light first."""
         for slot in old.tolist():
             self._leave(self.tile(slot))
         self.pool.free(old)
@@ -171,15 +171,15 @@ class Quadtree:
         level, x, y = tile
         return any((level - k, x >> k, y >> k) in self._first for k in range(level + 1))
 
-    def _may_merge(self, parent: Tile, family: list[int]) -> bool:
+    def _may_merge(self, parent: Tile, siblings: list[int]) -> bool:
         level, x, y = parent
         for child in range(4):
             tile = (level + 1, 2 * x + (child & 1), 2 * y + (child >> 1))
-            if tile in self.slots and self.slots[tile] not in family:
+            if tile in self.slots and self.slots[tile] not in siblings:
                 return False
             if self._is_split(tile):
                 return False
-        return not self._meets_finer(parent, frozenset().union(*(self._charts_in(slot) for slot in family)))
+        return not self._meets_finer(parent, frozenset().union(*(self._charts_in(slot) for slot in siblings)))
 
     def _meets_finer(self, tile: Tile, charts: frozenset[int]) -> bool:
         """Whether a neighbour that shows one of these charts is finer than this tile by two levels or more."""

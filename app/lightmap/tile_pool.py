@@ -1,4 +1,5 @@
-"""A scene cut into leaf tiles, ready for the GPU: plain arrays, made in any thread. See lightmap.py for what they mean."""
+"""A tile pool is a scene cut into leaf tiles, ready for the GPU: plain arrays, made in any thread. textures.py says what they
+mean."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from app.atlas.charts import Charts
 from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents, uniform_leaves
 from app.atlas.visible_mesh import VisibleMesh, visible_mesh
 from app.errors import UserError
-from app.lightmap.receivers import KIND, TileTexels, receivers, tile_kinds
+from app.lightmap.tile_shapes import SHAPE, TileTexels, tile_shapes
 from app.lightmap.tiles import Tiles
 from app.scene.model import F32, F64, Scene
 
@@ -24,7 +25,6 @@ ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 MAX_FACETS = (1 << 24) - 2  # item ids are held as floats, see common/item.glsl
 TABLE_WIDTH = 2048  # columns of the facet table
-UNCHARTED = 16777215.0  # item of a side that has no texels, see common/item.glsl
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +69,7 @@ class TilePool:
 
     tile: edge of a leaf [texels], t below; tiles: number of slots; used (tiles,) bool: those that hold a leaf; adaptive: whether
     leaves may be of several levels; depth: the level in which pages are counted, that of the finest leaf or one more.
-    leaves, surfaces, albedo_tiles, emission_tiles: of every slot, empty where it is not used.
-    occluders: of the visibility map; flat_spans, shaped_tiles: the receivers.
+    leaves, surfaces, albedo_tiles, emission_tiles, shapes (SHAPE): of every slot, empty where it is not used.
     Raises UserError where facets and materials do not fit the 32 bits of a texel's ids.
     """
 
@@ -89,7 +88,6 @@ class TilePool:
         cut = Tiles.cut(scene, charts, uniform_leaves(charts) if leaves is None else leaves)
         self._make_room(cut, max(len(cut), slots))
         self.put(np.arange(len(cut)), cut)
-        self.occluders = occluders(scene, charts, self.space)
 
     def _make_room(self, cut: Tiles, slots: int) -> None:
         self.columns = max(1, int(np.ceil(np.sqrt(slots))))
@@ -102,7 +100,7 @@ class TilePool:
         )
         self.albedo_tiles = None if cut.albedo is None else colours
         self.emission_tiles = None if cut.emission is None else colours
-        self._kinds, self.used = np.zeros(0, KIND), np.zeros(0, bool)
+        self.shapes, self.used = np.zeros(0, SHAPE), np.zeros(0, bool)
         self._texels = np.zeros(0, np.int64)  # of each slot, that cover a surface
         self.depth = 0
         self._pages = np.zeros([side // self.tile for side in self.charts.size[::-1]], np.uint32)
@@ -117,13 +115,12 @@ class TilePool:
             self.albedo_tiles = moves.array(self.albedo_tiles, 1.0)
         if self.emission_tiles is not None:
             self.emission_tiles = moves.array(self.emission_tiles, 1.0)
-        self._kinds, self.used = moves.array(self._kinds, 0), moves.array(self.used, False)
+        self.shapes, self.used = moves.array(self.shapes, 0), moves.array(self.used, False)
         self._texels = moves.array(self._texels, 0)
         self.surfaces.face[moves.staying :] = -1
         self.tiles, self.rows = moves.slots, max(1, -(-moves.slots // self.columns))
         self.size = (self.columns * self.tile, self.rows * self.tile)
         self._turn_pages(moves.new, moves.new + 1)
-        self.flat_spans, self.shaped_tiles = self.receivers_of(np.flatnonzero(self.used))
 
     # -- leaves that come and go ---------------------------------------------------------------------------------------
 
@@ -136,20 +133,15 @@ class TilePool:
             if own is not None:
                 own[slots] = 1.0 if colours is None else colours
         self._texels[slots] = (tiles.surfaces.face >= 0).sum((1, 2))
-        self._kinds[slots] = tile_kinds(self._tile_texels(tiles), self._facet_material)
+        self.shapes[slots] = tile_shapes(self._tile_texels(tiles), self._facet_material)
         self.used[slots] = True
         self._fit_pages()
         self._turn_pages(slots, slots + 1)
         if self.emission_tiles is not None:  # finer texels hold other shares of an image
             self.__dict__.pop("emission_weights", None)
-        self.flat_spans, self.shaped_tiles = self.receivers_of(np.flatnonzero(self.used))
-
-    def receivers_of(self, slots: NDArray[np.int64]) -> tuple[F32, F32]:
-        """Flat spans and shaped tiles of these slots, in ascending order, see receivers.py."""
-        return receivers(self._kinds, slots, self.leaves, self.columns, self.tile)
 
     def free(self, slots: NDArray[np.int64]) -> None:
-        """Let these slots hold nothing. The receivers follow with the next ``put``."""
+        """Let these slots hold nothing."""
         self.used[slots] = False
         self._turn_pages(slots, np.zeros_like(slots))
         self.leaves.level[slots] = self.leaves.x[slots] = self.leaves.y[slots] = -1
@@ -349,29 +341,4 @@ def octahedral(normals: NDArray[np.floating]) -> NDArray[np.uint32]:
     return np.asarray(packed[..., 0] | packed[..., 1] << np.uint32(16), np.uint32)
 
 
-OCCLUDER = np.dtype([("in_position", "f4", 3), ("in_sides", "f4", 2)])
-OCCLUDER_FORMAT = {"in_position": "3f", "in_sides": "2f"}
-
-
-def occluders(scene: Scene, charts: Charts, space: SolverSpace) -> tuple[Array, Array]:
-    """What a shooter sees: vertices (v,) OCCLUDER and triangles (m, 3) u32.
-
-    in_sides: the items of front and back, facet from 1 or UNCHARTED, of the one triangle that has this vertex last (flat values
-    come from there). The other two corners share any vertex in their place: one vertex per triangle, not three.
-    """
-    count = len(scene.triangles)
-    sides = np.full((count, 2), UNCHARTED, np.float32)
-    sides[charts.face_triangle, charts.face_back.astype(int)] = charts.face_facet + 1
-    last = scene.triangles[:, 2]
-    vertex_at = np.full(len(scene.positions), -1, np.int64)
-    vertex_at[last] = np.arange(count)
-    bare = np.setdiff1d(scene.triangles, last)
-    vertex_at[bare] = count + np.arange(len(bare))
-    vertices = np.zeros(count + len(bare), OCCLUDER)
-    vertices["in_position"] = space.local_from_world(scene.positions[np.concatenate([last, bare])])
-    vertices["in_sides"][:count] = sides
-    triangles = np.column_stack([vertex_at[scene.triangles[:, :2]], np.arange(count)])
-    return vertices, triangles.astype(np.uint32)
-
-
-__all__ = ["OCCLUDER_FORMAT", "Array", "Moves", "ScalarT", "SolverSpace", "TilePool", "octahedral"]
+__all__ = ["Array", "Moves", "ScalarT", "SolverSpace", "TilePool", "octahedral"]

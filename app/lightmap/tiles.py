@@ -1,4 +1,4 @@
-"""What the texels of some leaf tiles are: cut from the scene's charts, whatever the tiles' level."""
+"""Tiles are leaves with their texels, cut from the scene's charts, whatever their level."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Light that moves with the leaves of a lightmap: pushed down to children, pulled up to parents [Coombe03, 4.2]."""
+"""Light moves with the leaves of a lightmap: it is pushed down to children and pulled up to parents [Coombe03, 4.2]."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
-from app.lightmap.lightmap import QUAD_FORMAT, Lightmap, quads
 from app.lightmap.quadtree import Change
+from app.lightmap.textures import QUAD_FORMAT, LightTextures, quads
 from app.scene.model import F32
 
 LIFTED_COLUMNS = 32  # tiles side by side among those that are lifted
 
 
-class Regrowth:
-    """The passes; what a change needs besides goes with it."""
+class LightTransfer:
+    """The passes that push and pull the light of one lightmap."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
+    def __init__(self, gpu: Gpu, lightmap: LightTextures) -> None:
         self._gpu, self._lightmap = gpu, lightmap
         names = ("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
         self._lift, self._push, self._pull = (

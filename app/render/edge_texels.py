@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
-from app.lightmap.lightmap import QUAD_FORMAT, Lightmap
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.textures import QUAD_FORMAT
 from app.render.edges import KINDS, Kind, unequal_edges
 from app.scene.model import F64
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.gpu.shader import FULLSCREEN
-from app.lightmap.lightmap import QUAD_FORMAT, Lightmap, quads, upload, write_pages
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.textures import QUAD_FORMAT, quads, upload, write_pages
 from app.lightmap.tile_pool import TABLE_WIDTH
 from app.render.ages import LeafAges
 from app.render.edge_texels import EdgeTexels

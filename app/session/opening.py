@@ -10,7 +10,8 @@ from typing import Any
 
 from app.errors import UserError
 from app.gpu import Gpu, Texture
-from app.lightmap.lightmap import Lightmap, upload
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.textures import upload
 from app.options import Options
 from app.session.loading import Loaded, Loading
 from app.solvers import Family, Solver

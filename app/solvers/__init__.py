@@ -11,8 +11,8 @@ from app.lightmap.lightmap import Lightmap
 from app.options import Options
 from app.solvers.base import EnergyBalance, Inspection, Progress, Rect, Solver
 from app.solvers.shooting.options import ShootingOptions
+from app.solvers.shooting.records import BATCH
 from app.solvers.shooting.solver import Shooting
-from app.solvers.shooting.stages import BATCH
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,9 @@ from app.scene.model import F32, F64, Scene
 from app.session.batch import opened
 from app.solvers import DEFAULT_SOLVER, SOLVERS, EnergyBalance, Family
 from app.solvers.run import solve_until
+from app.solvers.shooting.choose import ROOT_LEVEL
+from app.solvers.shooting.coarse_to_fine import LEVEL
 from app.solvers.shooting.options import MAX_LEVEL
-from app.solvers.shooting.stages import LEVEL, ROOT_LEVEL
 
 SIZES = ("small", "large")
 ENOUGH = 2_000_000  # units of work: a solve that needs more does not converge

@@ -1,4 +1,4 @@
-"""The visibility map as a picture: one colour per facet, darker with distance."""
+"""The visibility image is a visibility map as a picture: one colour per facet, darker with distance."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class ItemImage:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._pass = Pass(gpu, "render/items")
+        self._pass = Pass(gpu, "visibility/items")
         self._image: Texture | None = None
 
     def draw(self, items: Texture, depth: Texture, size: tuple[int, int]) -> Texture:

@@ -1,4 +1,4 @@
-"""What casts shadows, as the projections draw it.
+"""Occluders are the scene's triangles as the projections draw them: what casts shadows.
 
 Straight edges [Wallner10, 5]. In the stereographic map an edge is an arc of a circle at least as large as the disc. Drawn
 straight, it misses an arc of length s by at most s²/8. An edge of length l at a distance d has s <= l/d: it is right within a
@@ -25,11 +25,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.gpu import Gpu, Mesh, Texture
+from app.gpu import Gpu, Mesh, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
+from app.lightmap.tile_pool import TilePool
 
 NEAR = 0.25  # solver space: an eighth of the scene's diagonal
 TRIANGLES_A_ROW = 512  # see visibility/projections/triangles.glsl
+UNCHARTED = glsl_constant("common/item.glsl", "UNCHARTED")  # item of a side that has no texels
+OCCLUDER = np.dtype([("in_position", "f4", 3), ("in_sides", "f4", 2)])
+OCCLUDER_FORMAT = {"in_position": "3f", "in_sides": "2f"}
 CASTER = np.dtype([("in_position", "f4", 3), ("in_sides", "f4", 2), ("in_normal", "f4", 3)])
 CASTER_FORMAT = {"in_position": "3f", "in_sides": "2f", "in_normal": "3f"}
 
@@ -51,9 +55,9 @@ class Occluders:
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
-        self._gpu, self._lightmap = gpu, lightmap
-        vertices: Any = lightmap.pool.occluders[0]
-        triangles = lightmap.pool.occluders[1]
+        self._gpu = gpu
+        vertices, triangles = occluders(lightmap.pool)
+        self._mesh = Mesh(gpu, vertices.tobytes(), OCCLUDER_FORMAT, indices=triangles.tobytes())
         self._corners: NDArray[np.float32] = vertices["in_position"][triangles]
         self._sides: NDArray[np.float32] = vertices["in_sides"][triangles[:, 2]]
         self.count = len(triangles)
@@ -66,7 +70,7 @@ class Occluders:
 
     def whole(self, resolution: int) -> Casters:
         """The triangles as they are, indexed."""
-        return Casters(self.count, mesh=self._lightmap.occluders)
+        return Casters(self.count, mesh=self._mesh)
 
     def fetched(self, resolution: int) -> Casters:
         """Three vertices for each triangle, which fetch all of it."""
@@ -88,7 +92,28 @@ class Occluders:
 
     def release(self) -> None:
         self._drop_split()
-        self._gpu.release_all(self.texture)
+        self._gpu.release_all(self._mesh, self.texture)
+
+
+def occluders(pool: TilePool) -> tuple[Any, NDArray[np.uint32]]:
+    """What a shooter sees: vertices (v,) OCCLUDER and triangles (m, 3) u32.
+
+    in_sides: the items of front and back, facet from 1 or UNCHARTED, of the one triangle that has this vertex last (flat values
+    come from there). The other two corners share any vertex in their place: one vertex per triangle, not three.
+    """
+    scene, charts, count = pool.scene, pool.charts, len(pool.scene.triangles)
+    sides = np.full((count, 2), UNCHARTED, np.float32)
+    sides[charts.face_triangle, charts.face_back.astype(int)] = charts.face_facet + 1
+    last = scene.triangles[:, 2]
+    vertex_at = np.full(len(scene.positions), -1, np.int64)
+    vertex_at[last] = np.arange(count)
+    bare = np.setdiff1d(scene.triangles, last)
+    vertex_at[bare] = count + np.arange(len(bare))
+    vertices = np.zeros(count + len(bare), OCCLUDER)
+    vertices["in_position"] = pool.space.local_from_world(scene.positions[np.concatenate([last, bare])])
+    vertices["in_sides"][:count] = sides
+    triangles = np.column_stack([vertex_at[scene.triangles[:, :2]], np.arange(count)])
+    return vertices, triangles.astype(np.uint32)
 
 
 def edge_limit(resolution: int) -> float:
@@ -121,7 +146,7 @@ def split_mesh(
     corners: NDArray[np.float32], sides: NDArray[np.float32], limit: float
 ) -> tuple[NDArray[np.generic], NDArray[np.uint32]]:
     """Triangles (m, 3, 3) with sides (m, 2) in pieces: vertices (v,) CASTER and indices (p, 3) u32. As in
-    atlas.tile_pool.occluders, each piece ends in a vertex of its own, which holds its values."""
+    ``occluders``, each piece ends in a vertex of its own, which holds its values."""
     pieces, parent = halved(corners, limit)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).astype(np.float64)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

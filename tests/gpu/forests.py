@@ -12,10 +12,11 @@ from solver_scenes import table_room
 from app.atlas.charts import DEFAULT_TILE, TILES
 from app.atlas.parametrize import parametrize
 from app.gpu import Gpu
-from app.lightmap.lightmap import LIGHT, Lightmap
+from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import Quadtree, quadtree_pool
-from app.lightmap.transfer import Regrowth
+from app.lightmap.textures import LIGHT
+from app.lightmap.transfer import LightTransfer
 from app.render.options import INTERPOLATIONS
 from app.render.resolve import DisplayTexels
 from app.scene.load import load_scene
@@ -37,7 +38,7 @@ class Forest:
         self.lightmap = Lightmap(gpu, quadtree_pool(scene, charts), LightmapOptions(adaptive=True, storage=storage))
         self.lightmap.clear()
         self.pool, self.storage = self.lightmap.pool, storage
-        self.tree, self.regrowth = Quadtree(self.pool), Regrowth(gpu, self.lightmap)
+        self.tree, self.transfer = Quadtree(self.pool), LightTransfer(gpu, self.lightmap)
 
     def write(self, light: dict[str, F64]) -> None:
         """Tiles (slots, t, t, 3) [stored units] by name of the texture, nothing where nothing is covered."""
@@ -59,11 +60,11 @@ class Forest:
         some = used if rng is None else used[rng.random(len(used)) < share]
         if self.tree.room < 4 * len(used):
             self.lightmap.resize(self.tree.resize(self.pool.tiles + 4 * len(used)))
-        self.regrowth.apply(self.tree.split(self.tree.splits(some.tolist(), DEPTH)))
+        self.transfer.apply(self.tree.split(self.tree.splits(some.tolist(), DEPTH)))
 
     def shrink(self) -> None:
-        families = self.tree.merges(np.flatnonzero(self.pool.used))
-        self.regrowth.apply(self.tree.merge(families))
+        siblings = self.tree.merges(np.flatnonzero(self.pool.used))
+        self.transfer.apply(self.tree.merge(siblings))
 
     @property
     def light(self) -> dict[str, F64]:

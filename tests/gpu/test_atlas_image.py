@@ -132,7 +132,7 @@ def test_leaves_shine_for_a_second_after_a_split(
     before = viewer.atlas(trees, 4)
     first = next(iter(trees.tree.slots))
     clock[0] += 10.0
-    trees.regrowth.apply(trees.tree.split([trees.tree.slots[first]]))
+    trees.transfer.apply(trees.tree.split([trees.tree.slots[first]]))
     viewer.frame(trees)
     alone = viewer.atlas(trees, 4)
     viewer.frame(trees, whole=False)

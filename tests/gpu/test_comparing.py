@@ -301,8 +301,8 @@ def test_a_node_set_that_is_resized_is_not_looked_up_at_once(
     trees = forest(table_room())
     for _ in range(2):
         trees.grow()
-    families = trees.tree.merges(np.flatnonzero(trees.pool.used))
-    trees.regrowth.apply(trees.tree.merge([family for family in families if rng.random() < 0.7]))
+    siblings = trees.tree.merges(np.flatnonzero(trees.pool.used))
+    trees.transfer.apply(trees.tree.merge([family for family in siblings if rng.random() < 0.7]))
     trees.write_noise(rng)
     lightmap, pool = trees.lightmap, trees.pool
     light = light_of(lightmap, lightmap.irradiance())

@@ -14,6 +14,7 @@ from app.gpu import Gpu, Pass
 from app.gpu.shader import SHADERS, ShaderLibrary
 from app.reference.form_factors import parallel_rectangles, perpendicular_rectangles, point_to_polygon
 from app.scene.model import F64
+from app.solvers.shooting.records import RECORDS
 
 PROBE = """
 #include "common/atlas.glsl"
@@ -57,7 +58,7 @@ def factors(gpu: Gpu, positions: F64, normals: F64, **defines: object) -> F64:
     ]
     output = gpu.texture((len(positions), 1), 4, "f4")
     target = gpu.target(output)
-    Pass(gpu, "probe", defines=defines).draw(
+    Pass(gpu, "probe", defines=defines, slots=RECORDS).draw(
         target,
         textures=dict(zip(("t_position", "t_normal"), inputs, strict=True)),
         uniforms=dict(zip(("u_edge_u", "u_edge_v"), EDGES, strict=True)),

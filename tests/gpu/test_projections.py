@@ -15,9 +15,8 @@ from app.gpu import Gpu, Pass
 from app.gpu.shader import SHADERS, ShaderLibrary
 from app.scene.load import load_scene
 from app.scene.model import F64
-from app.solvers.shooting.shot import Shot
-from app.solvers.shooting.stages import BATCH
-from app.visibility.occluders import halved
+from app.solvers.shooting.records import BATCH, Shot
+from app.visibility.occluders import halved, occluders
 from app.visibility.projections import PROJECTIONS
 
 # One fragment per texel of the map: its weight and direction; how far each pair of functions is from inverting the other
@@ -145,14 +144,15 @@ def met(corners: F64, sides: F64, origin: F64, rays: F64, own: int) -> tuple[F64
 
 def met_from(solution: Solution, shot: Shot, weight: F64) -> tuple[F64, F64]:
     """What rays from a shooter through every texel of its map meet: item and distance; weight: see ``probed``."""
-    vertices, triangles = solution.lightmap.pool.occluders
+    vertices, triangles = occluders(solution.lightmap.pool)
     corners = vertices["in_position"][triangles].astype(np.float64)
     sides = vertices["in_sides"][triangles[:, 2]]
-    normal, u = shot.rows[1, :3], shot.rows[3, :3]
+    record = {name: shot.record[name].astype(np.float64) for name in ("origin", "normal", "edge_u", "facet")}
+    normal, u = record["normal"], record["edge_u"]
     u = u - normal * (u @ normal)
     u /= np.linalg.norm(u)
     rays = weight[:, :3] @ np.stack([u, np.cross(normal, u), normal])
-    return met(corners, sides, shot.rows[0, :3], rays, int(shot.rows[1, 3]))
+    return met(corners, sides, record["origin"], rays, int(record["facet"]))
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -204,7 +204,7 @@ def test_inspect_shows_what_the_last_shot_saw(probe: Gpu) -> None:
     solution.settle()
     assert share_wrong() < EDGES_OF_64
     solution.refine(depth=1)
-    while solver._redo_under_way is None:
+    while solver.batch.replay.under_way is None:
         solution.step(BATCH)
         solver.poll()
     solver.poll(wait=True)

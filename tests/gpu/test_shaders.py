@@ -14,14 +14,15 @@ import numpy as np
 import pytest
 
 from app.atlas.charts import TILES
-from app.gpu import Gpu, Mesh, Pass, ShaderError, ShaderLibrary
+from app.gpu import Glsl, Gpu, Mesh, Pass, ShaderError, ShaderLibrary
 from app.gpu.shader import SHADERS, Source
 from app.options import specs
 from app.render.layers import LAYER_SHADERS
 from app.render.options import TONE_MAPS
 from app.render.resolve import BORDER, PLACES_WIDTH
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
-from app.solvers.shooting.stages import BLOCK_LEVEL, EMITTER, LEVELS, OPEN_BLOCK, SQUARE_LEVEL
+from app.solvers.shooting.records import BATCH, BLOCK_LEVEL, BLOCK_ROWS, CELL_LEVEL, EMITTER, GROUP, LEVELS, RECORDS
+from app.solvers.shooting.see import ESCAPED_BLOCK
 from app.visibility.projections import PROJECTIONS
 
 OPTION = {spec.name: spec for spec in specs(ShootingOptions)}
@@ -32,15 +33,17 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "LEVEL": tuple(range(MAX_LEVEL + 1)),
     "HIGHEST": (MAX_LEVEL,),
     "TILE": (TILES[-1],),
-    "TILE_BLOCKS": (TILES[-1],),
-    "TILE_SQUARES": (TILES[-1] >> SQUARE_LEVEL,),
-    "SQUARE_LEVEL": (SQUARE_LEVEL,),
-    "BLOCK": (OPEN_BLOCK,),
+    "TILE_CELLS": (TILES[-1] >> CELL_LEVEL,),
+    "CELL_LEVEL": (CELL_LEVEL,),
+    "BATCH": (BATCH,),
+    "BLOCK_ROWS": (BLOCK_ROWS,),
+    "GROUP": (GROUP,),
+    "BLOCK": (ESCAPED_BLOCK,),
     "BLOCK_LEVEL": (BLOCK_LEVEL,),
     "FINEST": (0, MAX_LEVEL),
     "LEVELS": (LEVELS,),
     "EMITTER": (EMITTER,),
-    "PAYS": FLAG,
+    "SETTLES": FLAG,
     "KEEPS": FLAG,
     "VIEWS": tuple({p.views for p in PROJECTIONS.values()}),
     "MATERIAL_BITS": (16,),
@@ -52,7 +55,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "BORDER": tuple(sorted(set(BORDER.values()))),
     "PLACES_WIDTH": (PLACES_WIDTH,),
     "SAMPLES": (1, 4),
-    "FLAT": FLAG,
+    "PLANAR": FLAG,
     "NEAR_FIELD": FLAG,
     "DISC": FLAG,
     "DISC_SUBDIVISION": (OPTION["discs"].maximum,),
@@ -60,7 +63,6 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "INTEGER": FLAG,
     "VISIBILITY": tuple(range(len(VISIBILITIES))),
 }
-CONSTANTS = {"BATCH"}
 SLOTS = {
     "projection": tuple(p.glsl for p in PROJECTIONS.values()),
     "vertex": tuple(p.drawing["vertex"] for p in PROJECTIONS.values()),
@@ -79,20 +81,20 @@ def stages(name: str) -> list[str]:
     return [vertex if (SHADERS / vertex).exists() else f"common/{shared}.vert.glsl", fragment]
 
 
-def fillings(name: str) -> Iterator[dict[str, str]]:
+def fillings(name: str) -> Iterator[dict[str, str | Glsl]]:
     """Every choice for each slot of a program."""
     text = "".join((SHADERS / stage).read_text() for stage in stages(name))
-    wanted = sorted(set(re.findall(r"#include <(\w+)>", text)))
+    wanted = sorted(set(re.findall(r"#include <(\w+)>", text)) - RECORDS.keys())
     for files in itertools.product(*(dict.fromkeys(SLOTS[slot]) for slot in wanted)):
         filling = dict(zip(wanted, files, strict=True))
         if "vertex" not in filling or filling in DRAWINGS:  # both sides of one projection
-            yield filling
+            yield RECORDS | filling
 
 
-def combinations(name: str, slots: Mapping[str, str]) -> Iterator[dict[str, object]]:
+def combinations(name: str, slots: Mapping[str, str | Glsl]) -> Iterator[dict[str, object]]:
     """Every choice for each define that a program declares with these files in its slots."""
     text = "".join(Source(SHADERS, stage, {}, slots, set()).text for stage in stages(name))
-    declared = sorted(set(re.findall(r"^\s*#define (\w+) ", text, re.MULTILINE)) - CONSTANTS)
+    declared = sorted(set(re.findall(r"^\s*#define (\w+)", text, re.MULTILINE)))
     for values in itertools.product(*(DEFINES[define] for define in declared)):
         yield dict(zip(declared, values, strict=True))
 

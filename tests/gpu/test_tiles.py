@@ -55,12 +55,11 @@ def test_every_program_that_asks_for_the_tile_is_told(gpu: Gpu, monkeypatch: pyt
             if re.search(r"#define TILE\b", text):
                 asked.append(name)
                 assert defines.get("TILE") == 8, name
-    assert {"render/source", "render/resolve", "render/edges", "lightmap/push"} <= set(asked)
+    assert {"render/source", "render/resolve", "render/edges", "lightmap/push", "lightmap/judge"} <= set(asked)
     assert {
         "solvers/shooting/choose",
         "solvers/shooting/patches",
-        "solvers/shooting/books",
-        "solvers/shooting/judge",
+        "solvers/shooting/tile_energy",
     } <= set(asked)
     view.release()
     session.release()

@@ -10,9 +10,9 @@ from solver_scenes import Solution, begin, grey, quads_scene, room, table_room
 
 from app.gpu import Gpu
 from app.lightmap.collapse import collapse
+from app.lightmap.refinement import MERGE
 from app.scene.load import load_scene
 from app.scene.model import Scene
-from app.solvers.shooting.adaptive import MERGE
 
 pytestmark = pytest.mark.long
 
@@ -54,7 +54,7 @@ def test_furnace(planted: Callable[..., Solution]) -> None:
     has been shot by some walls only is uneven.)"""
     scene = load_scene("furnace")
     box = planted(scene, density=16.0, residual=2e-3, gradient=0.8, depth=0)
-    leaves = set(box.solver.tree.slots)  # type: ignore[attr-defined]
+    leaves = set(box.lightmap.refinement.tree.slots)  # type: ignore[attr-defined]
     box.settle(FEW_STEPS)
     box.refine(depth=2)
     for _ in range(12):  # until the leaves have been judged
@@ -65,16 +65,16 @@ def test_furnace(planted: Callable[..., Solution]) -> None:
     glow = np.pi * np.array(material.emission) / (1 - np.array(material.albedo))
     mean = (box.B * box.area[:, None]).sum(0) / box.area.sum()
     np.testing.assert_allclose(mean, glow, rtol=FORM_FACTORS + box.solver.options.residual)  # which is not shot
-    assert set(box.solver.tree.slots) == leaves  # type: ignore[attr-defined]
+    assert set(box.lightmap.refinement.tree.slots) == leaves  # type: ignore[attr-defined]
 
 
 def test_no_shadow_no_split(planted: Callable[..., Solution]) -> None:
     """A closed empty box has none."""
     walls = quads_scene(room(), [grey(0.5), grey(0.5, 3.0)], [0, 1, 0, 0, 0, 0])
     box = planted(walls, density=16.0, criterion="shadow", depth=3, residual=0.1)
-    leaves = set(box.solver.tree.slots)  # type: ignore[attr-defined]
+    leaves = set(box.lightmap.refinement.tree.slots)  # type: ignore[attr-defined]
     box.settle(FEW_STEPS)
-    assert set(box.solver.tree.slots) == leaves  # type: ignore[attr-defined]
+    assert set(box.lightmap.refinement.tree.slots) == leaves  # type: ignore[attr-defined]
 
 
 # -- the table's shadow ------------------------------------------------------------------------------------------------
@@ -128,13 +128,13 @@ def test_a_tree_grows_as_deep_late_as_early(planted: Callable[..., Solution]) ->
     late.settle()
     late.refine(depth=2)
     late.settle()
-    leaves = [set(one.solver.tree.slots) for one in (early, late)]  # type: ignore[attr-defined]
+    leaves = [set(one.lightmap.refinement.tree.slots) for one in (early, late)]  # type: ignore[attr-defined]
     # the first shots split what later light makes smooth beside its mean, and merging waits for an eighth of the threshold
     assert len(leaves[0]) > len(leaves[1]) > len(leaves[0]) / 2
     assert {level for level, _, _ in leaves[1]} == {level for level, _, _ in leaves[0]}
     late.refine(depth=2)
     late.settle()
-    assert set(late.solver.tree.slots) == leaves[1], "it was not done"  # type: ignore[attr-defined]
+    assert set(late.lightmap.refinement.tree.slots) == leaves[1], "it was not done"  # type: ignore[attr-defined]
 
 
 def test_a_restart_after_a_slider_was_moved_is_a_restart(planted: Callable[..., Solution]) -> None:
@@ -147,14 +147,14 @@ def test_a_restart_after_a_slider_was_moved_is_a_restart(planted: Callable[..., 
         box.solver.reset,
     ):
         box.refine(depth=box.lightmap.options.depth + 1)
-        while box.solver._redo_under_way is None:  # type: ignore[attr-defined]
+        while box.solver.batch.replay.under_way is None:  # type: ignore[attr-defined]
             box.step(8)
             box.solver.poll()
         disturb()
-        assert box.solver._redo_under_way is None  # type: ignore[attr-defined]
+        assert box.solver.batch.replay.under_way is None  # type: ignore[attr-defined]
         box.settle()
         assert abs(box.book.imbalance_share) < CONTACTS
-    assert not box.solver._all_again  # type: ignore[attr-defined]
+    assert not box.solver.batch.replay.all_again  # type: ignore[attr-defined]
 
 
 def test_leaves_follow_threshold_depth_and_budget(planted: Callable[..., Solution]) -> None:
@@ -168,7 +168,7 @@ def test_leaves_follow_threshold_depth_and_budget(planted: Callable[..., Solutio
             box.solver.poll()
         box.settle()
         assert np.isfinite(box.H).all() and abs(box.book.imbalance_share) < CONTACTS
-        return len(box.solver.tree)  # type: ignore[attr-defined]
+        return len(box.lightmap.refinement.tree)  # type: ignore[attr-defined]
 
     few = settled()
     stay = settled(gradient=5.0 * MERGE)  # leaves that do not merge where the threshold is 5

@@ -11,9 +11,8 @@ from solver_scenes import Solution, begin, grey, quads_scene, room
 from app.gpu import Gpu
 from app.scene.load import load_scene
 from app.scene.model import Scene
-from app.solvers.shooting.shot import Shot
-from app.solvers.shooting.stages import EMITTER
-from app.solvers.shooting.uniform import MOST
+from app.solvers.shooting.emitter_groups import MOST
+from app.solvers.shooting.records import EMITTER, Shot
 
 EXACT = 1e-5  # sums of 32-bit floats
 
@@ -66,7 +65,7 @@ def test_light_that_will_come_back_is_shot_ahead(gpu: Gpu) -> None:
             box.step(8)
             box.solver.poll()
             if box is without:
-                box.solver.buffers.ambient_target.clear()
+                box.solver.batch.ambient.overshoot_target.clear()
             elif box.solver.issued % 64 == 0:
                 lowest = min(lowest, flux_of(box).min())
         box.solver.poll(wait=True)
@@ -96,7 +95,7 @@ def test_a_lamp_is_divided_and_fills_a_batch(gpu: Gpu) -> None:
 
 def test_what_is_partly_covered_shoots_from_its_finest_patches(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     """Large patches elsewhere: the blocks, which reach a little below the floor, stand on none."""
-    monkeypatch.setattr("app.solvers.shooting.stages.FIRST_PATCHES", 50)
+    monkeypatch.setattr("app.solvers.shooting.coarse_to_fine.FIRST_PATCHES", 50)
     scene = load_scene("cornell-box")
     block = ["block" in scene.objects[k] for k in scene.object_ids]
     sunk = scene.positions.copy()
@@ -121,19 +120,19 @@ def test_what_is_partly_covered_shoots_from_its_finest_patches(gpu: Gpu, monkeyp
 def test_a_patch_shoots_for_its_family_and_is_paid_back_evenly(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     """The room is lit long before all of the lamp has shot. When the others of each family shoot, and what was shot for them is
     taken back, in the same batch, the light stays as it is; in the end it is that of patches which shot for themselves only."""
-    monkeypatch.setattr("app.solvers.shooting.stages.FIRST_PATCHES", 100)
+    monkeypatch.setattr("app.solvers.shooting.coarse_to_fine.FIRST_PATCHES", 100)
     scene, options = load_scene("cornell-box"), {"texels": 8000, "residual": 2e-3, "resolution": 128}
     alone = begin(gpu, scene, coarsen=False, **options)
     alone.settle()
     box = begin(gpu, scene, **options)
-    patches = np.count_nonzero(box.solver.buffers.finer_levels)
+    patches = np.count_nonzero(box.solver.batch.marks.levels)
     received, owed = [], 0.0
     while not box.solver.poll().converged:
         box.step(8)
         box.solver.poll(wait=True)
-        received.append((box.solver._phase, np.average(box.H.mean(1), weights=box.area)))
+        received.append((box.solver.batch.phases.index, np.average(box.H.mean(1), weights=box.area)))
         if (
-            box.solver._phase == 0
+            box.solver.batch.phases.index == 0
             and not owed
             and received[-1][1] > 0.5 * np.average(alone.H.mean(1), weights=alone.area)
         ):
@@ -156,7 +155,7 @@ def test_a_patch_shoots_for_its_family_and_is_paid_back_evenly(gpu: Gpu, monkeyp
 def test_where_texels_hold_much_of_the_light_none_shoots_for_others(gpu: Gpu, texels: int, shares: bool) -> None:
     """It would be most of the lamp."""
     box = begin(gpu, load_scene("cornell-box"), texels=texels, level=2)
-    marks = box.solver.buffers.finer_levels
+    marks = box.solver.batch.marks.levels
     power = box.lightmap.emission().sum(-1) * box.lightmap.pool.surfaces.area
     assert (power.max() <= MOST * power.sum()) == shares
     assert marks.any() and (marks.max() >= EMITTER) == shares

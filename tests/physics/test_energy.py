@@ -26,7 +26,7 @@ from app.scene.load import load_scene
 from app.scene.model import Scene
 from app.scene.shapes import icosphere
 from app.solvers.shooting.options import FORM_FACTORS, VISIBILITIES
-from app.solvers.shooting.stages import BATCH
+from app.solvers.shooting.records import BATCH
 
 # The stereographic map draws edges straight, see app/visibility/occluders.py. Where the foot of a wall lies on the horizon, each
 # piece l of it at a distance d leaves a sliver of the rim open, h = (l/d)²/8 high: a parabola, in which the cosine is the height
@@ -296,8 +296,8 @@ def test_small_charts_in_one_patch_are_not_taken_for_one_surface(gpu: Gpu, adapt
     scene = quads_scene([*room(), *dark], [grey(0.3), grey(0.3, 1.0)], [0, 1] + [0] * 10)
     H = []
     for only in (scene, quads_scene(room(), scene.materials, [0, 1, 0, 0, 0, 0])):
-        lit = begin(gpu, only, density=4, level=level, adaptive=adaptive, residual=1e-4)
-        lit.solver._audits = False  # which strong shots only get
+        # audits are for strong shots only
+        lit = begin(gpu, only, density=4, level=level, adaptive=adaptive, residual=1e-4, audits=False)
         lit.settle()
         H.append(lit.means(lit.H)[:, 0])
         assert abs(shares(lit)["imbalance"]) < 1e-3
@@ -332,10 +332,9 @@ def test_a_lamp_in_a_shaft_shoots_from_finer_patches(gpu: Gpu, adaptive: bool) -
 
 def audited(gpu: Gpu, scene: Scene, adaptive: bool, *, audits: bool) -> float:
     """The imbalance of a solve."""
-    lit = begin(gpu, scene, density=8, residual=0.05, level=3, adaptive=adaptive)
-    lit.solver._audits = audits
+    lit = begin(gpu, scene, density=8, residual=0.05, level=3, adaptive=adaptive, audits=audits)
     lit.settle()
-    finer, shot = lit.solver.buffers.finer_levels.max(), lit.solver.last_shot
+    finer, shot = lit.solver.batch.marks.levels.max(), lit.solver.last_shot
     assert lit.solver.poll().converged and shot.size == lit.solver.patch_edge(
         shot.corner
     )  # host and shaders agree on what shoots
@@ -352,17 +351,17 @@ def test_patches_that_were_split_are_not_lost_at_another_level(gpu: Gpu, adaptiv
 
     def in_patches() -> float:
         lit.solver.settle()
-        runs = np.frombuffer(lit.solver.buffers.runs.read(), np.float32).reshape(-1, 4)
-        return float(runs[:, 3].sum(dtype=np.float64)) * lit.solver._watt
+        bins = np.frombuffer(lit.solver.batch.bins.strongest.read(), np.float32).reshape(-1, 4)
+        return float(bins[:, 3].sum(dtype=np.float64)) * lit.solver.batch.ledger.watt
 
     lit = begin(gpu, coffered_room(), density=8, adaptive=adaptive, level=2)
     lit.light_up()
     whole = lit.book.unshot.sum()
     assert in_patches() == pytest.approx(whole, rel=1e-4)
     split = [(x, y, lit.solver.patch_edge((x, y)), 1) for x, y in lit.patches()[::7].tolist()]
-    lit.solver.buffers.shoot_finer(split)
+    lit.solver.batch.marks.divide_patches(split)
     assert in_patches() == pytest.approx(whole, rel=1e-4)
     lit.solver.set_options(lit.solver.options.replace(level=4))
-    lit.solver.buffers.shoot_finer(split)
+    lit.solver.batch.marks.divide_patches(split)
     assert in_patches() == pytest.approx(whole, rel=1e-4)
     lit.release()

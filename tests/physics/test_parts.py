@@ -40,7 +40,7 @@ def test_so_do_the_parts_of_a_growing_tree(gpu: Gpu) -> None:
         whole.step(1)
         parts = 1 + sum(1 for _ in cut.solver.work(1, 3))
         most = max(most, parts)
-        redone += cut.solver._redo_under_way is not None  # type: ignore[attr-defined]
+        redone += cut.solver.batch.replay.under_way is not None  # type: ignore[attr-defined]
         whole.solver.poll(wait=True)
         cut.solver.poll(wait=True)
     assert redone > 3 and whole.lightmap.tiles > 20, "nothing grew"
@@ -58,8 +58,10 @@ def test_what_needs_whole_shots_finishes_them(gpu: Gpu) -> None:
     work = room.solver.work(1, 8)
     for _ in range(3):
         next(work)
-    off = abs(room.solver._tile_sums()[0].sum() + room.solver._tile_sums()[1].sum() - room.solver._emitted.sum())
-    assert off > 0.01 * room.solver._emitted.sum(), "nothing was under way"
+    ledger = room.solver.batch.ledger
+    absorbed, unshot, _ = ledger.tile_sums()
+    off = abs(absorbed.sum() + unshot.sum() - ledger.emitted.sum())
+    assert off > 0.01 * ledger.emitted.sum(), "nothing was under way"
     book = room.book
     assert abs(book.imbalance_share) < 5e-3  # form factors
     assert room.solver.issued == 1

@@ -29,7 +29,7 @@ def test_cornell_box_audits(gpu: Gpu, projection: str) -> None:
 
 @EVERY_PROJECTION
 def test_a_lone_emitter_sends_everything_away(gpu: Gpu, projection: str) -> None:
-    """Σ of the weights that open.frag.glsl uses: 1 within 1e-3, at the coarsest map as well."""
+    """Σ of the weights that escaped.frag.glsl uses: 1 within 1e-3, at the coarsest map as well."""
     for resolution in (64, 256):
         lamp = begin(
             gpu, quads_scene([UNIT_SQUARE], [grey(0.5, 1.0)]), texels=256, projection=projection, resolution=resolution

@@ -65,5 +65,5 @@ def shuffle(tree: Quadtree, rng: np.random.Generator, rounds: int = 6) -> None:
         used = np.flatnonzero(tree.pool.used)
         if k % 3 < 2:
             grow(tree, used[rng.random(len(used)) < rng.uniform(0.1, 0.3)].tolist())
-        elif families := [family for family in tree.merges(used) if rng.random() < 0.5]:
-            tree.merge(families)
+        elif siblings := [family for family in tree.merges(used) if rng.random() < 0.5]:
+            tree.merge(siblings)

@@ -45,15 +45,15 @@ def test_bytes_of_a_texel_follow_from_its_formats(gpu: Gpu, storage: str, light:
     held = LightmapOptions(storage=storage)
     with opened(gpu, "textured-room", AtlasOptions(texels=600), held, ShootingOptions()) as (lightmap, _):
         albedo = 4 * np.dtype(lightmap.pool.arrays["t_albedo"].dtype).itemsize
-        assert texel_bytes(lightmap, flat=True) == light + albedo
-        assert texel_bytes(lightmap, flat=False) == light + albedo + 16 + 8
+        assert texel_bytes(lightmap, planar=True) == light + albedo
+        assert texel_bytes(lightmap, planar=False) == light + albedo + 16 + 8
 
 
 @pytest.mark.parametrize("visibility", ["item-id", "combined"])
 def test_the_traffic_draws_the_texels_of_the_receiver_pass_and_changes_no_light(gpu: Gpu, visibility: str) -> None:
     options = ShootingOptions(visibility=visibility)
     with opened(gpu, "cornell-box", AtlasOptions(texels=8_000), LightmapOptions(), options) as (lightmap, solver):
-        assert isinstance(solver, Shooting) and set(lightmap.receivers) == {True, False}
+        assert isinstance(solver, Shooting) and set(solver.batch.receivers.meshes) == {True, False}
         solver.reset()
         run_to_end(solver.work(BATCH))
         traffic, steps = ReceiverTraffic(gpu, solver), solver.passes(BATCH)
@@ -69,7 +69,7 @@ def test_the_traffic_draws_the_texels_of_the_receiver_pass_and_changes_no_light(
         moved = traffic.moved()
         maps = moved["see"] / 2 * (1 if visibility == "item-id" else 2)
         received = (moved["receive"] - maps) * BATCH
-        least, most = (query.samples * texel_bytes(lightmap, flat=flat) for flat in (True, False))
+        least, most = (query.samples * texel_bytes(lightmap, planar=planar) for planar in (True, False))
         assert 0 < least < received < most
 
 

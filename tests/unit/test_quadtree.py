@@ -199,15 +199,14 @@ def test_enlarging_keeps_everything() -> None:
     slots, tiles, columns, room = dict(tree.slots), pool.tiles, pool.columns, tree.room
     arrays = pool.tile_arrays(np.arange(tiles))
     pages = pool.slot_tables["t_pages"]
-    receivers = [a.copy() for a in (pool.flat_spans, pool.shaped_tiles)]
+    shapes = pool.shapes.copy()
     tree.resize(tiles + 100)
     assert (pool.tiles, pool.columns, tree.room, tree.slots) == (tiles + 100, columns, room + 100, slots)
     assert pool.size == (columns * pool.tile, -(-pool.tiles // columns) * pool.tile)
     for name, array in pool.tile_arrays(np.arange(tiles)).items():
         np.testing.assert_array_equal(array, arrays[name])
     np.testing.assert_array_equal(pool.slot_tables["t_pages"], pages)
-    for now, before in zip((pool.flat_spans, pool.shaped_tiles), receivers, strict=True):
-        np.testing.assert_array_equal(now, before)
+    np.testing.assert_array_equal(pool.shapes[:tiles], shapes)
     splits = tree.splits(np.flatnonzero(pool.used).tolist(), DEPTH)
     assert tree.split(splits).children.max() < pool.tiles
 

@@ -10,7 +10,7 @@ move (receiver_traffic.py) against a plain copy, and the receiver pass without i
 from __future__ import annotations
 
 import argparse
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from app.atlas.options import AtlasOptions
@@ -23,7 +23,6 @@ from app.lightmap.options import LightmapOptions
 from app.options import from_flags
 from app.session.loading import load
 from app.solvers import ShootingOptions
-from app.solvers.shooting.shot import AuditTargets
 from app.solvers.shooting.solver import Shooting
 from app.util.console import Console
 from app.util.tables import Column, Row, markdown, markdown_table
@@ -65,20 +64,6 @@ BOUNDS_NOTE = (
 )
 
 
-class Unaudited(Shooting):
-    """As later in a solve, when shots are no longer strong enough to be tried before they are made."""
-
-    def _fails(self, shots: int) -> Generator[None, None, bool]:
-        yield from ()
-        return False
-
-
-def try_one(shots: Unaudited) -> None:
-    """An audit of the first of the batch."""
-    with AuditTargets(shots.gpu, shots.lightmap) as targets:
-        shots._hand_out(targets, 0, 1.0)
-
-
 def bench_shots(flags: argparse.Namespace) -> int:
     """Print the table."""
     console = Console(quiet=flags.json)
@@ -100,14 +85,14 @@ def bench_shots(flags: argparse.Namespace) -> int:
 def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions, light: LightmapOptions) -> dict[str, Any]:
     pool = load(name, AtlasOptions(texels=texels)).pool
     lightmap = Lightmap(gpu, pool, light)
-    solver = Unaudited(gpu, lightmap, options)
-    ms_per_shot(gpu, solver, 1, WARM_UP)
-    single_ms = ms_per_shot(gpu, solver, 1, SECONDS)
-    ms_per_shot(gpu, solver, BATCH, WARM_UP)
-    shot_ms = ms_per_shot(gpu, solver, BATCH, SECONDS)
-    traffic, copy = ReceiverTraffic(gpu, solver), MemoryCopy(gpu, lightmap.size)
-    beside = {"stream": traffic.run, "copy": copy.run, "audit": lambda: try_one(solver)}
-    times = passes_ms(gpu, solver, SECONDS, beside)
+    shooting = Shooting(gpu, lightmap, options, audits=False)  # as later in a solve, when no shot is strong
+    ms_per_shot(gpu, shooting, 1, WARM_UP)
+    single_ms = ms_per_shot(gpu, shooting, 1, SECONDS)
+    ms_per_shot(gpu, shooting, BATCH, WARM_UP)
+    shot_ms = ms_per_shot(gpu, shooting, BATCH, SECONDS)
+    traffic, copy = ReceiverTraffic(gpu, shooting), MemoryCopy(gpu, lightmap.size)
+    beside = {"stream": traffic.run, "copy": copy.run, "audit": shooting.try_one}
+    times = passes_ms(gpu, shooting, SECONDS, beside)
     stream_ms, copy_ms, audit_ms = (times.pop(name) for name in beside)
     row = {
         "scene": name,
@@ -120,7 +105,7 @@ def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions, light: 
     }
     row |= bounds(times, traffic.moved(), stream_ms, copy.moved / (BATCH * copy_ms * 1e-3))
     copy.release()
-    solver.release()
+    shooting.release()
     lightmap.release()
     return row
 

@@ -1,6 +1,6 @@
 // The receiver pass without its arithmetic: for the same texels and shots, all that shooting/receive.frag.glsl reads is read, and
 // added so faintly that the light stays what it is. What this takes is what memory takes of that pass.
-#define FLAT 1
+#define PLANAR 1
 #define VISIBILITY 2
 #include "common/atlas.glsl"
 #include "common/albedo.glsl"
@@ -14,7 +14,7 @@ uniform sampler2D t_depth;
 #endif
 
 flat in uint v_shots;
-#if FLAT
+#if PLANAR
 in vec3 v_position;
 flat in vec3 v_albedo;
 #else
@@ -28,7 +28,7 @@ layout(location = 1) out vec4 out_residual;
 
 void main() {
     ivec2 texel_px = ivec2(gl_FragCoord.xy);
-#if FLAT
+#if PLANAR
     vec4 read = vec4(v_position, 0.0);
     vec3 albedo = v_albedo * albedo_texture(texel_px);
 #else

@@ -1,6 +1,7 @@
-// What the rest of the solve will add to a texel: about the ambient irradiance of all light that is unshot [Cohen88, section 5], but
-// no more than it has got until now, or light that other rooms keep for themselves would be there; and when less is to come than
-// has arrived, no more than a few times its share of that. Less light than was shot has a negative residual, and ambient.
+// The ambient light that the rest of a solve will add to a texel: about the ambient irradiance of all light that is unshot
+// [Cohen88, section 5]. It is clamped to the irradiance that the texel has received, so that unlit rooms are not lit by what
+// other rooms have yet to shoot; and when less is to come than has arrived, to a few times that share of it. Where less light is
+// to be there than was shot, residual and ambient are negative.
 uniform sampler2D t_ambient;  // irradiance, stored units, and that over what has arrived on average: see ambient.frag.glsl
 
 const float SHARES = 4.0;  // fewer leave rooms without lamps dark that get all of their light late, more light dark corners

@@ -1,4 +1,4 @@
-// Reading the lightmap: texels, tiles, tables. See app/atlas/lightmap.py for what the textures hold.
+// Reading the lightmap: texels, tiles, tables. See app/lightmap/textures.py for what the textures hold.
 #define MATERIAL_BITS 1
 
 const float PI = 3.14159265358979323846;

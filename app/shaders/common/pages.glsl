@@ -1,5 +1,5 @@
-// From the virtual atlas to the tile pool: the page table holds the slot (from 1, 0 = none) of each cell of TILE×TILE texels of the finest
-// level, t_leaves what each slot holds. [Coombe03, 4.2]
+// From the virtual atlas to the tile pool: the page table holds the slot (from 1, 0 = none) of each cell of TILE×TILE texels of
+// the finest level, t_leaves what each slot holds. [Coombe03, 4.2]
 #include "common/leaves.glsl"
 uniform usampler2D t_pages;
 uniform vec2 u_pages;  // columns of the tile pool, cells per texel of level 0

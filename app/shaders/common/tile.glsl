@@ -1,1 +1,1 @@
-#define TILE 16  // texels along the edge of a leaf tile
+#define TILE  // texels along the edge of a leaf tile

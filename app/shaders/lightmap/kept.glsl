@@ -1,5 +1,6 @@
-// What texels keep when others take their light over. They have shot R = E + ρH - r, and keep that; what 8 bits hold cannot be
-// negative, as r then may become, and r itself is kept. In a, the power that they were sent, see receive.frag.glsl.
+// What stays as it is when leaves split and merge: the exitance that a texel has shot already, S = E + ρH - r. Its new leaves
+// keep S, so that r = E + ρH - S. What 8 bits hold cannot be negative, as r then may become: there r itself is kept. In a, the
+// power that a texel would have got without occluders, see app/lightmap/textures.py.
 #include "common/albedo.glsl"
 #include "common/exitance.glsl"
 

@@ -1,4 +1,4 @@
-// Copies tiles aside, before others take their light over: H, what each texel keeps, and its area.
+// Tiles are copied aside before others take their light over: H, what each texel has shot, and its area.
 #include "common/atlas.glsl"
 #include "lightmap/kept.glsl"
 

@@ -1,4 +1,5 @@
-// Irradiance at points of the atlas, with what is still to come, one per pixel, bilinear. Texels that cover nothing repeat their nearest neighbour, as in a bake.
+// Irradiance at points of the atlas, with what is still to come, one per pixel, bilinear. Texels that cover nothing repeat their
+// nearest neighbour, as in a bake.
 #include "common/ambient.glsl"
 #include "common/texel_at.glsl"
 uniform sampler2D t_points;  // uv [texels of level 0]

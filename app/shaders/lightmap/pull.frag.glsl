@@ -1,4 +1,5 @@
-// The light of children onto the leaf that replaces them: means over area of H and of what they keep, which keep all energy.
+// The light of children is pulled up to the leaf that replaces them: means over area of H and of what they keep, which keep all
+// energy.
 #include "common/atlas.glsl"
 #include "lightmap/kept.glsl"
 

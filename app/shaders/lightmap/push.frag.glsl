@@ -1,6 +1,7 @@
-// The light of a leaf onto its children [Coombe03, 4.2]. H is interpolated, then brought back to the mean of the texel that four of
-// them replace; their areas sum to its area, so that pushing keeps all energy. What a texel has shot, R, it has shot all over: its
-// children keep that and r = E + ρH - R, or a patch that has shot would shoot again what its neighbours have not.
+// The light of a leaf is pushed down to its children [Coombe03, 4.2]. H is interpolated, then brought back to the mean of the
+// texel that four of them replace; their areas sum to its area, so that pushing keeps all energy. What a texel has shot, R, it
+// has shot all over: its children keep that and r = E + ρH - R, or a patch that has shot would shoot again what its neighbours
+// have not.
 #include "common/atlas.glsl"
 #include "common/tile.glsl"
 #include "lightmap/kept.glsl"

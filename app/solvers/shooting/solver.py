@@ -1,12 +1,325 @@
-"""Progressive refinement radiosity, on uniform texels and on quadtrees."""
+"""Shooting is progressive refinement radiosity [Cohen88; Coombe03, 3], on uniform texels and on quadtrees.
+
+A piece of work is one batch of shots (batch.py), or on quadtrees another step of what their leaves ask for. The host learns a few
+batches late how much is unshot.
+"""
 
 from __future__ import annotations
 
-from app.solvers.shooting.adaptive import AdaptiveShooting
+import inspect
+from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.gpu import Framebuffer, Gpu, Texture
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.quadtree import Change
+from app.lightmap.tile_pool import Moves
+from app.scene.model import Material
+from app.solvers.base import EnergyBalance, Inspection, Progress
+from app.solvers.shooting.audit import Audit
+from app.solvers.shooting.batch import Batch
+from app.solvers.shooting.choose import Choice
+from app.solvers.shooting.material_edits import MaterialEdits, common_factor, needs_restart
+from app.solvers.shooting.options import ShootingOptions
+from app.solvers.shooting.records import BATCH, Shot, powers_of, shot_of, sizes_of
+from app.solvers.shooting.reports import Reports
+from app.util.parts import run_to_end
+from app.visibility.item_image import ItemImage
+
+LOOK_AFTER = 32  # shots, or a quarter of all, between two looks at leaves that did not change at the last
+CHANGES_PER_SHOT = 8  # leaves that split or merge, for each shot of a piece of work: bounded work for a frame
 
 
-class Shooting(AdaptiveShooting):
-    """Shoots a lightmap to convergence; where that refines itself, leaves follow the light. Whoever makes it releases it."""
+class Shooting:
+    """Shoots a lightmap until it has converged; where that refines itself, its leaves follow the light. Whoever makes it releases
+    it.
+
+    issued: shots given to the GPU. last_shot: the last that was reported. batch: the parts that make shots.
+    """
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool = True) -> None:
+        """audits: whether strong shots are tried before they are made."""
+        self.gpu, self.lightmap, self.options = gpu, lightmap, options
+        self.batch = Batch(gpu, lightmap, options, audits=audits)
+        if lightmap.refinement is not None:
+            lightmap.refinement.follower = self
+        self._reports, self._edits, self._picture = Reports(gpu), MaterialEdits(gpu, lightmap), ItemImage(gpu)
+        self._under_way: Generator[None, None, int] | None = None
+        self._progress = Progress(0, 1.0, np.zeros(3))  # but for what follows from now
+        self._look_at = 0  # shots in the log at which leaves are looked at again
+        self.issued = 0
+        self.last_shot: Shot | None = None
+        self.reset()
+
+    # -- work ----------------------------------------------------------------------------------------------------------
+
+    def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
+        """Up to ``amount`` shots (at most BATCH), the strongest patches first, in parts. Returns how many were issued: of a
+        batch, those too weak beside its best are left for later, and not counted once ``poll`` has the report of it."""
+        self._finish()
+        shots = min(amount, BATCH)
+        self._under_way = self._shoot(shots, bands) if self.batch.replay is None else self._follow_leaves(shots, bands)
+        return self._under_way
+
+    def _shoot(self, shots: int, bands: int) -> Generator[None, None, int]:
+        """A batch, and the report of it."""
+        choice = self.batch.phases.now
+        made = yield from self.batch.shoot(choice, shots, bands)
+        self.issued += made
+        self._reports.send(choice, self.batch.bins, self.batch.ledger, self.batch.shooters)
+        return made
+
+    def _follow_leaves(self, shots: int, bands: int) -> Generator[None, None, int]:
+        """On quadtrees: first what there is to do for fresh leaves, a batch of earlier shots at a time, then shots while light is
+        left; not until the leaves have followed options that were changed. Then, now and then, a look at the leaves."""
+        refinement, replay = self.lightmap.refinement, self.batch.replay
+        assert refinement is not None and replay is not None
+        made, done = 0, bool(replay.log.count) and self._all_shot
+        if replay.under_way is not None:
+            made = yield from replay.work(self.batch.see, self.batch.receive, bands)
+            if replay.under_way is None:
+                self._corrected()
+        elif replay.fresh and (refinement.stable if done or replay.all_again else replay.is_cheap):
+            replay.start()
+        elif not done and (refinement.stable or not replay.all_again):
+            made = yield from self._shoot(shots, bands)
+        clock = replay.log.count
+        if replay.under_way is None and (not refinement.stable or done or clock >= self._look_at):
+            yield
+            yield from refinement.look(CHANGES_PER_SHOT * shots, bands, clock)
+            if not refinement.waiting:
+                self._look_at = clock + max(LOOK_AFTER, clock // 4)
+        replay.all_again &= self._refining
+        return made or shots
+
+    def _corrected(self) -> None:
+        """Fresh leaves have got their light: less or more is unshot now, and what was judged is gone."""
+        assert self.lightmap.refinement is not None
+        self.poll(wait=True)  # or an older report would follow
+        self._progress = replace(self._progress, remaining=self._unshot_share())
+        self.batch.phases.even = False
+        self.lightmap.refinement.drop_judgement()
+        self.lightmap.refinement.stable = False
+
+    def _finish(self) -> None:
+        """End the work that is under way, if any; of its own parts this asks nothing."""
+        if self._under_way is not None and inspect.getgeneratorstate(self._under_way) != inspect.GEN_RUNNING:
+            for _ in self._under_way:
+                pass
+            self._under_way = None
+
+    # -- how far it is -------------------------------------------------------------------------------------------------
+
+    def poll(self, *, wait: bool = False) -> Progress:
+        """The newest progress that has arrived: the state before the work that sent it; with ``wait`` that of the last."""
+        if wait:
+            self._finish()
+        for choice, report, shooter in self._reports.arrived(wait=wait):
+            self._follow_report(choice, report, shooter)
+        if self._reports.all_arrived:
+            self.issued = self._progress.done
+        refinement = self.lightmap.refinement
+        refining, note = (False, None) if refinement is None else (self._refining, refinement.note)
+        converged = bool(self._all_shot) and not refining
+        return replace(self._progress, converged=converged, refining=refining, note=note)
+
+    def _follow_report(self, choice: Choice, report: np.void, shooter: np.void) -> None:
+        """Take in the REPORT of a batch of this choice, and its first SHOOTER."""
+        unshot, options = self._share(float(report["unshot"])), self.options
+        if choice is self.batch.phases.now:
+            if choice.settles:
+                finer = float(report["strongest"]) <= self.batch.groups.settled
+            else:
+                finer = self.batch.phases.follow(unshot, self._share(float(report["to_shoot"])), options.residual)
+            if finer:
+                self.batch.shoot_finer()
+        escaped = report["escaped"].astype(np.float64) * self.batch.ledger.watt
+        self._progress = Progress(int(report["shots"]), unshot, escaped)
+        if sizes_of(shooter):
+            self.last_shot = shot_of(self.lightmap, shooter)
+        if self.batch.replay is not None and choice is self.batch.phases.now:
+            self.batch.replay.follow_power(self._share(float(powers_of(shooter))), unshot)
+
+    def _share(self, power: float) -> float:
+        """Power [stored units · solver area] as a share of what is emitted; 0 where nothing is."""
+        emitted = float(self.batch.ledger.emitted.sum())
+        return power * self.batch.ledger.watt / emitted if emitted > 0 else 0.0
+
+    def _unshot_share(self) -> float:
+        """The residual now, Σ |Σ r A| over tiles, as a share of the emitted power. Waits for the GPU."""
+        self._finish()
+        return self._share(self.batch.unshot())
+
+    @property
+    def _all_shot(self) -> bool:
+        """Whether the finest patches have shot, and no more is unshot than asked for."""
+        return self.batch.phases.even and self._progress.remaining <= self.options.residual
+
+    @property
+    def _refining(self) -> bool:
+        """Whether leaves come or go, or do not yet hold what the shots gave them. When all is shot they are looked at once
+        more."""
+        refinement, replay = self.lightmap.refinement, self.batch.replay
+        assert refinement is not None and replay is not None
+        judged = refinement.stable and not (self._all_shot and refinement.looked_at < replay.log.count)
+        return not judged or bool(replay.fresh) or replay.under_way is not None
+
+    def settle(self) -> Progress:
+        """End the work under way, and measure what is unshot."""
+        self.poll(wait=True)
+        self._progress = replace(self._progress, remaining=self._unshot_share())
+        return self.poll()
+
+    def energy(self) -> EnergyBalance:
+        """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
+        self._finish()
+        return self.batch.ledger.balance()
+
+    # -- beginning, and other options ----------------------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Forget all light: H = 0, r = E. The leaves stay."""
+        if self._under_way is not None:
+            self._under_way.close()
+            self._under_way = None
+        if self.lightmap.refinement is not None:
+            self.lightmap.refinement.begin_again()
+        self._look_at = 0
+        self._reports.drop()
+        self.lightmap.clear()
+        self.batch.begin()
+        self.issued, self.last_shot = 0, None
+        self._progress = Progress(0, 1.0 if self.batch.ledger.emitted.sum() > 0 else 0.0, np.zeros(3))
+
+    def set_options(self, options: ShootingOptions) -> None:
+        """Use other knobs from the next shot on."""
+        if self.lightmap.refinement is not None:
+            self.lightmap.refinement.stable = False
+            if options == self.options:
+                return
+        self._finish()
+        if self.batch.replay is not None:
+            self.batch.replay.stop()
+        self.options = options
+        self.batch.set_options(options)
+        self.batch.ambient.hide()
+        if self.issued:
+            self.batch.unshot()
+            self.batch.ambient.update(self.batch.bins, shown=options.ambient)
+
+    def set_materials(self, materials: tuple[Material, ...]) -> None:
+        """Other albedos and emissions: the light that is there stays, and the difference is shot, negative too [Chen90]. Begins
+        again where nothing is left to emit, and where the storage holds no negative light."""
+        self._finish()
+        batch = self.batch
+        if needs_restart(self.lightmap, materials) or batch.ledger.emitted.sum() <= 0:
+            self.lightmap.set_materials(materials)
+            self.reset()
+            return
+        self.poll(wait=True)
+        if self.lightmap.refinement is not None:
+            self.lightmap.refinement.begin_again()
+            self._look_at = 0
+        factor, before = common_factor(self.lightmap, materials), self.lightmap.scene.materials
+        batch.scale(self._edits, factor)
+        self._edits.enter(materials, factor)
+        batch.weigh(at_least=batch.groups.settled * float(factor.max()))
+        if not np.allclose([m.emission for m in materials], [m.emission * factor for m in before]):
+            batch.groups.divide(batch.phases)
+        self._progress = replace(self._progress, remaining=self._unshot_share())
+        batch.ambient.update(batch.bins, shown=self.options.ambient)
+
+    # -- leaves that come and go, see app/lightmap/refinement.py -------------------------------------------------------
+
+    @property
+    def carried(self) -> list[tuple[Texture, Framebuffer]]:
+        return [] if self.batch.replay is None else self.batch.replay.carried
+
+    def options_changed(self) -> None:
+        if self.batch.replay is not None:
+            self.batch.replay.all_again = bool(self.batch.replay.log.count)
+
+    def leaves_changed(self, change: Change) -> None:
+        self.batch.leaves_changed(change)
+
+    def slots_will_move(self) -> None:
+        self.poll(wait=True)
+
+    def resized(self, moves: Moves) -> None:
+        self.batch.resized(moves)
+
+    # -- what there is to see ------------------------------------------------------------------------------------------
+
+    @property
+    def resolved(self) -> Mapping[str, Any]:
+        """The level that shoots in the end, and the edge of a full face of the visibility map [px]."""
+        return {"level": self.batch.phases.finest.level, "resolution": self.batch.see.resolution}
+
+    def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
+        """What ``last_shot`` saw, its patch, and the patch of a texel."""
+        shot, facts, pictures, of_texel = self.last_shot, {"Projection": self.options.projection}, {}, {}
+        if images:
+            seen = self.sight()
+            pictures["What the last shooter saw"] = self._picture.draw(
+                seen["items"], seen["depth"], self.batch.see.map_size
+            )
+            if count := self.vanished():
+                facts["Smaller than a sample"] = f"{count:,} triangles"
+        if texel is not None:
+            edge = self.patch_edge(texel)
+            of_texel["Patch"] = f"{texel[0] // edge}, {texel[1] // edge} of {edge}×{edge} texels"
+        rectangles = {} if shot is None else {"last shooter": shot.rect}
+        return Inspection(pictures, rectangles, facts, of_texel)
+
+    def sight(self, shot: Shot | None = None) -> dict[str, Texture]:
+        """What ``last_shot`` or another one sees: ``items`` and ``depth``, nothing before the first."""
+        maps = self.batch.see.inspect(shot or self.last_shot)
+        return {"items": maps.items, "depth": maps.depth}
+
+    def vanished(self, shot: Shot | None = None) -> int:
+        """Triangles that ``last_shot`` or another one sees only because each is drawn as one sample at least. Waits for the
+        GPU."""
+        shot = shot or self.last_shot
+        return 0 if shot is None else self.batch.see.count_small(shot)
+
+    def patch_edge(self, texel: tuple[int, int]) -> int:
+        """Texels along the edge of the largest patch that a texel (column, row) of the tile pool may shoot from now."""
+        return self.batch.phases.patch_edge(texel, self.batch.marks)
+
+    def audit(self, corner: tuple[int, int]) -> Audit:
+        """What becomes of a shot from the patch with this lower corner [texels of the tile pool] if it shot now. Changes no
+        light. The patch must hold some residual."""
+        self._finish()
+        return self.batch.audit(corner)
+
+    def try_one(self) -> None:
+        """Audit the first shot of the batch that was chosen last, to be timed."""
+        self.batch.auditor.once(self.batch.see, self.batch.receive, 0, 1.0)
+
+    def passes(self, amount: int) -> dict[str, Callable[[], None]]:
+        """Each part of a batch by itself, to be timed. They leave the light wrong: reset afterwards."""
+        return self.batch.passes(amount)
+
+    def warm_up(self) -> Iterator[None]:
+        """Every pass, and how finer patches are chosen."""
+        for run in self.passes(1).values():
+            run()
+            self.gpu.ctx.finish()
+            yield
+        for choice in self.batch.phases.choices[1:]:
+            run_to_end(self.batch.choose_once(choice, 1))
+            self.gpu.ctx.finish()
+            yield
+
+    def release(self) -> None:
+        refinement = self.lightmap.refinement
+        if refinement is not None and refinement.follower is self:
+            refinement.follower = None
+        for part in (self._reports, self._picture, self.batch):
+            part.release()
 
 
 __all__ = ["Shooting"]

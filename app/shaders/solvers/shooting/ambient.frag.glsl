@@ -1,11 +1,13 @@
-// The irradiance that all unshot light will make on average, after all its reflections [Cohen88, eq. 9], in an open scene:
+// The ambient term is the irradiance that all unshot light will make on average, after all its reflections [Cohen88, eq. 9]; in
+// an open scene:
 //
 //   Φ f (1 + ρf + ρ²f² + …) / A = Φ f / (A (1 - ρf))
 //
 // Φ: unshot power; ρ: mean albedo; f: share of what was shot until now that stayed in the scene; A: area of all texels.
 #include "solvers/shooting/shooter.glsl"
+#include "solvers/shooting/ledger.glsl"
 
-uniform sampler2D t_unshot;  // of runs: Σ r A, and Σ |Σ r A| over tiles, summed over RGB, before the batch
+uniform sampler2D t_unshot;  // of bins: Σ r A, and Σ |Σ r A| over tiles, summed over RGB, before the batch
 uniform sampler2D t_ledger;
 uniform sampler2D t_shooters;
 uniform int u_shots;  // of a batch that has shot since
@@ -14,7 +16,7 @@ uniform float u_area;  // solver space
 
 layout(location = 0) out vec4 out_ambient;  // a: over what was received until now, on average
 
-const float LEAST_LOST = 0.01;  // at a bounce: with less, errors of form factors would be shot ahead, a thousandfold
+const float LEAST_LOST = 0.01;  // at a bounce: with less, errors of form factors would be overshot, a thousandfold
 const float CANCELS = 1e-6;  // under this share of Σ |Σ r A| over tiles, Σ r A is what rounding leaves
 
 void main() {
@@ -23,13 +25,14 @@ void main() {
     vec3 batch = vec3(0.0);
     for (int shot = 0; shot < u_shots; ++shot) {
         Shooter s = load_shooter(t_shooters, shot);
-        if (s.size_px > 0) batch += s.exitance * s.area;
+        if (size_px(s) > 0) batch += s.exitance * s.area;
     }
     vec3 unshot = mix(vec3(0.0), sum.rgb, greaterThan(abs(sum.rgb), vec3(CANCELS * sum.a)));
     vec3 shot = vec3(0.0), gone = vec3(0.0);
     for (int i = 0; i < textureSize(t_ledger, 0).x; ++i) {
-        gone += texelFetch(t_ledger, ivec2(i, 0), 0).rgb + texelFetch(t_ledger, ivec2(i, 1), 0).rgb;
-        shot += texelFetch(t_ledger, ivec2(i, 2), 0).rgb;
+        Ledger entry = load_ledger(t_ledger, i);
+        gone += entry.escaped + entry.blackened;
+        shot += entry.shot;
     }
     vec3 stays = clamp(1.0 - gone / max(shot, vec3(1e-30)), 0.0, 1.0);
     stays = mix(vec3(0.0), stays, greaterThan(shot, vec3(0.0)));

@@ -1,4 +1,4 @@
-// Power that a tile would receive from a batch, Σ A a: receive.frag.glsl leaves Σ r F V of all its shots in a.
+// The power that a tile would receive from a batch is Σ A a: receive.frag.glsl leaves Σ r F V of all its shots in a.
 #include "common/tile.glsl"
 
 uniform sampler2D t_position_area;

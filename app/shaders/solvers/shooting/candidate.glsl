@@ -1,8 +1,8 @@
-// A patch that may shoot: (power, x, 8 y + level, power of all that it stands for), with x, y its lower corner [texels]. What is
-// part of a larger one has a negative a instead, and its flux in rgb.
+// A candidate is a patch that may shoot: (power, x, LEVELS y + level, power of all candidates that it is the strongest of), with
+// x, y its lower corner [texels]. A block that is part of a larger patch has a negative a instead, and its flux in rgb.
 #include "solvers/shooting/block.glsl"
 
-#define LEVELS 8
+#define LEVELS  // of patches, at most
 const vec2 UNLIT_YET = vec2(3e38, 0.0);  // least and greatest irradiance of no texel
 const float COVERED = 0.05;  // a texel that has so little of the irradiance of its patch's brightest lies under something
 

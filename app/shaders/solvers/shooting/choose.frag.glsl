@@ -1,44 +1,44 @@
-// The shooters of a batch: row k describes the k-th strongest of the runs' strongest patches. [Coombe03, 3.4]
+// The shooters of a batch: row k describes the k-th strongest of the bins' strongest patches. [Coombe03, 3.4]
 //
 // The polygon is the patch's own parallelogram, so that neighbouring patches tile their surface exactly. Visibility is
-// sampled from the middle of what is shot; where part of the patch is dark (something stands on it), or the patch is not flat, from
-// its leading texel.
+// sampled from the middle of what is shot; where part of the patch is dark (something stands on it), or the patch is not flat,
+// from its leading texel.
 #include "common/atlas.glsl"
 #include "common/tile.glsl"
 #include "common/albedo.glsl"
 #include "solvers/shooting/patch_level.glsl"
 #include "solvers/shooting/candidate.glsl"
-#include "solvers/shooting/expected.glsl"
-#include "solvers/shooting/family.glsl"
+#include "solvers/shooting/overshoot.glsl"
+#include "solvers/shooting/emitter_group.glsl"
 #include "solvers/shooting/shooter.glsl"
 #include "solvers/shooting/belongs.glsl"
 
 const float WEAKEST = 0.1;       // a shot under a tenth of the batch's best waits for a later batch
-const float MOST_FAMILY = 8.0;    // times its own area, a patch may shoot for
-const float CANCELS = 1.0 / 256;  // under this share of Σ |R| A, Σ R A is what rounding leaves: no mean is taken from texels for it
+const float MOST_REPRESENTED = 8.0;    // times its own area, a patch may represent
+const float CANCELS = 1.0 / 256;  // under this share of Σ |R| A, Σ R A is what rounding leaves: texels give no mean for it
 
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
 uniform sampler2D t_materials;
 uniform sampler2D t_irradiance;
 uniform sampler2D t_residual;
-uniform sampler2D t_runs;
+uniform sampler2D t_bins;
 uniform float u_least;  // power that is worth a shot
 
 layout(location = 0) out vec4 out_row;
 
-// The candidate of the rank-th strongest run; equal powers rank by index.
-vec4 ranked_run(int rank) {
-    int runs = textureSize(t_runs, 0).x;
+// The candidate of the rank-th strongest bin; equal powers rank by index.
+vec4 ranked_bin(int rank) {
+    int bins = textureSize(t_bins, 0).x;
     vec4 last = vec4(3e38);
     int last_index = -1;
     for (int k = 0; k <= rank; ++k) {
         vec4 best = vec4(0.0);
         int best_index = -1;
-        for (int i = 0; i < runs; ++i) {
-            vec4 run = texelFetch(t_runs, ivec2(i, 0), 0);
-            bool follows = run.x < last.x || (run.x == last.x && i > last_index);
-            if (follows && run.x > best.x) { best = run; best_index = i; }
+        for (int i = 0; i < bins; ++i) {
+            vec4 bin = texelFetch(t_bins, ivec2(i, 0), 0);
+            bool follows = bin.x < last.x || (bin.x == last.x && i > last_index);
+            if (follows && bin.x > best.x) { best = bin; best_index = i; }
         }
         last = best;
         last_index = best_index;
@@ -52,7 +52,7 @@ vec3 irradiance_at(ivec2 px) { return texelFetch(t_irradiance, px, 0).rgb; }
 
 vec3 shoots(ivec2 px, Texel texel) {
     vec3 H = irradiance_at(px);
-    return texelFetch(t_residual, px, 0).rgb + light_ahead(H, albedo_of(t_materials, texel.material, px));
+    return texelFetch(t_residual, px, 0).rgb + overshoot(H, albedo_of(t_materials, texel.material, px));
 }
 
 // The strongest texel near the middle of what the patch shoots: its plane is the shooter's. On a convex surface no other part of
@@ -87,11 +87,16 @@ ivec2 leading_texel(ivec2 corner_px, int size, out Texel lead) {
     return lead_px;
 }
 
+Shooter no_shooter() {
+    Shooter s;
+    s.signed_size = 0;
+    return s;
+}
+
 Shooter shooter_from_patch(ivec2 corner_px, int size) {
     Texel lead;
     leading_texel(corner_px, size, lead);
-    Shooter s;
-    s.size_px = 0;
+    Shooter s = no_shooter();
     if (lead.area <= 0.0) return s;
     vec3 dpdu = facet_entry(lead.facet, 0).xyz, dpdv = facet_entry(lead.facet, 1).xyz;
     float texel_size = texelFetch(t_leaves, corner_px / TILE, 0).z;
@@ -104,7 +109,7 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
 
     vec3 area_centre = vec3(0.0), power_centre = vec3(0.0), flux = vec3(0.0);
     float area = 0.0, power = 0.0;
-    bool flat_patch = true, alone = true;
+    bool planar = true, alone = true;
     vec2 lit = UNLIT_YET;
     ivec2 lower = ivec2(size), upper = ivec2(-1);
     for (int i = 0; i < size * size; ++i) {
@@ -121,7 +126,7 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
         float own = power_of(r);
         power_centre += texel.position * texel.area * own;
         power += texel.area * own;
-        flat_patch = flat_patch && texel.facet == lead.facet;
+        planar = planar && texel.facet == lead.facet;
         lit = lit_with(lit, irradiance_at(px));
         lower = min(lower, at);
         upper = max(upper, at);
@@ -129,10 +134,10 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
     s.area = area;
     s.exitance = flux / area;
     s.facet = lead.facet;
-    s.patch_px = corner_px;
-    s.size_px = size;
-    bool whole = flat_patch && !partly_covered(lit);
-    s.even = whole && alone && power_of(flux) > CANCELS * power;
+    s.patch_x = corner_px.x;
+    s.patch_y = corner_px.y;
+    bool whole = planar && !partly_covered(lit), even = whole && alone && power_of(flux) > CANCELS * power;
+    s.signed_size = even ? size : -size;
 
     // see from the middle of what is shot, or where that may lie inside or under something, from the texel that leads
     s.origin = whole ? power_centre / power : lead.position;
@@ -149,8 +154,8 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
     return s;
 }
 
-// Whether a part of a patch can shoot for all of it: like for like, and no small rest at an edge for much more; their flux
-bool is_family(ivec2 corner_px, int size, Shooter part, out vec3 flux) {
+// Whether one patch of a group can represent all of them: like for like, and no small rest at an edge for much more; their flux
+bool can_represent(ivec2 corner_px, int size, Shooter part, out vec3 flux) {
     bool all = true;
     float area = 0.0;
     vec2 lit = UNLIT_YET;
@@ -164,27 +169,26 @@ bool is_family(ivec2 corner_px, int size, Shooter part, out vec3 flux) {
         lit = lit_with(lit, irradiance_at(px));
         flux += shoots(px, texel) * texel.area;
     }
-    return all && part.area * MOST_FAMILY >= area && !partly_covered(lit);
+    return all && part.area * MOST_REPRESENTED >= area && !partly_covered(lit);
 }
 
-// One of a family that shoots at once: the others have their turn in the same batch, so that none of it is missing, or there
-// twice, for long.
-Shooter shooter_among(ivec2 corner_px, int level, int member) {
+// One member of a group that settles: the others have their turn in the same batch, so that none of its light is missing, or
+// there twice, for long.
+Shooter member_of_group(ivec2 corner_px, int level, int member) {
     int one = min(level, patch_levels(corner_px).shoots);
-    if (one < level) return shooter_from_patch(corner_px + (ivec2(member % FAMILY, member / FAMILY) << one), 1 << one);
-    Shooter s;
-    s.size_px = 0;
+    if (one < level) return shooter_from_patch(corner_px + (ivec2(member % GROUP, member / GROUP) << one), 1 << one);
+    Shooter s = no_shooter();
     if (member == 0) s = shooter_from_patch(corner_px, 1 << one);
     return s;
 }
 
-// The patch itself, or one of a family, which shoots for all and owes the others.
+// The patch itself, or of a group the representative, which shoots for all: the others settle later.
 Shooter shooter_for(ivec2 corner_px, int level) {
     int one = min(level, patch_levels(corner_px).shoots), size = 1 << level;
-    Shooter s = shooter_from_patch(one < level ? speaker_of(corner_px, one) : corner_px, 1 << one);
+    Shooter s = shooter_from_patch(one < level ? representative_of(corner_px, one) : corner_px, 1 << one);
     if (one == level) return s;
     vec3 flux;
-    if (s.size_px > 0 && s.even && is_family(corner_px, size, s, flux)) {
+    if (size_px(s) > 0 && is_even(s) && can_represent(corner_px, size, s, flux)) {
         s.exitance = flux / s.area;
         return s;
     }
@@ -193,14 +197,14 @@ Shooter shooter_for(ivec2 corner_px, int level) {
 }
 
 void main() {
-    const int TURNS = PAYS == 1 ? FAMILY * FAMILY : 1;  // of one candidate
+    const int TURNS = SETTLES == 1 ? GROUP * GROUP : 1;  // of one candidate
     int shot = int(gl_FragCoord.y), rank = shot / TURNS;
-    vec4 run = ranked_run(rank);
-    Shooter s;
-    s.size_px = 0;
-    if (run.x > u_least && (rank == 0 || run.x >= WEAKEST * ranked_run(0).x)) {
-        ivec2 corner_px = corner_of(run);
-        s = PAYS == 1 ? shooter_among(corner_px, level_of(run), shot % TURNS) : shooter_for(corner_px, level_of(run));
+    vec4 chosen = ranked_bin(rank);
+    Shooter s = no_shooter();
+    if (chosen.x > u_least && (rank == 0 || chosen.x >= WEAKEST * ranked_bin(0).x)) {
+        ivec2 corner_px = corner_of(chosen);
+        int level = level_of(chosen);
+        s = SETTLES == 1 ? member_of_group(corner_px, level, shot % TURNS) : shooter_for(corner_px, level);
     }
-    out_row = s.size_px > 0 ? shooter_row(s, int(gl_FragCoord.x)) : vec4(0.0);
+    out_row = size_px(s) > 0 ? shooter_row(s, int(gl_FragCoord.x)) : vec4(0.0);
 }

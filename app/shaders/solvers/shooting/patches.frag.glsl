@@ -1,14 +1,14 @@
 // What blocks of 4×4 texels hold, one texel for each: what is to be shot and what is unshot [stored units · solver area], and how
-// lit they are. Of families, all that their texels owe or are owed, whatever its sign.
+// lit they are. Of groups that settle, the sum of what each texel is off by, whatever its sign.
 //
-// A patch that is partly covered is divided into the finest: the light of its middle would pass through what stands on it, or none
-// would leave it.
+// A patch that is partly covered is divided into the finest: the light of its middle would pass through what stands on it, or
+// none would leave it.
 #include "common/atlas.glsl"
 #include "common/tile.glsl"
 #include "common/albedo.glsl"
 #include "solvers/shooting/patch_level.glsl"
 #include "solvers/shooting/candidate.glsl"
-#include "solvers/shooting/expected.glsl"
+#include "solvers/shooting/overshoot.glsl"
 
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
@@ -20,7 +20,7 @@ layout(location = 0) out vec4 out_patch;   // see candidate.glsl
 layout(location = 1) out vec4 out_unshot;  // Σ r A
 layout(location = 2) out vec2 out_lit;     // least and greatest H of the texels, summed over RGB
 
-vec3 counted(vec3 flux) { return PAYS == 1 ? abs(flux) : flux; }
+vec3 counted(vec3 flux) { return SETTLES == 1 ? abs(flux) : flux; }
 
 // To be shot from the square with this lower corner
 vec3 flux_of(ivec2 corner_px, int edge) {
@@ -31,7 +31,7 @@ vec3 flux_of(ivec2 corner_px, int edge) {
         if (area <= 0.0) continue;
         vec3 albedo = albedo_of(t_materials, material_from_ids(texelFetch(t_normal_ids, px, 0).y), px);
         vec3 r = texelFetch(t_residual, px, 0).rgb;
-        flux += counted((r + light_ahead(texelFetch(t_irradiance, px, 0).rgb, albedo)) * area);
+        flux += counted((r + overshoot(texelFetch(t_irradiance, px, 0).rgb, albedo)) * area);
     }
     return flux;
 }
@@ -60,7 +60,7 @@ void main() {
         vec3 r = texelFetch(t_residual, px, 0).rgb, H = texelFetch(t_irradiance, px, 0).rgb;
         vec3 albedo = albedo_of(t_materials, material_from_ids(texelFetch(t_normal_ids, px, 0).y), px);
         out_unshot.rgb += r * area;
-        out_patch.rgb += counted((r + light_ahead(H, albedo)) * area);
+        out_patch.rgb += counted((r + overshoot(H, albedo)) * area);
         if (area > 0.0) out_lit = lit_with(out_lit, H);
     }
     if (levels.largest < 0) {

@@ -1,7 +1,7 @@
-// The light of some shots on every texel, blended into H and r:
+// The light of some shots is blended into H and r of every texel:
 //
 //   ΔH_j = Σ_i R_i F_ji V_ji,   Δr_j = ρ_j ΔH_j      [Coombe03, eq. 1; F_ji from the texel to the shooter's polygon]
-#define FLAT 1
+#define PLANAR 1
 #include "common/atlas.glsl"
 #include "common/albedo.glsl"
 #include "common/item.glsl"
@@ -11,7 +11,7 @@
 #include "solvers/shooting/visible.glsl"
 
 flat in uint v_shots;  // a bit for each shot that may light this receiver
-#if FLAT
+#if PLANAR
 in vec3 v_position;
 flat in vec3 v_normal;
 flat in float v_facet;
@@ -38,7 +38,7 @@ vec2 received(vec3 position, vec3 normal, float facet, Shooter s, int shot) {
 
 void main() {
     ivec2 texel_px = ivec2(gl_FragCoord.xy);
-#if FLAT
+#if PLANAR
     vec3 position = v_position, normal = v_normal;
     vec3 albedo = v_albedo * albedo_texture(texel_px);
     float facet = v_facet;
@@ -56,9 +56,10 @@ void main() {
         shots &= shots - 1u;
         Shooter s = shooter_of(shot);
         vec2 FV = received(position, normal, facet, s, shot);
-#if !FLAT
-        // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it. Another chart in it is no part of it.
-        bool within = u_own != 0 && all(lessThan(uvec2(texel_px - s.patch_px), uvec2(s.size_px)));
+#if !PLANAR
+        // j ∉ i [Coombe03, 3]: a hollow patch would see its own flat polygon from next to it. Another chart in it is no part of
+        // it.
+        bool within = u_own != 0 && all(lessThan(uvec2(texel_px - patch_px(s)), uvec2(size_px(s))));
         FV = within && chart == s.chart || texel.area <= 0.0 ? vec2(0.0) : FV;
 #endif
         light += s.exitance * FV.x * FV.y;

@@ -1,8 +1,7 @@
 // The shooters of this draw, as uniforms: t_shooters copied into a buffer on the GPU, each padded to a block of its own.
 #include "solvers/shooting/shooter.glsl"
-#define BATCH 8
-
-const int BLOCK_ROWS = 16;
+#define BATCH
+#define BLOCK_ROWS  // vec4s from one shooter to the next
 
 layout(std140) uniform ShooterBlock {
     vec4 u_shooter_rows[BATCH * BLOCK_ROWS];

@@ -1,4 +1,4 @@
-// A small triangle in the map of visibility, or the count of them.
+// A small triangle is drawn into the map of visibility, or counted.
 #include "common/item.glsl"
 #define COUNT 0
 

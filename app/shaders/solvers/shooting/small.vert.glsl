@@ -31,7 +31,7 @@ void main() {
     v_seen = vec2(0.0);
     Shooter s = shooter_of(gl_InstanceID);
     Triangle local = seen_from(load_triangle(t_triangles, gl_VertexID), s.origin, world_axes(s));
-    if (s.size_px == 0 || unseen(local, plane_of(local), float(s.facet))) return;
+    if (size_px(s) == 0 || unseen(local, plane_of(local), float(s.facet))) return;
     vec3 middle = (local.a + local.b + local.c) / 3.0;
     int view = view_from_direction(middle);
     Triangle t = local;

@@ -1,4 +1,4 @@
-// How much of the shooter's sight a receiver point gets: the four map samples around it, weighted bilinearly.
+// Visibility V is how much of the shooter a receiver point sees: the four map samples around it, weighted bilinearly.
 // A map sample is an item and its depth along the sight; the open background is item 0 at depth FAR.
 //
 //   VISIBILITY 0, item id   a sample sees the receiver if it shows the receiver's facet [Coombe03, 3.2]

@@ -1,6 +1,6 @@
-// Delta form factors of the map's samples, summed over every 4×4 of them and shared out among those of the four in their middle
-// that lie on the hemisphere, for open.frag.glsl. Where none does, a corner of the rim is left out: in all 3e-5 of the
-// hemisphere at R = 64, 4e-6 at 256.
+// The weights are delta form factors of the map's samples, summed over every 4×4 of them and shared out among those of the four
+// in their middle that lie on the hemisphere, for escaped.frag.glsl. Where none does, a corner of the rim is left out: in all
+// 3e-5 of the hemisphere at R = 64, 4e-6 at 256.
 #include <projection>
 
 const int STRIDE = 4;

@@ -10,6 +10,6 @@ void main() {
     v_shot = gl_InstanceID;
     Shooter s = load_shooter(t_shooters, v_shot);
     vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
-    vec2 px = vec2(s.patch_px) + corner * float(s.size_px);
+    vec2 px = vec2(patch_px(s)) + corner * float(size_px(s));
     gl_Position = vec4(px / u_size * 2.0 - 1.0, 0.0, 1.0);
 }

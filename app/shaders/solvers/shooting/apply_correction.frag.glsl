@@ -1,4 +1,5 @@
-// What the shots so far give to a leaf, summed anew, in place of what it inherited: H += C, r += ρ C, where C began as -H. Blended.
+// The correction C takes the place of what a leaf inherited: H += C, r += ρ C. C is what the shots so far give to the leaf,
+// summed anew, minus what it held of them. Blended.
 #include "common/atlas.glsl"
 #include "common/albedo.glsl"
 

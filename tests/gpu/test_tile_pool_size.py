@@ -13,9 +13,11 @@ from solver_scenes import Solution, begin, table_room
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu, Texture
 from app.lightmap.collapse import collapse
-from app.lightmap.lightmap import LIGHT, Lightmap
+from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import STORAGE, LightmapOptions
 from app.lightmap.quadtree import Quadtree, Tile, quadtree_pool
+from app.lightmap.refinement import Refinement
+from app.lightmap.textures import LIGHT
 from app.render import resolve
 from app.render.ages import LeafAges
 from app.render.options import DisplayOptions
@@ -23,8 +25,11 @@ from app.render.resolve import BORDER, DisplayTexels
 from app.session.session import Session
 from app.session.view import View
 from app.solvers import EnergyBalance, ShootingOptions
+from app.solvers.shooting.patch_marks import PatchMarks
+from app.solvers.shooting.receivers import receivers
+from app.solvers.shooting.records import EMITTER
+from app.solvers.shooting.replay import Replay
 from app.solvers.shooting.solver import Shooting
-from app.solvers.shooting.stages import EMITTER, ShotBuffers
 from app.viewer.picture import picture
 
 __all__ = ["forest"]
@@ -36,7 +41,7 @@ FEW: dict[str, object] = {"depth": 1, "gradient": 0.5}
 
 @pytest.fixture(autouse=True)
 def small_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("app.lightmap.quadtree", "app.solvers.shooting.adaptive"):
+    for module in ("app.lightmap.quadtree", "app.lightmap.refinement"):
         monkeypatch.setattr(f"{module}.FIRST_ROOM", SMALL_ROOM)
 
 
@@ -58,8 +63,8 @@ def scattered(trees: Forest, rng: np.random.Generator) -> None:
     """Leaves and holes all over the tile pool."""
     for _ in range(2):
         trees.grow()
-    families = trees.tree.merges(np.flatnonzero(trees.pool.used))
-    trees.regrowth.apply(trees.tree.merge([family for family in families if rng.random() < 0.7]))
+    siblings = trees.tree.merges(np.flatnonzero(trees.pool.used))
+    trees.transfer.apply(trees.tree.merge([family for family in siblings if rng.random() < 0.7]))
 
 
 @pytest.mark.parametrize(("name", "storage"), [*(("table", storage) for storage in STORAGE), ("textured", "rgba32f")])
@@ -76,20 +81,20 @@ def test_leaves_take_along_all_that_is_theirs(
         kind = {"rgba32f": np.float32, "rgba16f": np.float16, "fixed8": np.uint8}[storage]
         texture.write((noise * (255 if storage == "fixed8" else 1)).astype(kind).tobytes())
     own = gpu.texture(lightmap.size, 4, "f4", rng.uniform(-1, 1, (*lightmap.size, 4)).astype(np.float32).tobytes())
-    buffers = ShotBuffers(gpu, lightmap)
-    buffers._tiles[:] = rng.integers(0, 3, buffers._tiles.shape) + EMITTER * rng.integers(0, 2, buffers._tiles.shape)
+    marks = PatchMarks(gpu, lightmap)
+    marks.tiles[:] = rng.integers(0, 3, marks.tiles.shape) + EMITTER * rng.integers(0, 2, marks.tiles.shape)
 
     def held() -> list[dict[Tile, bytes]]:
-        assert buffers.finer.read() == buffers.finer_levels.tobytes()
-        finer = {tile: buffers._tiles[divmod(slot, pool.columns)].tobytes() for tile, slot in tree.slots.items()}
+        assert marks.texture.read() == marks.levels.tobytes()
+        finer = {tile: marks.tiles[divmod(slot, pool.columns)].tobytes() for tile, slot in tree.slots.items()}
         return [*(by_leaf(tree, lightmap.texture(n)) for n in leaf_textures(lightmap)), by_leaf(tree, own), finer]
 
-    buffers.finer.write(buffers.finer_levels.tobytes())
+    marks.upload()
     before, memory, leaves, room = held(), sum(lightmap.memory.values()), len(tree), tree.room
     moves = tree.resize(len(tree) + 5)
     lightmap.resize(moves)
     own = lightmap.moved(own, moves)
-    buffers.resize(lightmap, moves)
+    marks.resize(lightmap, moves)
     assert len(moves.old) > 20 and moves.new.max() < moves.old.min(), "it moved nothing"
     assert (len(before) > 6) == (name == "textured")
     for was, now in zip(before, held(), strict=True):
@@ -100,7 +105,7 @@ def test_leaves_take_along_all_that_is_theirs(
         assert texture.size == lightmap.size == pool.size
     covered = by_area(lightmap)
     assert covered[~pool.used].sum() == 0 and covered[pool.used].all()
-    buffers.release()
+    marks.release()
     own.release()
 
 
@@ -136,7 +141,7 @@ def test_the_node_set_is_one_that_was_never_larger(forest: Callable[..., Forest]
             mine = pool.surfaces.area > 0
             read, array = pool.tiles_from_image(read)[mine], pool.tiles_from_image(array)[mine]
         np.testing.assert_array_equal(read, array, err_msg=name)
-    quads = np.concatenate([pool.flat_spans, pool.shaped_tiles])
+    quads = np.concatenate(receivers(pool, np.flatnonzero(pool.used)))
     assert (quads[:, 2] * quads[:, 3]).sum() >= pool.texel_count, "some leaves receive nothing"
     assert (quads[:, 1] + quads[:, 3]).max() <= pool.size[1]
     np.testing.assert_allclose(trees.energy, whole, rtol=1e-12)  # sums in another order
@@ -202,85 +207,91 @@ def follow(solution: Solution, **options: object) -> None:
     solution.settle(3000)
 
 
-def tree_solver(solution: Solution) -> Shooting:
-    assert isinstance(solution.solver, Shooting)
-    return solution.solver
+def refinement_of(solution: Solution) -> Refinement:
+    assert solution.lightmap.refinement is not None
+    return solution.lightmap.refinement
+
+
+def replay_of(solution: Solution) -> Replay:
+    assert solution.solver.batch.replay is not None
+    return solution.solver.batch.replay
 
 
 @pytest.mark.long
 def test_memory_follows_the_light(planted: Callable[..., Solution]) -> None:
     """A tree that merges gives its room back, once: what is left serves as it comes and goes a little."""
     box = planted(**MANY)
-    solver, pool = tree_solver(box), box.lightmap.pool
-    first, sizes = sum(box.lightmap.memory.values()), [pool.tiles]
-    resize = solver._resize
+    refinement, pool = refinement_of(box), box.lightmap.pool
+    first, sizes, tree = sum(box.lightmap.memory.values()), [pool.tiles], refinement.tree
+    resize = refinement._resize
 
     def watched(slots: int) -> None:
-        before, books = leaves_of(box), solver.energy()
+        before, energy = leaves_of(box), box.solver.energy()
         resize(slots)
         sizes.append(pool.tiles)
         assert leaves_of(box) == before
-        assert_same_books(solver.energy(), books)
+        assert_same_energy(box.solver.energy(), energy)
 
-    solver._resize = watched  # type: ignore[method-assign]
+    refinement._resize = watched  # type: ignore[method-assign]
     box.settle()
-    peak, most, imbalance = sum(box.lightmap.memory.values()), len(solver.tree), box.book.imbalance_share
+    peak, most, imbalance = sum(box.lightmap.memory.values()), len(tree), box.book.imbalance_share
     assert peak > 2 * first and len(sizes) > 2 and sizes == sorted(sizes), "the tile pool did not grow"
     grown = len(sizes)
     follow(box, **FEW)
-    assert len(solver.tree) < most / 3
-    assert sizes[grown:] == [max(SMALL_ROOM // pool.tile**2, len(solver.tree) * 3 // 2)]
+    assert len(tree) < most / 3
+    assert sizes[grown:] == [max(SMALL_ROOM // pool.tile**2, len(tree) * 3 // 2)]
     assert sum(box.lightmap.memory.values()) < peak / 2
-    assert pool.tiles >= len(solver.tree) and sorted(solver.tree.slots.values()) == np.flatnonzero(pool.used).tolist()
+    assert pool.tiles >= len(tree) and sorted(tree.slots.values()) == np.flatnonzero(pool.used).tolist()
     for depth in (2, 1, 2, 1):
-        leaves = len(solver.tree)
+        leaves = len(tree)
         follow(box, depth=depth)
-        assert len(solver.tree) != leaves
+        assert len(tree) != leaves
     assert len(sizes) <= grown + 2, "a slider dragged to and fro makes it anew each time"
     # shots since then are of the last tenth of the light, and strong ones are sound to 2 %
     assert box.book.imbalance_share == pytest.approx(imbalance, abs=2e-3)
 
 
-def assert_same_books(a: EnergyBalance, b: EnergyBalance) -> None:
+def assert_same_energy(a: EnergyBalance, b: EnergyBalance) -> None:
     for name in ("absorbed", "escaped", "unshot"):  # the same sums of tiles, added up in another order
         np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=1e-12)
 
 
 def leaves_of(solution: Solution) -> list[dict[Tile, bytes] | set[Tile]]:
     """All that a solver knows of its leaves."""
-    solver, lightmap = tree_solver(solution), solution.lightmap
-    textures = [lightmap.texture(name) for name in leaf_textures(lightmap)] + [t for t, _ in solver._carried]
-    held = [by_leaf(solver.tree, texture) for texture in textures]
-    finer = {t: solver.buffers._tiles[divmod(s, lightmap.columns)].tobytes() for t, s in solver.tree.slots.items()}
-    return [*held, finer, {solver.tree.tile(slot) for slot in solver._fresh}]
+    lightmap, tree, marks = solution.lightmap, refinement_of(solution).tree, solution.solver.batch.marks
+    textures = [lightmap.texture(name) for name in leaf_textures(lightmap)] + [t for t, _ in solution.solver.carried]
+    held = [by_leaf(tree, texture) for texture in textures]
+    finer = {t: marks.tiles[divmod(s, lightmap.columns)].tobytes() for t, s in tree.slots.items()}
+    return [*held, finer, {tree.tile(slot) for slot in replay_of(solution).fresh}]
 
 
 def test_a_solver_takes_along_what_it_knows_of_its_leaves(planted: Callable[..., Solution]) -> None:
     """Also those that are fresh, and the light of strong shots that is kept."""
     box = planted(**(MANY | {"depth": 2, "residual": 0.01}))
     box.settle()
-    solver = tree_solver(box)
-    assert solver._carried, "no strong light is kept"
+    refinement, replay, marks = refinement_of(box), replay_of(box), box.solver.batch.marks
+    tree = refinement.tree
+    assert box.solver.carried, "no strong light is kept"
     box.refine(**FEW)
-    fresh = solver.tree.splits([slot for tile, slot in solver.tree.slots.items() if tile[0] < 2], 3)
-    solver._make_room(4 * len(fresh) + 400)
-    solver._apply(solver.tree.split(fresh))
-    solver.buffers._tiles[:] = np.arange(solver.buffers._tiles.size).reshape(solver.buffers._tiles.shape) % 3
-    families = solver.tree.merges(np.flatnonzero(box.lightmap.pool.used))[::2]
-    solver._apply(solver.tree.merge(families))
+    fresh = tree.splits([slot for tile, slot in tree.slots.items() if tile[0] < 2], 3)
+    refinement._make_room(4 * len(fresh) + 400)
+    refinement._apply(tree.split(fresh))
+    marks.tiles[:] = np.arange(marks.tiles.size).reshape(marks.tiles.shape) % 3
+    siblings = tree.merges(np.flatnonzero(box.lightmap.pool.used))[::2]
+    refinement._apply(tree.merge(siblings))
     before = leaves_of(box)
     for held in before:
         assert held and (isinstance(held, set) or len(set(held.values())) > 1), "nothing to be lost"
-    slots = np.array(sorted(solver._fresh))
-    solver._drop_judged()
-    solver._resize(len(solver.tree) + 3)
+    slots = np.array(sorted(replay.fresh))
+    refinement.drop_judgement()
+    refinement._resize(len(tree) + 3)
     assert leaves_of(box) == before
-    assert sorted(solver._fresh) != slots.tolist()
+    assert sorted(replay.fresh) != slots.tolist()
 
 
 def twin(gpu: Gpu, solution: Solution) -> Solution:
     """Before the first shot, on the same leaves."""
-    wanted, pool = tree_solver(solution).tree.slots, quadtree_pool(solution.lightmap.scene, solution.lightmap.charts)
+    wanted, pool = refinement_of(solution).tree.slots, quadtree_pool(solution.lightmap.scene, solution.lightmap.charts)
     tree = Quadtree(pool)
     while splits := [slot for tile, slot in tree.slots.items() if tile not in wanted]:
         if tree.room < 4 * len(splits):
@@ -293,10 +304,10 @@ def twin(gpu: Gpu, solution: Solution) -> Solution:
 @pytest.mark.long
 def test_further_shots_come_to_the_same_answer(gpu: Gpu, planted: Callable[..., Solution]) -> None:
     """As of a solver that kept its room: what either leaves unshot, at most 1 %, lies elsewhere, since the strongest patches are
-    found run by run of slots. As of one that had these leaves from the start: what patches of other leaves make of it is 1 %
+    found bin by bin. As of one that had these leaves from the start: what patches of other leaves make of it is 1 %
     (test_adaptive.py), besides that."""
     box, roomy = (planted(**(MANY | {"density": 4.0, "residual": 0.5})) for _ in range(2))
-    tree_solver(roomy)._give_room_back = lambda: None  # type: ignore[method-assign]
+    refinement_of(roomy)._give_room_back = lambda: None  # type: ignore[method-assign]
     for one in (box, roomy):
         one.settle()
         room = one.lightmap.pool.tiles
@@ -304,12 +315,12 @@ def test_further_shots_come_to_the_same_answer(gpu: Gpu, planted: Callable[..., 
     assert box.lightmap.pool.tiles < room / 2 == roomy.lightmap.pool.tiles / 2
     others = roomy, twin(gpu, box)
     for one in (box, *others):
-        tree_solver(one)._grow = lambda *_: False  # type: ignore[method-assign]  # they keep these leaves
+        refinement_of(one)._change = lambda *_: False  # type: ignore[method-assign]  # they keep these leaves
         one.solver.set_options(one.solver.options.replace(residual=0.01))
         one.settle()
     mine, here = collapse(box.lightmap.pool, box.lightmap.irradiance())
     for other, tolerance in zip(others, (0.005, 0.015), strict=True):
-        assert tree_solver(other).tree.slots.keys() == tree_solver(box).tree.slots.keys()
+        assert refinement_of(other).tree.slots.keys() == refinement_of(box).tree.slots.keys()
         light, there = collapse(other.lightmap.pool, other.lightmap.irradiance())
         assert (here == there).all()
         assert np.sqrt(((mine - light)[here] ** 2).mean() / (light[here] ** 2).mean()) < tolerance
@@ -327,26 +338,26 @@ def test_the_picture_stays_and_the_panel_tells(gpu: Gpu) -> None:
     session = Session(gpu, options=options, atlas=AtlasOptions(texels=900), light=light)
     view = View(session)
     session.open_now("cornell-box")
-    solver = session.solver
-    assert isinstance(solver, Shooting)
-    while not (solver.settled and session.run.converged):
+    solver, refinement = session.solver, session.lightmap.refinement
+    assert refinement is not None
+    while not session.run.converged:
         session.work(8)
         session.run.poll(energy=False)
     peak = session.stats.memory_mib
     session.set_light(light.replace(**FEW))
-    pictures, resize = [], solver._resize
+    pictures, resize = [], refinement._resize
 
     def watched(slots: int) -> None:
         pictures.append(picture(view, (240, 160)))
-        books = solver.energy()
+        energy = solver.energy()
         resize(slots)
-        assert_same_books(solver.energy(), books)
-        assert books.escaped.min() > 0
+        assert_same_energy(solver.energy(), energy)
+        assert energy.escaped.min() > 0
         pictures.append(picture(view, (240, 160)))
 
-    solver._resize = watched  # type: ignore[method-assign]
+    refinement._resize = watched  # type: ignore[method-assign]
     session.work(8)
-    while not (solver.settled and session.run.converged):
+    while not session.run.converged:
         session.work(8)
         session.run.poll(energy=False)
     before, after = pictures

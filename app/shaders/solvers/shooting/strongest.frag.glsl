@@ -1,10 +1,10 @@
-// The strongest patch that begins in each square of 8×8 texels, one texel for each: patches are as large as they may be, see
-// patches.frag.glsl.
-#define TILE_SQUARES 2
+// Each cell of 8×8 texels keeps the strongest patch that begins in it: one texel per cell. Patches are as large as they may be,
+// see patches.frag.glsl.
+#define TILE_CELLS 2
 #define HIGHEST 4
 
 #include "solvers/shooting/candidate.glsl"
-#include "solvers/shooting/square.glsl"
+#include "solvers/shooting/cell.glsl"
 
 uniform sampler2D t_patches;
 uniform sampler2D t_unshot;
@@ -13,7 +13,7 @@ uniform sampler2D t_lit;
 layout(location = 0) out vec4 out_candidate;
 layout(location = 1) out vec4 out_unshot;  // of the tile that begins here: Σ r A, and its absolute value summed over RGB
 
-const int SQUARE = 1 << (SQUARE_LEVEL - BLOCK_LEVEL);  // blocks along its edge
+const int CELL = 1 << (CELL_LEVEL - BLOCK_LEVEL);  // blocks along its edge
 
 // Whether a square of blocks is one patch; its flux
 bool is_patch(ivec2 corner, int level, out vec3 flux) {
@@ -34,7 +34,7 @@ bool is_patch(ivec2 corner, int level, out vec3 flux) {
 
 vec4 begins_in(ivec2 corner) {
     vec3 flux;
-    for (int level = HIGHEST; level >= SQUARE_LEVEL; --level) {
+    for (int level = HIGHEST; level >= CELL_LEVEL; --level) {
         ivec2 within = corner & ((1 << (level - BLOCK_LEVEL)) - 1);
         if (!is_patch(corner - within, level, flux)) continue;
         if (within != ivec2(0)) return vec4(0.0);
@@ -42,8 +42,8 @@ vec4 begins_in(ivec2 corner) {
         return candidate(power, corner * BLOCK, level, power);
     }
     vec4 best = vec4(0.0);
-    for (int k = 0; k < SQUARE * SQUARE; ++k) {
-        ivec2 block = corner + ivec2(k % SQUARE, k / SQUARE);
+    for (int k = 0; k < CELL * CELL; ++k) {
+        ivec2 block = corner + ivec2(k % CELL, k / CELL);
         vec4 one = texelFetch(t_patches, block, 0);
         float power = power_of(one.rgb);
         if (is_part(one)) one = candidate(power, block * BLOCK, BLOCK_LEVEL, power);
@@ -53,12 +53,12 @@ vec4 begins_in(ivec2 corner) {
 }
 
 void main() {
-    ivec2 square = ivec2(gl_FragCoord.xy);
-    out_candidate = begins_in(square * SQUARE);
+    ivec2 cell = ivec2(gl_FragCoord.xy);
+    out_candidate = begins_in(cell * CELL);
     out_unshot = vec4(0.0);
-    if (any(notEqual(square % TILE_SQUARES, ivec2(0)))) return;
-    const int BLOCKS = TILE_SQUARES * SQUARE;
+    if (any(notEqual(cell % TILE_CELLS, ivec2(0)))) return;
+    const int BLOCKS = TILE_CELLS * CELL;
     for (int k = 0; k < BLOCKS * BLOCKS; ++k)
-        out_unshot.rgb += texelFetch(t_unshot, square * SQUARE + ivec2(k % BLOCKS, k / BLOCKS), 0).rgb;
+        out_unshot.rgb += texelFetch(t_unshot, cell * CELL + ivec2(k % BLOCKS, k / BLOCKS), 0).rgb;
     out_unshot.a = power_of(out_unshot.rgb);
 }

@@ -1,47 +1,46 @@
-"""All shots so far, to be made again into leaves that came later: on the GPU, one row for each, as t_shooters has them."""
+"""The log keeps all shots so far, on the GPU: one row for each, as t_shooters has them."""
 
 from __future__ import annotations
 
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.scene.model import F64
-from app.solvers.shooting.stages import BATCH, BLOCK_ROWS, ShotBuffers
+from app.solvers.shooting.material_edits import MaterialEdits
+from app.solvers.shooting.records import BATCH, BLOCK_ROWS
+from app.solvers.shooting.shooters import ShooterBatch
 
 PAGE = 2048  # shots in one texture; as many textures as it takes
-EXITANCE_ROW = 5  # of a shooter's record, see shooter.glsl
 
 
 class ShotLog:
-    """Whoever makes it releases it."""
+    """Whoever makes it releases it. count: of shots."""
 
-    def __init__(self, gpu: Gpu) -> None:
-        self._gpu = gpu
-        self._copy, self._scale = Pass(gpu, "common/copy"), Pass(gpu, "lightmap/scale")
+    def __init__(self, gpu: Gpu, shooters: ShooterBatch) -> None:
+        self._gpu, self._shooters = gpu, shooters
+        self._copy = Pass(gpu, "common/copy")
         self._pages: list[tuple[Texture, Framebuffer]] = []
         self.count = 0
 
-    def add(self, buffers: ShotBuffers, shots: int) -> None:
-        """Append the first shots of the batch in ``buffers``."""
+    def add(self, shots: int) -> None:
+        """Append the first shots of the batch."""
         for page, row, first, some in _pieces(self.count, shots):
             if page == len(self._pages):
                 rows = self._gpu.texture((BLOCK_ROWS, PAGE), 4, "f4")
                 self._pages.append((rows, self._gpu.target(rows)))
-            self._draw(self._pages[page][1], buffers.shooters, first - row, (0, row, BLOCK_ROWS, some))
+            self._draw(self._pages[page][1], self._shooters.texture, first - row, (0, row, BLOCK_ROWS, some))
         self.count += shots
 
-    def recall(self, buffers: ShotBuffers, first: int) -> int:
-        """Make the batch in ``buffers`` of the shots from ``first`` on; how many."""
+    def recall(self, first: int) -> int:
+        """Make the batch of the shots from ``first`` on; how many."""
         shots = min(BATCH, self.count - first)
         for page, row, start, some in _pieces(first, shots):
-            self._draw(buffers.shooter_target, self._pages[page][0], row - start, (0, start, BLOCK_ROWS, some))
-        buffers.shooter_target.read_into(buffers.shooter_blocks, components=4, dtype="f4")
+            self._draw(self._shooters.target, self._pages[page][0], row - start, (0, start, BLOCK_ROWS, some))
+        self._shooters.share()
         return shots
 
-    def scale(self, factor: F64) -> None:
+    def scale(self, edits: MaterialEdits, factor: F64) -> None:
         """All shots were stronger by a factor (3,) for each channel."""
         for _, target in self._pages:
-            self._scale.draw(
-                target, uniforms={"u_factor": (*factor, 1.0)}, blend="multiply", viewport=(EXITANCE_ROW, 0, 1, PAGE)
-            )
+            edits.scale_shooters(target, factor)
 
     def clear(self) -> None:
         self.count = 0

@@ -1,4 +1,4 @@
-// The energy of one tile, in solver area: absorbed Σ (1-ρ) H A, unshot Σ r A, and Σ ρ A for the ambient term.
+// The energy on one tile is, in solver area: absorbed Σ (1-ρ) H A, unshot Σ r A, and Σ ρ A for the ambient term.
 #include "common/atlas.glsl"
 #include "common/tile.glsl"
 #include "common/albedo.glsl"

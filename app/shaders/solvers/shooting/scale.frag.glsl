@@ -1,4 +1,4 @@
-// Multiplies what is there, H and r: light is linear in what emits it. Blended.
+// Multiplies light that is there, H and r: it is linear in what emits it. Blended.
 uniform vec4 u_factor;
 
 layout(location = 0) out vec4 out_irradiance;

@@ -1,4 +1,4 @@
-// How rough a leaf is, one texel per slot: (largest second difference of H, light Σ H A, area Σ A, share of texels in light).
+// The judgement of a leaf, one texel per slot: (largest second difference of H, light Σ H A, area Σ A, share of texels in light).
 //
 // Where the gradient does not change, linear interpolation shows all there is, and more texels would show no more: the second
 // difference is the jump of the gradient [Coombe03, 4.1; Vedel92]. H and not B = E + ρH: textures of albedo have texels of

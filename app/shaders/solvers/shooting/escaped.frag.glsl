@@ -1,5 +1,6 @@
-// Share of the shooter's sight that leaves the scene (r), and that ends on black sides without texels (g), in pieces: each texel
-// sums the weights of such samples in one block of the map. The four in the middle of every 4×4 samples stand for these.
+// This sums how much of what the shooters send out escapes from the scene (r), or ends on black sides without texels (g), in
+// pieces: each texel sums the weights of such samples in one block of the map. The four in the middle of every 4×4 samples stand
+// for these.
 #include "common/item.glsl"
 #define BLOCK 8
 
@@ -9,7 +10,7 @@ uniform sampler2D t_items;
 uniform sampler2D t_weights;  // what each of those four stands for, see weights.frag.glsl
 uniform int u_row;            // of the target, where the blocks of the first map begin
 
-layout(location = 0) out vec2 out_open;
+layout(location = 0) out vec2 out_escaped;
 
 void main() {
     ivec2 corner_px = (ivec2(gl_FragCoord.xy) - ivec2(0, u_row)) * BLOCK;
@@ -23,5 +24,5 @@ void main() {
             vec4 items = textureGather(t_items, vec2(px + STRIDE / 2) * px_to_uv);
             sum += vec2(dot(weights, vec4(equal(items, vec4(OPEN)))), dot(weights, vec4(equal(items, vec4(UNCHARTED)))));
         }
-    out_open = sum;
+    out_escaped = sum;
 }

@@ -1,4 +1,5 @@
-// C = -H: what a leaf holds of the shots that are summed anew; or C = S - H, where S holds those that are not.
+// C = -H: the correction of a leaf begins with minus what it inherited of the shots that are summed anew; or C = S - H, where S
+// holds those that are not.
 uniform sampler2D t_light;
 uniform sampler2D t_other;
 uniform float u_other;  // whether it counts

@@ -1,0 +1,115 @@
+"""An audit tries a shot before it is made; where it would make or lose light, its patch is divided.
+
+Σ_j A_j F_ji V_ji plus what leaves the scene should be A_i. Where a patch sees from its middle what its edges do not, in a coffer
+or beside a box, it is not. Most light is shot by few patches, so only strong ones are audited, each once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.gpu import Gpu, Pass
+from app.lightmap.lightmap import Lightmap
+from app.solvers.shooting.ledger import Ledger
+from app.solvers.shooting.receive import Receive
+from app.solvers.shooting.records import Shot, powers_of, sizes_of
+from app.solvers.shooting.see import See
+from app.solvers.shooting.shooters import ShooterBatch
+
+# Shots of so large a share of the emitted power are audited; where one would make or lose more than this share of its own, its
+# patch is divided: a hall under skylights in coffers gains 5.8 % without. A patch of two texels along its edge sees what its
+# texels see.
+AUDITED, SOUND, SMALL = 0.005, 0.02, 2
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What becomes of a shot, as shares of its power: received by texels, Σ A_j F_ji V_ji / A_i, sent out of the scene, and
+    lost on black sides that have no texels. Their sum should be 1."""
+
+    received: float
+    open: float
+    black: float
+    shot: Shot
+
+    @property
+    def total(self) -> float:
+        return self.received + self.open + self.black
+
+
+class AuditTargets:
+    """What a shot that is only tried writes: light on texels, and the power on each tile. Gone when the audit is."""
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
+        self._gpu = gpu
+        self.light = gpu.texture(lightmap.size, 4, "f4")
+        self.powers = gpu.texture((lightmap.columns, lightmap.rows), 1, "f4")
+        self.light_target, self.power_target = gpu.target(self.light), gpu.target(self.powers)
+
+    def __enter__(self) -> AuditTargets:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._gpu.release_all(self.light_target, self.power_target, self.light, self.powers)
+
+
+class Auditor:
+    """Tries shots. wanted: whether batches are still strong enough to be audited; never, unless ``enabled``."""
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch, ledger: Ledger, *, enabled: bool) -> None:
+        self._gpu, self._lightmap, self._shooters, self._ledger = gpu, lightmap, shooters, ledger
+        self._sum = Pass(gpu, "solvers/shooting/audit", defines=lightmap.defines("TILE"))
+        self._enabled, self._sound = enabled, set[tuple[int, int, int]]()  # patches that passed: column, row, edge
+        self.begin()
+
+    def begin(self) -> None:
+        """Audit batches again: they may be strong again."""
+        self.wanted = self._enabled
+
+    def forget(self) -> None:
+        """Patches may be others now."""
+        self._sound.clear()
+
+    def failed(self, see: See, receive: Receive, shots: int) -> Generator[None, None, list[np.void]]:
+        """The shooters of the batch, SHOOTER, that would make or lose light and can shoot from finer patches. After the first
+        batch without any strong one, none is audited any more. In parts; waits for the GPU."""
+        shooters = self._shooters.read(shots)
+        power, edge = powers_of(shooters), sizes_of(shooters)
+        strong = power * self._ledger.watt > AUDITED * self._ledger.emitted.sum()
+        self.wanted = bool(strong.any())
+        corners = zip(shooters["patch_x"], shooters["patch_y"], edge, strict=True)
+        patches = [(int(x), int(y), int(size)) for x, y, size in corners]
+        tried = [k for k in np.flatnonzero(strong & (edge > SMALL)).tolist() if patches[k] not in self._sound]
+        if not tried:
+            return []
+        failed = []
+        with AuditTargets(self._gpu, self._lightmap) as targets:
+            for shot in tried:
+                if abs(sum(self.shares(targets, see, receive, shot, power[shot])) - 1) > SOUND:
+                    failed.append(shooters[shot])
+                else:
+                    self._sound.add(patches[shot])
+                yield
+        return failed
+
+    def shares(
+        self, targets: AuditTargets, see: See, receive: Receive, shot: int, power: float
+    ) -> tuple[float, float, float]:
+        """What would become of a shot of the batch and its power: its shares received, open and black, see Audit. Changes no
+        light. Waits for the GPU."""
+        targets.light_target.clear()
+        see.draw(shot, 1)
+        receive.draw_into(targets.light_target, shot, 1)
+        see.add_escaped(shot, 1)
+        area = self._lightmap.textures("t_position_area")
+        self._sum.draw(targets.power_target, textures=area | {"t_received": targets.light})
+        received = np.frombuffer(targets.powers.read(), np.float32).astype(np.float64).sum()
+        return float(received / power), *see.maps.escaped_shares(shot)
+
+    def once(self, see: See, receive: Receive, shot: int, power: float) -> tuple[float, float, float]:
+        """``shares`` with targets of its own."""
+        with AuditTargets(self._gpu, self._lightmap) as targets:
+            return self.shares(targets, see, receive, shot, power)

@@ -1,0 +1,60 @@
+"""A report tells the host what became of a batch, a few batches late: nothing waits for the GPU."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+
+import numpy as np
+
+from app.gpu import Gpu, Pass, ReadBack
+from app.solvers.shooting.choose import Bins, Choice
+from app.solvers.shooting.ledger import Ledger
+from app.solvers.shooting.records import RECORDS, REPORT, SHOOTER
+from app.solvers.shooting.shooters import ShooterBatch
+
+LAG = 2  # read-backs in flight before the oldest is looked at
+
+
+class Reports:
+    """Those that are on their way. Whoever makes it releases it."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._texture = gpu.texture((REPORT.rows + SHOOTER.rows, 1), 4, "f4")
+        self._target = gpu.target(self._texture)
+        self._make = Pass(gpu, "solvers/shooting/report", slots=RECORDS)
+        self._sent: deque[tuple[Choice, ReadBack]] = deque()
+
+    def send(self, choice: Choice, bins: Bins, ledger: Ledger, shooters: ShooterBatch) -> None:
+        """Report a batch of this choice: the state before it, and its first shooter."""
+        self._make.draw(
+            self._target,
+            textures={
+                "t_bins": bins.strongest,
+                "t_unshot": bins.unshot,
+                "t_ledger": ledger.texture,
+                "t_shooters": shooters.texture,
+            },
+        )
+        self._sent.append((choice, ReadBack(self._gpu, self._target)))
+
+    def arrived(self, *, wait: bool) -> Iterator[tuple[Choice, np.void, np.void]]:
+        """Those that have arrived, or with ``wait`` all: the choice, REPORT and SHOOTER of each."""
+        while self._sent and (wait or len(self._sent) > LAG):
+            choice, readback = self._sent.popleft()
+            texels = np.frombuffer(readback.take(), np.float32).reshape(-1, 4)
+            yield choice, REPORT.read(texels[: REPORT.rows])[0], SHOOTER.read(texels[REPORT.rows :])[0]
+
+    @property
+    def all_arrived(self) -> bool:
+        return not self._sent
+
+    def drop(self) -> None:
+        """Forget those on their way."""
+        while self._sent:
+            self._sent.popleft()[1].take()
+
+    def release(self) -> None:
+        self.drop()
+        self._gpu.release_all(self._target, self._texture)
