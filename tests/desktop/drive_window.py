@@ -62,8 +62,8 @@ class ReportingSession(Session):
         self.folder, self.frame = folder, 0
         self.view = ReportingView(self)
 
-    def poll(self, *, brisk: bool = False) -> None:
-        super().poll(interactive=brisk)
+    def poll(self, *, interactive: bool = False) -> None:
+        super().poll(interactive=interactive)
         self.frame += 1
         if self.frame % EVERY == 0:
             state = {
