@@ -31,7 +31,7 @@ from app.commands.flags import (
 )
 from app.errors import UserError
 from app.lightmap.options import LightmapOptions
-from app.options import add_flags
+from app.options import add_flags, specs
 from app.render.options import DisplayOptions
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
 
@@ -245,7 +245,8 @@ def _error_flags(error: Parser, family: Family) -> None:
         help="from each point of a path-traced reference (default 16384)",
     )
     json_flag(error)
-    solver_flags(error, family)
+    add_flags(error, SOLVERS[DEFAULT_SOLVER].options)
+    add_flags(error, LightmapOptions, only=[spec.name for spec in specs(LightmapOptions) if spec.name != "adaptive"])
 
 
 def _doctor_flags(doctor: Parser, family: Family) -> None:

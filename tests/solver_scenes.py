@@ -23,9 +23,9 @@ from app.solvers import EnergyBalance, ShootingOptions
 from app.solvers.shooting.audit import Audit
 from app.solvers.shooting.choose import ROOT_LEVEL
 from app.solvers.shooting.coarse_to_fine import LEVEL
+from app.solvers.shooting.inspectable import InspectableShooting
 from app.solvers.shooting.options import MAX_LEVEL
 from app.solvers.shooting.records import BATCH
-from app.solvers.shooting.shot_by_shot import ShotByShot
 from app.solvers.shooting.solver import Shooting
 from app.util.parts import run_to_end
 from app.visibility.projections import PROJECTIONS
@@ -102,7 +102,7 @@ class Solution:
     surface, and ``H`` and ``r`` (n, 3) [W/m²], read from the GPU anew: of the leaves that there are now."""
 
     lightmap: Lightmap
-    solver: ShotByShot
+    solver: InspectableShooting
 
     @property
     def _covered(self) -> NDArray[np.bool_]:

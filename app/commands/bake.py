@@ -30,7 +30,8 @@ def bake(flags: argparse.Namespace) -> int:
         session = Session(gpu, **session_options(flags))
         open_scene(session, flags.scene, console)
         failure = solve(session, flags, console)
-        whole = failure is not None or session.run.interrupted or _estimate(session, console)
+        stopped = failure is not None or session.run.interrupted
+        whole = stopped or _estimate(session, console)
         clock = time.perf_counter()
         lightmap = session.lightmap
         irradiance, covered = collapse(lightmap.pool, lightmap.irradiance(ambient=True))

@@ -1,0 +1,1 @@
+"""The picture of a lightmap: layers, tone curves, false colour, overlays, and what lies under a pixel."""

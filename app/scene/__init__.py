@@ -1,0 +1,1 @@
+"""Files and procedural scenes, read into triangles, materials and cameras."""

@@ -64,7 +64,7 @@ class Pacer:
             if made < amount:
                 self._gpu.ctx.finish()
                 spent = (time.perf_counter() - start) * 1e3
-                self._batch = max(1, int((budget_ms - spent) / (spent / made)))
+                self._batch = max(1, int((budget_ms - spent) / (spent / max(made, 1))))
                 if spent >= budget_ms:
                     break
         return made

@@ -19,6 +19,7 @@ from app.session.energy import Effort, EnergyWatch
 from app.session.history import History
 from app.session.pacing import Pacer
 from app.solvers import EnergyBalance, Family, Progress, Solver
+from app.solvers.run import solve_until
 from app.util.parts import run_to_end
 
 TELL_SECONDS = 0.2  # between two calls of progress
@@ -199,21 +200,19 @@ class Run:
             raise failure
 
     def _solve(self, stop: Stop, start: float, tell: Callable[[], None] | None) -> None:
-        told = start
-        while not self.converged:
-            left = NO_LIMIT if stop.work is None else stop.work - self.solver.issued
-            if left <= 0 and stop.work is not None:
-                self.poll(energy=False, wait=True)  # some of the work issued may have come to nothing
-                left = stop.work - self.solver.issued
-            spent = time.perf_counter() - start
-            if left <= 0 or (stop.seconds is not None and spent >= stop.seconds):
-                break
-            self.work(left)
-            self.seconds = time.perf_counter() - start
+        told, self.settled = start, False
+
+        def over(_: Progress) -> bool:
+            nonlocal told
+            now = time.perf_counter()
+            self.seconds = now - start
             self.poll(energy=False)
-            if tell and time.perf_counter() - told > TELL_SECONDS:
-                told = time.perf_counter()
+            if tell and now - told > TELL_SECONDS:
+                told = now
                 tell()
+            return self.converged or (stop.seconds is not None and self.seconds >= stop.seconds)
+
+        solve_until(self.solver, NO_LIMIT, over, most=stop.work)
 
     def _not_finite(self) -> NotFiniteError:
         return NotFiniteError(self._message(f"{self.progress.done} {self.family.unit}"))

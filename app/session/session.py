@@ -1,4 +1,4 @@
-"""One open scene and its solution: what window, headless shot, bake and bench all step.
+"""A session is one open scene and its solution: the window steps it frame by frame, shot and bake from first to last.
 
 A session has a scene on its way (opening), a solve (run), a comparison with a reference (compared) and an error estimate. It
 knows no window, no picture and no imgui; whoever draws reads ``lightmap``.
@@ -56,6 +56,8 @@ class Session:
         expose_on_open: bool = False,
     ) -> None:
         """options: of that solver, its defaults if None; default_light: give scenes a ceiling light."""
+        if solver not in SOLVERS:
+            raise UserError(f"--solver {solver}: must be one of {', '.join(SOLVERS)}")
         self.gpu = gpu
         self.solver_name = solver
         self._options = {name: family.options() for name, family in SOLVERS.items()}
@@ -76,7 +78,7 @@ class Session:
         self._then_reference: Path | None = None
 
     def follow(self, prepare: Prepare, opened: Opened) -> None:
-        """Let a view prepare for each lightmap before it is shown, and hear when it is open."""
+        """Call a view to prepare for each lightmap before it is shown, and once it is open."""
         self._opening.prepare, self._on_open = prepare, opened
 
     # -- opening -------------------------------------------------------------------------------------------------------
@@ -93,12 +95,13 @@ class Session:
         loaded = load(source, self.atlas, self.light, default_light=light, expose=expose, progress=progress)
         self._take_over(self._opening.at_once(loaded, self.family, self.options))
 
-    def cut_anew(self, atlas: AtlasOptions, light: LightmapOptions | None = None) -> None:
-        """Cut the open scene anew, in the background; its materials as edited, exposure and camera stay. light: how its light is
-        held then. Raises UserError while another scene is on its way."""
-        if self.loading is not None and self.loading.source is not self.unedited:
-            raise UserError(f"{self.loading.name} is loading: cut {self.name} anew before or after that")
-        self._opening.begin(Loading(self.unedited, atlas, light or self.light))
+    def cut_anew(self, atlas: AtlasOptions, *, adaptive: bool | None = None) -> None:
+        """Cut the open scene anew, in the background; its materials as edited, exposure and camera stay. adaptive: whether into
+        quadtrees, as it is if None. Raises UserError while another scene is on its way."""
+        if self.loading is not None and not (self._opened and self.loading.source is self.unedited):
+            raise UserError(f"{self.loading.name} is loading: cut {self.name or 'it'} anew before or after that")
+        light = self.light if adaptive is None else self.light.replace(adaptive=adaptive)
+        self._opening.begin(Loading(self.unedited, atlas, light))
 
     def poll(self, *, interactive: bool = False) -> None:
         """Once per frame: take in what the GPU reports, and swap in a scene that has finished loading, a part of it per frame.
@@ -118,6 +121,7 @@ class Session:
         """The next part of opening what was loaded; the scene that is open stays until the last."""
         if loading.cancelled:
             self._opening.stop()
+            self._then_reference = None
             self.message = f"{loading.name}: stopped" + (f"; {self.name} stays as it is" if self._opened else "")
             return
         try:
@@ -129,20 +133,21 @@ class Session:
 
     def _take_over(self, ready: Ready) -> None:
         """In place of what is open."""
-        loaded, lightmap, solver = ready.loaded, ready.lightmap, ready.solver
+        loaded, lightmap = ready.loaded, ready.lightmap
         scene = loaded.pool.scene
-        if ready.family is not self.family:  # chosen between two parts
-            solver.release()
-            solver = self.family.make(self.gpu, lightmap, self.options)
-        elif solver.options != self.options:
-            solver.set_options(self.options)
+        try:
+            solver = self._catch_up(ready)
+        except UserError:
+            ready.solver.release()
+            lightmap.release()
+            raise
         same_scene = self._opened and scene is self.unedited
         if same_scene and self.scene is not scene:
             lightmap.set_materials(self.scene.materials)
             solver.reset()
         self.close()
         self.lightmap, self.solver, self.unedited = lightmap, solver, scene
-        self.atlas, self.light = loaded.atlas, loaded.options
+        self.atlas, self.light = loaded.atlas, lightmap.options
         self.load_seconds = loaded.seconds | {"upload": time.perf_counter() - ready.began}
         self.source = self.scene.source or self.scene.name
         self.message = None if self.scene.emits else f"{self.scene.name} has no light: try --light for a ceiling light"
@@ -154,6 +159,22 @@ class Session:
         if self._then_reference is not None:
             self.compared.open(self._then_reference)
             self._then_reference = None
+
+    def _catch_up(self, ready: Ready) -> Solver[Any]:
+        """The solver of what was uploaded, by what has been chosen since: solver, options, how light is held. Raises
+        UserError."""
+        solver, light = ready.solver, self.light.replace(adaptive=ready.loaded.options.adaptive)
+        if ready.lightmap.options != light:
+            ready.lightmap.set_options(light)
+            solver.reset()
+        if ready.family is not self.family:
+            chosen = self.family.make(self.gpu, ready.lightmap, self.options)
+            solver.release()
+            chosen.reset()
+            return chosen
+        if solver.options != self.options:
+            solver.set_options(self.options)
+        return solver
 
     def close(self) -> None:
         """Release the open scene; the session can open another."""
@@ -255,32 +276,35 @@ class Session:
         """Another solver, live. It begins with the light that is there if its method can, else from nothing. Raises UserError."""
         if name not in SOLVERS:
             raise UserError(f"--solver {name}: must be one of {', '.join(SOLVERS)}")
-        if name != self.solver_name:
-            self.solver_name = name
-            if self._opened:
-                self._make_solver()
+        if name == self.solver_name:
+            return
+        if self._opened:
+            family = SOLVERS[name]
+            solver = family.make(
+                self.gpu, self.lightmap, self._options[name]
+            )  # before the other one goes: it may not be had
+            self.solver.release()
+            self.solver = solver
+            if not family.keeps_light:
+                solver.reset()
+        self.solver_name = name
+        if self._opened:
+            self._begin()
 
     def set_light(self, light: LightmapOptions) -> None:
         """Other ways to hold the light: thresholds of quadtrees act on the next work, another format begins again, and quadtrees
         instead of uniform texels, or the reverse, cut the scene anew in the background. Raises UserError as ``cut_anew``."""
-        if not self._opened:
-            self.light = light
-        elif light.adaptive != self.light.adaptive:
-            self.cut_anew(self.atlas, light)
-        else:
-            storage, self.light = self.light.storage, light
+        if light.adaptive != self.light.adaptive and (self._opened or self.loading is not None):
+            self.cut_anew(self.atlas, adaptive=light.adaptive)
+            light = light.replace(adaptive=self.light.adaptive)  # as long as it is not cut
+        storage, self.light = self.light.storage, light
+        if self._opened:
             self.lightmap.set_options(light)
             if light.storage != storage:
                 self.solver.reset()
                 self._begin()
             else:
                 self.run.options_changed()
-
-    def _make_solver(self) -> None:
-        """In place of the one that is there."""
-        self.solver.release()
-        self.solver = self.family.make(self.gpu, self.lightmap, self.options)
-        self._begin()
 
     def set_material(self, index: int, material: Material) -> None:
         """Another albedo or emission: charts and texels stay, and the light where the solver can solve for the difference."""
@@ -333,7 +357,8 @@ class Session:
     @property
     def _state(self) -> object:
         """All that the light depends on: another one where the light is another."""
-        return self.solver.issued, self.lightmap.version, self.lightmap.scene, self.solver.options
+        shown = tuple(getattr(self.solver.options, name) for name in self.family.shows)
+        return self.solver.issued, self.lightmap.version, self.lightmap.scene, shown
 
     # -- what is known -------------------------------------------------------------------------------------------------
 

@@ -30,7 +30,7 @@ LAST_WORK = "last shooter"  # the rectangle of an Inspection that ``display.last
 class View:
     """A camera in the open scene, how its light is displayed, and the renderer. Whoever makes it releases it, before the session.
 
-    camera: set when a scene opens.
+    It is made before a scene opens: camera is set then.
     """
 
     def __init__(self, session: Session, display: DisplayOptions | None = None) -> None:

@@ -19,11 +19,12 @@ from app.solvers.shooting.solver import Shooting
 class Family:
     """A row of the table of solvers.
 
-    title: what the viewer calls it. options: its knobs, each a flag and a widget. make: it for a lightmap, without any light.
+    title: what the viewer calls it. options: its class of them, each a flag and a widget. make: it for a lightmap; what raises
+    does so before the light of the lightmap is touched.
     unit: of its work, in the plural, as in ``--shots``. remains: what is left of what it has to do, as in "0.1 % unshot".
     batch: work that it does at once when nothing waits for it. keeps_light: whether it can begin with light that another solver
     has left in the lightmap; else it begins anew. threshold: the option that says how little may remain when it has converged.
-    pictures: captions of the images of its Inspection.
+    pictures: captions of the images of its Inspection. shows: options that change the light that is shown without any work.
     """
 
     title: str
@@ -36,6 +37,7 @@ class Family:
     threshold: str
     keeps_light: bool = False
     pictures: tuple[str, ...] = ()
+    shows: tuple[str, ...] = ()
 
 
 SOLVERS: dict[str, Family] = {
@@ -49,6 +51,7 @@ SOLVERS: dict[str, Family] = {
         batch=BATCH,
         threshold="residual",
         pictures=("What the last shooter saw",),
+        shows=("ambient",),
     ),
 }
 DEFAULT_SOLVER = "shooting"

@@ -1,7 +1,7 @@
 """What every solver is: it writes the light of a Lightmap in bounded pieces of work, and says how far it is.
 
-Three families share this contract: shooting [Cohen88], gathering along rays [Kahl22], the local matrix [Shcherbakov19]. Each
-counts its work in a unit of its own (shots, rays, updates), and says in its own words what remains: unshot light, or noise.
+The contract is made for shooting [Cohen88], gathering along rays [Kahl22] and a local matrix [Shcherbakov19]: each family counts
+its work in a unit of its own (shots, rays, updates), and says in its own words what remains, unshot light or noise.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A solver driven until something ends the solve: the one loop of it, without a window."""
+"""The loop that drives a solver until something ends the solve, where no window has to stay at its frame rate."""
 
 from __future__ import annotations
 

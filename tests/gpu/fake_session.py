@@ -203,7 +203,7 @@ class FakeSession:
     def set_solver(self, name: str) -> None:
         self.calls.append(("set_solver", name))
 
-    def cut_anew(self, atlas: AtlasOptions, light: LightmapOptions) -> None:
+    def cut_anew(self, atlas: AtlasOptions, *, adaptive: bool) -> None:
         self.calls.append(("cut_anew",))
 
     def set_material(self, index: int, material: Material) -> None:

@@ -3,14 +3,19 @@ told of like any other."""
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
-from constant_solver import FAMILY, SWEEPS
+from constant_solver import FAMILY, SWEEPS, Constant
 
 from app.atlas.options import AtlasOptions
 from app.cli import build_parser
 from app.commands.report import report, summary
+from app.errors import UserError
 from app.gpu import Gpu
+from app.lightmap.lightmap import Lightmap
+from app.options import Options
 from app.session.run import Stop
 from app.session.session import Session
 from app.session.view import View
@@ -58,3 +63,31 @@ def test_flags_are_those_of_the_solver(constant: str) -> None:
     assert flags.work == 2 and flags.irradiance == 3
     with pytest.raises(SystemExit):
         build_parser(constant).parse_args([*arguments, "--shots", "2"])
+
+
+def test_a_solver_that_cannot_be_had_leaves_the_one_that_is_there(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuses(gpu: Gpu, lightmap: Lightmap, options: Options) -> Constant:
+        raise UserError("not here")
+
+    monkeypatch.setitem(SOLVERS, "broken", dataclasses.replace(FAMILY, make=refuses))
+    session = Session(gpu, options=ShootingOptions(resolution=64), atlas=AtlasOptions(texels=900))
+    session.open_now("furnace")
+    session.solve(Stop(work=8))
+    before = session.lightmap.irradiance()
+    with pytest.raises(UserError, match="not here"):
+        session.set_solver("broken")
+    assert session.solver_name == "shooting"
+    np.testing.assert_array_equal(session.lightmap.irradiance(), before)
+    session.work(8)
+    assert session.lightmap.irradiance().sum() > before.sum()
+    session.release()
+
+
+def test_a_family_that_cannot_begin_with_light_begins_without(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(SOLVERS, "anew", dataclasses.replace(FAMILY, keeps_light=False))
+    session = Session(gpu, options=ShootingOptions(resolution=64), atlas=AtlasOptions(texels=900))
+    session.open_now("furnace")
+    session.solve(Stop(work=8))
+    session.set_solver("anew")
+    assert not session.lightmap.irradiance().any()
+    session.release()

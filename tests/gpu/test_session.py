@@ -278,6 +278,48 @@ def test_options_changed_while_a_scene_is_uploaded_are_used(session: Session) ->
     assert session.solver.options == session.options and session.options.level == 4
 
 
+@pytest.mark.parametrize("cut", [False, True], ids=["another scene", "cut anew"])
+@pytest.mark.parametrize("change", [{"storage": "rgba16f"}, {"gradient": 0.1, "depth": 2}], ids=str)
+def test_how_light_is_held_is_as_asked_for_while_a_scene_loads(
+    session: Session, change: dict[str, object], cut: bool
+) -> None:
+    if cut:
+        session.cut_anew(AtlasOptions(texels=2000), adaptive=True)
+    else:
+        session.open("cornell-box")
+    session.set_light(session.light.replace(**change))
+    wait_for(session)
+    held = session.light.as_dict()
+    assert held["adaptive"] is cut and {name: held[name] for name in change} == change
+    assert session.lightmap.options == session.light and session.lightmap.storage == session.light.storage
+    session.work(8)
+    assert irradiance(session) > 0
+
+
+def test_quadtrees_are_asked_for_before_or_after_a_scene_loads(gpu: Gpu) -> None:
+    session = Session(gpu, options=SHOOTING, atlas=ATLAS)
+    session.open("furnace")
+    with pytest.raises(UserError, match="furnace is loading"):
+        session.set_light(session.light.replace(adaptive=True))
+    wait_for(session)
+    assert not session.light.adaptive and not session.lightmap.pool.adaptive
+    session.set_light(session.light.replace(adaptive=True))
+    wait_for(session)
+    assert session.light.adaptive and session.lightmap.pool.adaptive
+    session.release()
+
+
+def test_options_that_change_no_light_keep_what_is_known_of_it(session: Session) -> None:
+    session.solve(Stop(work=16))
+    session.estimate_now(lambda share: None)
+    known = session.expected
+    assert known is not None
+    session.set_options(session.options.replace(residual=0.9))
+    assert session.expected is known
+    session.set_options(session.options.replace(ambient=False))
+    assert session.expected is None, "other light is shown"
+
+
 def test_a_bad_file_leaves_the_scene_and_says_why(session: Session, tmp_path: Path) -> None:
     session.solve(Stop(work=8))
     before = irradiance(session)

@@ -38,7 +38,6 @@ def test_every_program_that_asks_for_the_tile_is_told(gpu: Gpu, monkeypatch: pyt
     options = ShootingOptions(resolution=64, residual=0.5)
     session = Session(gpu, options=options, atlas=AtlasOptions(texels=500, tile=8), light=light)
     view = View(session)
-    view = View(session)
     session.open_now("cornell-box")
     session.solve(Stop(work=40))
     texture = gpu.texture(SIZE, 4, "f1")

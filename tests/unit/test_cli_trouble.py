@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from PIL import Image
 
 import app.viewer.window
 from app.cli import run
-from app.session.run import Run
+from app.solvers.shooting.solver import Shooting
 
 ROOT = Path(__file__).parent.parent.parent
 NOWHERE = os.devnull + "/home"  # cannot be made, even by root
@@ -66,20 +67,19 @@ def test_charts_are_found_without_a_folder_to_keep_them(tmp_path: Path) -> None:
 
 def poison(monkeypatch: pytest.MonkeyPatch, texture: str, call: int) -> None:
     """The ``call``-th batch of shots writes NaN to one texel that covers a surface."""
-    work, calls = Run.work, []
+    work, calls = Shooting.work, []
 
-    def poisoned(run: Run, amount: int) -> int:
-        made = work(run, amount)
+    def poisoned(solver: Shooting, amount: int, bands: int = 1) -> Generator[None, None, int]:
+        made = yield from work(solver, amount, bands)
         calls.append(made)
         if len(calls) == call:
-            lightmap = run.solver.lightmap  # type: ignore[attr-defined]
-            pool = lightmap.pool
+            lightmap, pool = solver.lightmap, solver.lightmap.pool
             tile, y, x = np.argwhere(pool.surfaces.face >= 0)[100]
             at = tile % pool.columns * pool.tile + x, tile // pool.columns * pool.tile + y
             lightmap.texture(texture).write(np.full(4, np.nan, "f4").tobytes(), viewport=(*map(int, at), 1, 1))
         return made
 
-    monkeypatch.setattr(Run, "work", poisoned)
+    monkeypatch.setattr(Shooting, "work", poisoned)
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from __future__ import annotations
 from app.gpu import Gpu, Pass
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import LIGHT
+from app.solvers.shooting.inspectable import InspectableShooting
 from app.solvers.shooting.options import VISIBILITIES
 from app.solvers.shooting.records import BATCH, IN_BLOCKS, RECORDS
-from app.solvers.shooting.shot_by_shot import ShotByShot
 
 GENERAL = ("t_position_area", "t_normal_ids")  # of tiles that are not planar
 CHOSEN = ("t_position_area", "t_normal_ids", "t_irradiance", "t_residual")
@@ -21,7 +21,7 @@ CHOSEN = ("t_position_area", "t_normal_ids", "t_irradiance", "t_residual")
 class ReceiverTraffic:
     """Reads and blends for the same texels and shots what the receiver pass of a solver does, and computes nothing."""
 
-    def __init__(self, gpu: Gpu, shooting: ShotByShot) -> None:
+    def __init__(self, gpu: Gpu, shooting: InspectableShooting) -> None:
         self._gpu, self._lightmap, self._batch = gpu, shooting.lightmap, shooting.batch
         self._visibility = VISIBILITIES.index(shooting.options.visibility)
         self._passes = {key: self._pass(*key) for key in self._batch.receive.passes}

@@ -32,8 +32,9 @@ def draw(view: View, state: State) -> None:
 
 
 def _solver(view: View, state: State) -> None:
-    """What the solver shows of its last work: one fold for each of its pictures, and facts below the last."""
-    for caption in view.session.family.pictures:
+    """What the solver shows of its last work: a fold for each of its pictures, with what there is to say below the first."""
+    state.inspected_age += imgui.get_io().delta_time
+    for nth, caption in enumerate(view.session.family.pictures):
         if not widgets.fold(caption):
             continue
         inspection = _inspection(view, state)
@@ -47,7 +48,7 @@ def _solver(view: View, state: State) -> None:
             imgui.ImVec2(0, 1),
             imgui.ImVec2(1, 0),
         )
-        if inspection.facts:
+        if nth == 0:
             widgets.facts("solver", list(inspection.facts.items()))
 
 
@@ -55,7 +56,6 @@ def _inspection(view: View, state: State) -> Any:
     """With pictures, made anew a few times a second, and whenever the textures behind them may be others."""
     session = view.session
     source = session.lightmap, session.solver, session.options
-    state.inspected_age += imgui.get_io().delta_time
     if state.inspected is None or state.inspected[0] != source or state.inspected_age >= REFRESH_SECONDS:
         state.inspected, state.inspected_age = (source, session.solver.inspect(images=True)), 0.0
     return state.inspected[1]

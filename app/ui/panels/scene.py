@@ -81,7 +81,7 @@ def _atlas(view: View, state: State) -> None:
     if (atlas, light) != (session.atlas, session.light):
         imgui.begin_disabled(session.loading is not None)
         if imgui.button("Cut anew", imgui.ImVec2(-1, 0)):
-            state.act(lambda: session.cut_anew(atlas, light))
+            state.act(lambda: session.cut_anew(atlas, adaptive=light.adaptive))
         imgui.end_disabled()
 
 

@@ -87,7 +87,7 @@ def _buttons(view: View, state: State, *, done: bool) -> None:
     if imgui.button("One step", size):
         session.run.running = False
         state.act(session.work)
-    widgets.tooltip(f"Pause and go one step in {session.family.unit}: . (full stop)")
+    widgets.tooltip(f"Pause and make one of the {session.family.unit}: . (full stop)")
     imgui.same_line()
     if imgui.button(f"{ICONS.ICON_FA_ROTATE_LEFT} Restart", size):
         state.act(session.restart)

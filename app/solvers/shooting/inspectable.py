@@ -16,7 +16,7 @@ from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.records import Shot
 
 
-class ShotByShot(Solver[ShootingOptions], Protocol):
+class InspectableShooting(Solver[ShootingOptions], Protocol):
     """batch: the parts that make shots. last_shot: the last that was reported."""
 
     lightmap: Lightmap
