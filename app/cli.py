@@ -16,9 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from app import __version__
-from app.atlas.options import AtlasOptions
 from app.commands.flags import (
-    DEFAULT_SCENE,
     Parser,
     json_flag,
     output_flag,
@@ -162,10 +160,9 @@ def _shots_flags(shots: Parser, family: Family) -> None:
 
 
 def _frames_flags(frames: Parser, family: Family) -> None:
-    frames.add_argument("scene", nargs="?", default=DEFAULT_SCENE, help=f"a file or a name (default {DEFAULT_SCENE})")
+    scene_flags(frames, optional=True)
     frames.add_argument("--drag", action="store_true", help="drag the sliders of the quadtrees (with --adaptive)")
     json_flag(frames)
-    add_flags(frames, AtlasOptions)
     solver_flags(frames, family)
 
 

@@ -29,7 +29,7 @@ def session_options(flags: argparse.Namespace) -> dict[str, Any]:
         "options": from_flags(SOLVERS[flags.solver].options, flags),
         "atlas": from_flags(AtlasOptions, flags),
         "light": from_flags(LightmapOptions, flags),
-        "default_light": getattr(flags, "light", False),
+        "default_light": flags.light,
     }
 
 

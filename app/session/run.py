@@ -147,11 +147,11 @@ class Run:
         self.settled = False
         return run_to_end(self.solver.work(amount))
 
-    def poll(self, *, energy: bool = True, wait: bool = False) -> bool:
-        """Take in what the solver reports, with ``wait`` up to its last piece of work; the energy balance now and then, and once
-        when solving has stopped. Whether that took long. Raises NotFiniteError and pauses."""
+    def poll(self, *, energy: bool = True) -> bool:
+        """Take in what the solver reports; the energy balance now and then, and once when solving has stopped. Whether that took
+        long. Raises NotFiniteError and pauses."""
         before, slow = self.progress.done, False
-        self.progress = self.solver.poll(wait=wait)
+        self.progress = self.solver.poll()
         if self.running and not np.isfinite(self.progress.remaining):
             self.running = False
             raise self._not_finite()

@@ -24,8 +24,6 @@ from app.scene.model import Camera
 from app.session.picking import Picked, picked_from_hit
 from app.session.session import Session
 
-LAST_WORK = "last shooter"  # the rectangle of an Inspection that ``display.last_shooter`` marks
-
 
 class View:
     """A camera in the open scene, how its light is displayed, and the renderer. Whoever makes it releases it, before the session.
@@ -97,8 +95,9 @@ class View:
 
     @property
     def _last_shooter(self) -> Rect | None:
-        """The patch that shot last, in atlas texels."""
-        return self.session.solver.inspect().rectangles.get(LAST_WORK) if self.display.last_shooter else None
+        """Where the solver worked last, in atlas texels: of shooting, the patch that shot."""
+        rectangles = self.session.solver.inspect().rectangles if self.display.last_shooter else {}
+        return next(iter(rectangles.values()), None)
 
     # -- what lies under a pixel ---------------------------------------------------------------------------------------
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from app.gpu import Gpu
@@ -12,19 +12,19 @@ from app.options import Options
 from app.solvers.base import EnergyBalance, Inspection, Progress, Rect, Solver
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.records import BATCH
-from app.solvers.shooting.solver import Shooting
+from app.solvers.shooting.solver import PICTURES, Shooting
 
 
 @dataclass(frozen=True)
 class Family:
     """A row of the table of solvers.
 
-    title: what the viewer calls it. options: its class of them, each a flag and a widget. make: it for a lightmap; what raises
-    does so before the light of the lightmap is touched.
-    unit: of its work, in the plural, as in ``--shots``. remains: what is left of what it has to do, as in "0.1 % unshot".
-    batch: work that it does at once when nothing waits for it. keeps_light: whether it can begin with light that another solver
-    has left in the lightmap; else it begins anew. threshold: the option that says how little may remain when it has converged.
-    pictures: captions of the images of its Inspection. shows: options that change the light that is shown without any work.
+    title: what the viewer calls it. options: the class of its options, each a flag and a widget. make: makes one for a lightmap,
+    or raises UserError before it has touched the light there. unit: of its work, in the plural, as in ``--shots``. remains: what
+    is left of what it has to do, as in "0.1 % unshot". batch: work that it does at once when nothing waits for it. keeps_light:
+    whether it can begin with light that another solver has left in the lightmap; else it begins anew. threshold: the option that
+    says how little may remain when it has converged. pictures: captions of the images of its Inspection, and what they show.
+    shows: options that change the light that is shown without any work.
     """
 
     title: str
@@ -36,7 +36,7 @@ class Family:
     batch: int
     threshold: str
     keeps_light: bool = False
-    pictures: tuple[str, ...] = ()
+    pictures: Mapping[str, str] = field(default_factory=dict)
     shows: tuple[str, ...] = ()
 
 
@@ -50,7 +50,7 @@ SOLVERS: dict[str, Family] = {
         remains="unshot",
         batch=BATCH,
         threshold="residual",
-        pictures=("What the last shooter saw",),
+        pictures=PICTURES,
         shows=("ambient",),
     ),
 }

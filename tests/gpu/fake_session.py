@@ -166,7 +166,7 @@ class FakeSession:
 
     @property
     def solver(self) -> SimpleNamespace:
-        caption = self.family.pictures[0]
+        caption = next(iter(self.family.pictures))
         shown = Inspection(
             {} if self.image is None else {caption: self.image}, {}, {"Smaller than a sample": "3 triangles"}
         )

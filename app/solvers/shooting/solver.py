@@ -30,6 +30,8 @@ from app.util.parts import run_to_end
 from app.visibility.item_image import ItemImage
 
 LOOK_AFTER = 32  # shots, or a quarter of all, between two looks at leaves that did not change at the last
+SIGHT = "What the last shooter saw"
+PICTURES = {SIGHT: "All that the patch that shot last sees, one colour per surface"}
 CHANGES_PER_SHOT = 8  # leaves that split or merge, for each shot of a piece of work: bounded work for a frame
 
 
@@ -263,11 +265,9 @@ class Shooting:
         shot, facts, pictures, of_texel = self.last_shot, {"Projection": self.options.projection}, {}, {}
         if images:
             seen = self.sight()
-            pictures["What the last shooter saw"] = self._picture.draw(
-                seen["items"], seen["depth"], self.batch.see.map_size
-            )
+            pictures[SIGHT] = self._picture.draw(seen["items"], seen["depth"], self.batch.see.map_size)
             if count := self.vanished():
-                facts["Smaller than a sample"] = f"{count:,} triangles"
+                facts["Smaller than a sample"] = f"{count:,} triangles, each drawn as one sample"
         if texel is not None:
             edge = self.patch_edge(texel)
             of_texel["Patch"] = f"{texel[0] // edge}, {texel[1] // edge} of {edge}×{edge} texels"

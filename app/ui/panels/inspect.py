@@ -34,7 +34,7 @@ def draw(view: View, state: State) -> None:
 def _solver(view: View, state: State) -> None:
     """What the solver shows of its last work: a fold for each of its pictures, with what there is to say below the first."""
     state.inspected_age += imgui.get_io().delta_time
-    for nth, caption in enumerate(view.session.family.pictures):
+    for nth, (caption, meaning) in enumerate(view.session.family.pictures.items()):
         if not widgets.fold(caption):
             continue
         inspection = _inspection(view, state)
@@ -48,6 +48,7 @@ def _solver(view: View, state: State) -> None:
             imgui.ImVec2(0, 1),
             imgui.ImVec2(1, 0),
         )
+        widgets.tooltip(meaning)
         if nth == 0:
             widgets.facts("solver", list(inspection.facts.items()))
 
