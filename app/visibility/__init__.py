@@ -1,1 +1,1 @@
-"""Visibility is who sees whom: projections of the scene onto a patch's hemisphere."""
+"""Visibility is who sees whom: projections of the scene onto a patch's hemisphere, and rays."""

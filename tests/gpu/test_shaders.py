@@ -23,6 +23,7 @@ from app.render.resolve import BORDER, PLACES_WIDTH
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 from app.solvers.shooting.records import BATCH, BLOCK_LEVEL, BLOCK_ROWS, CELL_LEVEL, EMITTER, GROUP, LEVELS, RECORDS
 from app.solvers.shooting.see import ESCAPED_BLOCK
+from app.visibility.bvh import DEEPEST
 from app.visibility.projections import PROJECTIONS
 
 OPTION = {spec.name: spec for spec in specs(ShootingOptions)}
@@ -61,6 +62,8 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "DISC_SUBDIVISION": (OPTION["discs"].maximum,),
     "COUNT": FLAG,
     "INTEGER": FLAG,
+    "ANY": FLAG,
+    "STACK": (DEEPEST,),
     "VISIBILITY": tuple(range(len(VISIBILITIES))),
 }
 SLOTS = {

@@ -1,0 +1,82 @@
+"""Rays find what they meet first in textures that hold the scene's triangles under a tree of boxes: see visibility/rays.glsl.
+
+All is in the solver space (radius 1), in tables of ENTRIES_A_ROW entries a row, RGBA32F:
+
+    t_bvh_nodes      four texels a node: both children, (lower, reference), (upper, count), see bvh.py
+    t_bvh_triangles  three texels a slot: the corners; a of the first: the triangle in the scene
+    t_bvh_uv         three texels a slot: place in the virtual atlas [texels of level 0] of each corner, on the front and on the
+                     back; -1 where that side has no texels
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from app.errors import UserError
+from app.gpu import Gpu, Texture, glsl_constant
+from app.lightmap.tile_pool import MAX_FACETS, TilePool
+from app.scene.model import F32, F64
+from app.visibility.bvh import Bvh, build_bvh
+
+ENTRIES_A_ROW = 1 << int(glsl_constant("visibility/rays.glsl", "ROW_BITS"))
+
+
+class RayScene:
+    """The triangles of a tile pool on the GPU, for rays. Whoever makes it releases it.
+
+    textures: to bind, by name; a program that knows no places of hits does without t_bvh_uv. defines: of visibility/rays.glsl.
+    Raises UserError where there are more triangles than a float counts.
+    """
+
+    def __init__(self, gpu: Gpu, pool: TilePool, bvh: Bvh | None = None) -> None:
+        """bvh: of ``corners_of(pool)``, where it was built before."""
+        corners = corners_of(pool)
+        if len(corners) > MAX_FACETS:
+            raise UserError(f"{len(corners)} triangles: rays can be traced among {MAX_FACETS}")
+        self.bvh = bvh or build_bvh(corners)
+        self._gpu = gpu
+        triangles = np.zeros((len(corners), 3, 4), np.float32)
+        triangles[..., :3] = corners[self.bvh.order]
+        triangles[:, 0, 3] = self.bvh.order
+        tables = {
+            "t_bvh_nodes": self.bvh.nodes,
+            "t_bvh_triangles": triangles,
+            "t_bvh_uv": places_of(pool)[self.bvh.order],
+        }
+        self.textures: dict[str, Texture] = {name: _uploaded(gpu, table) for name, table in tables.items()}
+        self.defines: dict[str, object] = {"STACK": self.bvh.depth}
+
+    @property
+    def memory(self) -> int:
+        """Bytes on the GPU."""
+        return sum(16 * texture.width * texture.height for texture in self.textures.values())
+
+    def release(self) -> None:
+        self._gpu.release_all(*self.textures.values())
+
+
+def corners_of(pool: TilePool) -> F64:
+    """(n, 3, 3) corners of the scene's triangles in the solver space, rounded as the GPU holds them."""
+    local = pool.space.local_from_world(pool.scene.positions)
+    return local.astype(np.float32).astype(np.float64)[pool.scene.triangles]
+
+
+def places_of(pool: TilePool) -> F32:
+    """(n, 3, 4): of each triangle's corners the place in the virtual atlas [texels of level 0] on the front (u, v) and on the
+    back (u, v), -1 where a side has no texels."""
+    drawn = pool.visible_mesh
+    places = np.empty((len(drawn.corners), 3, 4), np.float32)
+    vertices: Any = drawn.vertices[drawn.corners]
+    places[drawn.triangle, :, :2], places[drawn.triangle, :, 2:] = vertices["in_uv_front"], vertices["in_uv_back"]
+    return places
+
+
+def _uploaded(gpu: Gpu, table: F32) -> Texture:
+    """Entries (n, texels, 4) in rows of ENTRIES_A_ROW, the last one filled up."""
+    count, texels, _ = table.shape
+    rows = max(1, -(-count // ENTRIES_A_ROW))
+    filled = np.zeros((rows * ENTRIES_A_ROW, texels, 4), np.float32)
+    filled[:count] = table
+    return gpu.texture((ENTRIES_A_ROW * texels, rows), 4, "f4", filled.tobytes())
