@@ -203,10 +203,10 @@ def _error_flags(error: Parser, family: Family) -> None:
     error.add_argument(
         "--methods",
         type=_method_names,
-        default="uniform,adaptive,disc,item-id,level-1,level-3",
+        default="uniform,adaptive,gathering,disc,item-id,level-1,level-3",
         metavar="A,B",
-        help="all, or some of uniform, adaptive, disc, item-id, depth, stereographic, nonlinear, rgba16f, fixed8, level-1, "
-        "level-3 (default %(default)s)",
+        help="all, or some of uniform, adaptive, gathering, gathering-adaptive, disc, item-id, depth, stereographic, nonlinear, "
+        "rgba16f, fixed8, level-1, level-3 (default %(default)s)",
     )
     error.add_argument(
         "--peers",
@@ -242,7 +242,8 @@ def _error_flags(error: Parser, family: Family) -> None:
         help="from each point of a path-traced reference (default 16384)",
     )
     json_flag(error)
-    add_flags(error, SOLVERS[DEFAULT_SOLVER].options)
+    for row in SOLVERS.values():
+        add_flags(error, row.options)
     add_flags(error, LightmapOptions, only=[spec.name for spec in specs(LightmapOptions) if spec.name != "adaptive"])
 
 

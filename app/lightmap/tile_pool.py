@@ -70,6 +70,7 @@ class TilePool:
     tile: edge of a leaf [texels], t below; tiles: number of slots; used (tiles,) bool: those that hold a leaf; adaptive: whether
     leaves may be of several levels; depth: the level in which pages are counted, that of the finest leaf or one more.
     leaves, surfaces, albedo_tiles, emission_tiles, shapes (SHAPE): of every slot, empty where it is not used.
+    dpdu, dpdv (facets, 3): ∂p/∂u and ∂p/∂v of each facet, solver space per texel of level 0.
     Raises UserError where facets and materials do not fit the 32 bits of a texel's ids.
     """
 
@@ -82,7 +83,7 @@ class TilePool:
         self.material_bits = max(1, (len(scene.materials) - 1).bit_length())
         if charts.facet_count > min(MAX_FACETS, (1 << (32 - self.material_bits)) - 2):
             raise UserError(f"{charts.facet_count} facets × {len(scene.materials)} materials do not fit 32 bits")
-        self._dpdu, self._dpdv = self._facet_tangents()
+        self.dpdu, self.dpdv = self._facet_tangents()
         self._facet_material = np.zeros(charts.facet_count, np.int32)
         self._facet_material[charts.face_facet] = scene.material_ids[charts.face_triangle]
         cut = Tiles.cut(scene, charts, uniform_leaves(charts) if leaves is None else leaves)
@@ -301,9 +302,9 @@ class TilePool:
         """(rows, TABLE_WIDTH, 4): per facet, from 1, two entries: ∂p/∂u per texel of level 0 and its chart; ∂p/∂v."""
         rows = -(-2 * (self.charts.facet_count + 1) // TABLE_WIDTH)
         table = np.zeros((rows * TABLE_WIDTH, 4), np.float32)
-        table[2 : 2 * len(self._dpdu) + 2 : 2, :3] = self._dpdu
+        table[2 : 2 * len(self.dpdu) + 2 : 2, :3] = self.dpdu
         table[2 * self.charts.face_facet + 2, 3] = self.charts.face_chart
-        table[3 : 2 * len(self._dpdv) + 3 : 2, :3] = self._dpdv
+        table[3 : 2 * len(self.dpdv) + 3 : 2, :3] = self.dpdv
         return table.reshape(rows, TABLE_WIDTH, 4)
 
     def _tile_texels(self, tiles: Tiles) -> TileTexels:
@@ -314,8 +315,8 @@ class TilePool:
             area=s.area / self.space.scale**2,
             facet=np.where(s.face >= 0, charts.face_facet[s.face], -1).astype(np.int32),
             size=np.exp2(-tiles.leaves.level.astype(np.float64)),
-            dpdu=self._dpdu,
-            dpdv=self._dpdv,
+            dpdu=self.dpdu,
+            dpdv=self.dpdv,
         )
 
     def _facet_tangents(self) -> tuple[F64, F64]:

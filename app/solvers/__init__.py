@@ -10,6 +10,9 @@ from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.options import Options
 from app.solvers.base import EnergyBalance, Inspection, Progress, Rect, Solver
+from app.solvers.gathering.options import GatheringOptions
+from app.solvers.gathering.solver import BATCH as RAYS
+from app.solvers.gathering.solver import Gathering
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.records import BATCH
 from app.solvers.shooting.solver import PICTURES, Shooting
@@ -52,6 +55,17 @@ SOLVERS: dict[str, Family] = {
         threshold="residual",
         pictures=PICTURES,
         shows=("ambient",),
+    ),
+    "gathering": Family(
+        title="Gathering",
+        help="every texel gathers along rays that are traced once (Kahl 2022)",
+        options=GatheringOptions,
+        make=Gathering,
+        unit="rays",
+        remains="noise",
+        batch=RAYS,
+        threshold="noise",
+        shows=("smooth",),
     ),
 }
 DEFAULT_SOLVER = "shooting"

@@ -69,9 +69,11 @@ def test_each_method_differs_in_its_axis_alone() -> None:
     assert every["adaptive"] == replace(base, atlas=AtlasOptions(texels=1_000), light=LightmapOptions(adaptive=True))
     assert len({repr(setup) for setup in every.values()}) == len(METHODS), "two methods are the same"
     for name, setup in every.items():
-        pairs = ((setup.options, base.options), (setup.light, base.light))
+        own_base = base if setup.solver == DEFAULT_SOLVER else every[setup.solver]
+        pairs = ((setup.options, own_base.options), (setup.light, own_base.light))
         changed = [s.name for own, other in pairs for s in specs(type(own)) if differ(own, other, s.name)]
-        assert len(changed) == (name != "uniform"), name
+        assert len(changed) == (setup != own_base), name
+        assert setup.solver == DEFAULT_SOLVER or METHODS[name].axis == "solver"
     assert set(DEFAULT_METHODS) <= set(METHODS)
 
 
@@ -83,7 +85,8 @@ def test_every_choice_of_a_solver_is_a_method() -> None:
         for name in names:
             spec = next(s for s in specs(kind) if s.name == name)
             setups = [method.setup(None, NO_FLAGS) for method in METHODS.values()]
-            tried = {getattr(setup.light if kind is LightmapOptions else setup.options, name) for setup in setups}
+            held = [setup.light if kind is LightmapOptions else setup.options for setup in setups]
+            tried = {getattr(options, name) for options in held if isinstance(options, kind)}
             assert tried == set(spec.choices)
 
 
@@ -108,7 +111,7 @@ def test_all_and_some_methods() -> None:
     ("arguments", "says"),
     [
         ("furnace", "-o/--output"),
-        ("furnace -o out --methods bogus", "bogus: must be all, or some of uniform, adaptive, disc"),
+        ("furnace -o out --methods bogus", "bogus: must be all, or some of uniform, adaptive, gathering"),
         ("furnace -o out --methods uniform,", "must be all, or some of"),
         ("furnace -o out --peers bogus", "bogus: must be all, or some of mitsuba"),
         ("furnace -o out --seconds 0", "0: must be a number above 0"),

@@ -64,6 +64,8 @@ class Method:
 METHODS = {
     "uniform": Method("lightmap"),
     "adaptive": Method("lightmap", light={"adaptive": True}),
+    "gathering": Method("solver", solver="gathering"),
+    "gathering-adaptive": Method("solver", solver="gathering", light={"adaptive": True}),
     "disc": Method("form factor", options={"form_factor": "disc"}),
     "item-id": Method("visibility", options={"visibility": "item-id"}),
     "depth": Method("visibility", options={"visibility": "depth"}),
@@ -74,7 +76,7 @@ METHODS = {
     "level-1": Method("shooting level", options={"level": 1}),
     "level-3": Method("shooting level", options={"level": 3}),
 }
-DEFAULT_METHODS = ("uniform", "adaptive", "disc", "item-id", "level-1", "level-3")
+DEFAULT_METHODS = ("uniform", "adaptive", "gathering", "disc", "item-id", "level-1", "level-3")
 
 
 def method_names(text: str) -> tuple[str, ...]:

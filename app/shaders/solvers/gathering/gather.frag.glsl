@@ -1,0 +1,38 @@
+// Σ B over some rays of each texel, B = ρH, and E of what is lit by rays alone, of the texel that was hit: read from where the
+// hits are kept, or traced again. Blended.
+#define TRACED 0
+#if TRACED
+#include "solvers/gathering/ray.glsl"
+#else
+uniform usampler2D t_hits;
+uniform ivec3 u_pages;  // size of a page [texels], pages side by side
+#endif
+
+uniform sampler2D t_outgoing;
+uniform ivec2 u_rays;  // the first, and how many
+
+const int GROUP = 8;  // rays
+
+layout(location = 0) out vec4 out_light;  // a: Σ over groups (Σ mean of RGB)²
+
+void main() {
+    ivec2 px = ivec2(gl_FragCoord.xy);
+    out_light = vec4(0.0);
+#if TRACED
+    Origin o = load_origin(px);
+    if (!o.there) return;
+#endif
+    for (int first = u_rays.x; first < u_rays.x + u_rays.y; first += GROUP) {
+        vec3 sum = vec3(0.0);
+        for (int k = first; k < first + GROUP; ++k) {
+#if TRACED
+            uint hit = trace(o, k);
+#else
+            uint hit = texelFetch(t_hits, px + u_pages.xy * ivec2(k % u_pages.z, k / u_pages.z), 0).x;
+#endif
+            sum += texelFetch(t_outgoing, ivec2(hit & 0xFFFFu, hit >> 16), 0).rgb;
+        }
+        float mean = dot(sum, vec3(1.0 / 3.0));
+        out_light += vec4(sum, mean * mean);
+    }
+}

@@ -1,0 +1,58 @@
+// Where rays of a texel start: anywhere on its square where one flat surface fills it, so that the mean over its rays is that over
+// its area; else in the middle of the surface that it covers.
+#include "common/atlas.glsl"
+#include "common/item.glsl"
+#include "common/leaves.glsl"
+#include "common/tile.glsl"
+#include "solvers/gathering/sequence.glsl"
+
+uniform sampler2D t_origin;  // point, solver space; w: 0 nothing here, 1 that point, 2 all of the square around it
+uniform usampler2D t_origin_normal;
+uniform usampler2D t_normal_ids;
+uniform sampler2D t_facets;
+
+struct Origin {
+    vec3 position;
+    vec3 normal;
+    bool there;
+    bool square;
+    vec3 u, v;    // along the edges of the square
+    ivec3 place;  // of the texel in the atlas, for its random numbers
+};
+
+vec3 facet_tangent(int entry) {
+    int width = textureSize(t_facets, 0).x;
+    return texelFetch(t_facets, ivec2(entry % width, entry / width), 0).xyz;
+}
+
+Origin load_origin(ivec2 texel_px) {
+    Origin o;
+    vec4 p = texelFetch(t_origin, texel_px, 0);
+    o.there = p.w > 0.0;
+    o.square = p.w > 1.5;
+    o.normal = normal_from_octahedral(texelFetch(t_origin_normal, texel_px, 0).x);
+    o.position = p.xyz + 2.0 * COPLANAR * o.normal;
+    vec3 leaf = texelFetch(t_leaves, texel_px / TILE, 0).xyz;
+    o.place = ivec3(ivec2(leaf.xy) * TILE + texel_px % TILE, int(1.0 / max(leaf.z, 1e-6)));
+    o.u = o.v = vec3(0.0);
+    if (o.square) {
+        int entry = 2 * int(facet_from_ids(texelFetch(t_normal_ids, texel_px, 0).y));
+        o.u = facet_tangent(entry) * leaf.z;
+        o.v = facet_tangent(entry + 1) * leaf.z;
+    }
+    return o;
+}
+
+vec3 start_of(Origin o, vec2 share) { return o.position + (share.x - 0.5) * o.u + (share.y - 0.5) * o.v; }
+
+// Unit vectors square to a normal. [Duff17]
+mat3 frame_of(vec3 n) {
+    float s = n.z >= 0.0 ? 1.0 : -1.0, a = -1.0 / (s + n.z), b = n.x * n.y * a;
+    return mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n);
+}
+
+// Distributed as the cosine: what such rays see is to be averaged, and that is the irradiance over π.
+vec3 cosine_direction(vec3 normal, vec2 share) {
+    float r = sqrt(share.x), phi = 2.0 * PI * share.y;
+    return frame_of(normal) * vec3(r * cos(phi), r * sin(phi), sqrt(max(1.0 - share.x, 0.0)));
+}

@@ -1,0 +1,143 @@
+"""Bounces find the light that is left when every texel has given on what it received, along the rays that are kept.
+
+    H = H_direct + 1/N Σ_k B(hit_k),    B = ρH
+
+is linear; the largest eigenvalue of its matrix is about the mean albedo, λ = ρ̄: the Chebyshev semi-iteration [Golub61] solves it
+in O(1/√(1 - λ)) steps where Jacobi needs O(1/(1 - λ)):
+
+    H_{n+1} = ω_{n+1} (H_direct + 1/N Σ B(H_n) - H_{n-1}) + H_{n-1},    ω_1 = 1, ω_2 = 2/(2 - λ²), ω_{n+1} = 1/(1 - λ² ω_n / 4)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from app.gpu import Gpu, Pass, Texture
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.tile_pool import Moves
+from app.solvers.gathering.hits import Hits
+
+# Texels with few rays do not see each other alike: eigenvalues leave the real axis by about λ/√N, and the iteration diverges
+# where that is more than the y of y + √(y² + λ²) = 1 + √(1 - λ²): 16 rays allow this.
+MOST_REFLECTED = 0.95
+
+
+def steps_to(tolerance: float, reflected: float) -> int:
+    """Chebyshev steps after which the error is this share of what it was, at most."""
+    rate = reflected / (1 + math.sqrt(1 - reflected**2))
+    return 1 if rate <= 0 else max(1, math.ceil(math.log(2 / tolerance) / -math.log(rate)))
+
+
+class Bounces:
+    """Of one lightmap: ``solution`` is H on every texel [stored units]. Whoever makes it releases it.
+
+    reflected: λ, the mean albedo of the colour that is reflected most.
+    """
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
+        self._gpu, self._lightmap = gpu, lightmap
+        reads = lightmap.defines("MATERIAL_BITS", "TILE", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
+        self._send = Pass(gpu, "solvers/gathering/outgoing", defines=reads)
+        self._relax = Pass(gpu, "solvers/gathering/relax")
+        width, height = lightmap.charts.size
+        self.outgoing = gpu.texture((width, height + 1), 4, "f4")  # one row more: see hit.glsl
+        self._outgoing_target = gpu.target(self.outgoing)
+        self._outgoing_target.clear()
+        self.reflected = 0.0
+        self._sources: Texture | None = None
+        self._fit()
+
+    def _fit(self) -> None:
+        size = self._lightmap.size
+        self._solutions = [self._gpu.texture(size, 4, "f4") for _ in range(2)]
+        self._targets = [self._gpu.target(texture) for texture in self._solutions]
+        self.gathered = self._gpu.texture(size, 4, "f4")
+        self._gathered_target = self._gpu.target(self.gathered)
+        self.clear()
+
+    def clear(self) -> None:
+        """No light."""
+        for target in (*self._targets, self._gathered_target):
+            target.clear()
+
+    @property
+    def solution(self) -> Texture:
+        return self._solutions[0]
+
+    def set_materials(self, by_rays: Sequence[int]) -> None:
+        """The lightmap's materials are others. by_rays: those whose light the rays bring that hit them."""
+        materials, unit = self._lightmap.scene.materials, self._lightmap.unit
+        table = np.zeros((len(materials), 1, 4), np.float32)
+        for i in by_rays:
+            table[i, 0, :3] = np.pi * np.array(materials[i].emission) / unit
+        if self._sources is not None:
+            self._gpu.release_all(self._sources)
+        self._sources = self._gpu.texture((1, len(materials)), 4, "f4", table.tobytes())
+        area = self._lightmap.pool.surfaces.area
+        mean = (self._lightmap.albedo() * area[..., None]).sum((0, 1, 2)) / max(float(area.sum()), 1e-300)
+        self.reflected = min(float(mean.max()), MOST_REFLECTED)
+
+    def solve(self, hits: Hits, direct: Texture, rays: int, steps: int) -> Iterator[None]:
+        """So many steps from the solution as it is, along so many rays of each texel, in parts."""
+        omega = 1.0
+        for step in range(steps):
+            yield from self.gather(hits, 0, rays, anew=True)
+            if step == 1:
+                omega = 2 / (2 - self.reflected**2)
+            elif step > 1:
+                omega = 1 / (1 - self.reflected**2 * omega / 4)
+            self._solutions.reverse()
+            self._targets.reverse()
+            self._relax.draw(
+                self._targets[0],
+                textures={"t_direct": direct, "t_gathered": self.gathered},
+                uniforms={"u_rays": rays, "u_omega": omega},
+                blend="keep",
+            )
+            yield
+
+    def gather(self, hits: Hits, first: int, count: int, *, anew: bool) -> Iterator[None]:
+        """Add what so many rays of each texel find of the solution to ``gathered``, in parts; ``anew``: to nothing."""
+        if anew:
+            self.send()
+            self._gathered_target.clear()
+        yield from hits.gather(self._gathered_target, self.outgoing, first, count)
+
+    def send(self) -> None:
+        """B = ρH of the solution."""
+        lightmap = self._lightmap
+        assert self._sources is not None
+        reads = "t_pages", "t_leaves", "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_emission"
+        width, height = lightmap.charts.size
+        self._send.draw(
+            self._outgoing_target,
+            textures=lightmap.textures(*reads) | {"t_sources": self._sources, "t_solution": self.solution},
+            uniforms={
+                "u_pages": (float(lightmap.columns), lightmap.pool.pages_per_texel),
+                "u_depth": lightmap.pool.depth,
+            },
+            viewport=(0, 0, width, height),
+        )
+
+    def resized(self, moves: Moves) -> None:
+        """The tile pool has got another number of slots; what was gathered is gone."""
+        self._gpu.release_all(*self._targets, self._gathered_target, self.gathered, self._solutions.pop())
+        solution = self._lightmap.moved(self._solutions[0], moves)
+        self._fit()
+        self._gpu.release_all(self._targets[0], self._solutions[0])
+        self._solutions[0] = solution
+        self._targets[0] = self._gpu.target(solution)
+
+    @property
+    def memory(self) -> int:
+        """Bytes on the GPU."""
+        (width, height), (columns, rows) = self._lightmap.size, self.outgoing.size
+        return int(16 * (3 * width * height + columns * rows))
+
+    def release(self) -> None:
+        sources = [] if self._sources is None else [self._sources]
+        self._gpu.release_all(*self._targets, *self._solutions, self._gathered_target, self.gathered)
+        self._gpu.release_all(self._outgoing_target, self.outgoing, *sources)

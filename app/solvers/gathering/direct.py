@@ -1,0 +1,224 @@
+"""Direct light comes straight from lamps: shadow rays to points on them say which part of them each texel sees [Veach97, 8.2].
+
+    H_direct = Σ_sets E_set Σ_j F_ij V_ij,    Σ_j F_ij V_ij ≈ Σ_j F_ij · (Σ_k w_k V_k / Σ_k w_k)
+
+w_k is what the point of the k-th shadow ray would give unoccluded, over its probability: with the closed form of Σ F_ij beside it
+there is noise in half-shadows only. What is kept is Σ F V, so that another exitance costs no ray.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.textures import QUAD_FORMAT, quads, upload
+from app.lightmap.tile_pool import Moves
+from app.scene.model import F32, Scene
+from app.solvers.gathering.lamps import LampSet, chances, lamp_sets
+from app.solvers.gathering.origins import Origins
+from app.visibility.rays import RayScene
+
+STREAM = 1  # of random numbers, of the first set
+
+
+@dataclass
+class Lit:
+    """What is known of the light of one set. count: shadow rays of each texel, in so many passes."""
+
+    lamps: LampSet
+    table: Texture
+    chances: Texture
+    seen: Texture
+    target: Framebuffer
+    unoccluded: Texture | None
+    stream: int
+    count: int = 0
+    passes: int = 0
+
+
+class DirectLight:
+    """On one lightmap: ``light`` holds it [stored units], and in its alpha the variance of the mean of RGB. Whoever makes it
+    releases it.
+
+    traced: shadow rays so far, of all texels.
+    """
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, rays: RayScene, origins: Origins) -> None:
+        self._gpu, self._lightmap, self._rays, self._origins = gpu, lightmap, rays, origins
+        self.sets: list[Lit] = []
+        self.traced = self._streams = 0
+        defines = lightmap.defines("MATERIAL_BITS", "TILE")
+        self._shoot = {
+            closed: Pass(
+                gpu,
+                "solvers/gathering/direct",
+                defines={"CLOSED_FORM": closed} | defines | dict(rays.defines),
+                vertex="common/rects",
+            )
+            for closed in (True, False)
+        }
+        self._unoccluded = Pass(gpu, "solvers/gathering/unoccluded", defines=defines, vertex="common/rects")
+        self._add = {c: Pass(gpu, "solvers/gathering/lamp_light", defines={"CLOSED_FORM": c}) for c in (True, False)}
+        self._fit()
+
+    def _fit(self) -> None:
+        self.light = self._gpu.texture(self._lightmap.size, 4, "f4")
+        self._target = self._gpu.target(self.light)
+        self._target.clear()
+
+    def add(self, lamps: LampSet) -> None:
+        """Another set, none of whose light is known yet."""
+        gpu, size = self._gpu, self._lightmap.size
+        table = upload(gpu, lamps.rows)
+        chance = upload(gpu, chances(self._lightmap.pool, lamps)[..., None])
+        seen = gpu.texture(size, 4, "f4")
+        target = gpu.target(seen)
+        target.clear()
+        unoccluded = gpu.texture(size, 1, "f4") if lamps.closed_form else None
+        self._streams += 1
+        self.sets.append(Lit(lamps, table, chance, seen, target, unoccluded, STREAM + self._streams))
+        self._look_unoccluded(self.sets[-1], self._everywhere)
+
+    def _look_unoccluded(self, lit: Lit, rects: F32) -> None:
+        """Σ F of a set with a closed form, in these rectangles."""
+        if lit.unoccluded is not None:
+            target = self._gpu.target(lit.unoccluded)
+            self._draw(self._unoccluded, target, rects, {"t_lamps": lit.table}, {}, blend=None)
+            self._gpu.release_all(target)
+
+    def _draw(
+        self,
+        how: Pass,
+        target: Framebuffer,
+        rects: F32,
+        textures: dict[str, Texture],
+        uniforms: dict[str, Any],
+        *,
+        blend: str | None,
+    ) -> None:
+        mesh = Mesh(self._gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)
+        how.draw(
+            target,
+            textures=textures | self._origins.textures,
+            uniforms=uniforms | {"u_size": target.size},
+            mesh=mesh,
+            blend=blend,
+        )
+        self._gpu.release_all(mesh)
+
+    @property
+    def _everywhere(self) -> F32:
+        return np.array([(0, 0, *self._lightmap.size, 0, 0)], np.float32)
+
+    def drop(self, lit: Lit) -> None:
+        """Forget a set."""
+        self.sets.remove(lit)
+        optional = [] if lit.unoccluded is None else [lit.unoccluded]
+        self._gpu.release_all(lit.target, lit.seen, lit.table, lit.chances, *optional)
+
+    def shoot(self, count: int) -> Iterator[None]:
+        """So many shadow rays more from each texel to each set, in parts."""
+        for lit in self.sets:
+            self._shoot_at(lit, count)
+            yield
+
+    def _shoot_at(self, lit: Lit, count: int) -> None:
+        """One pass of shadow rays to a set."""
+        self._trace(lit, self._everywhere, lit.count, count, "add")
+        lit.count += count
+        lit.passes += 1
+        self.traced += count * self._lightmap.texel_count
+
+    def _trace(self, lit: Lit, rects: F32, first: int, count: int, blend: str | None) -> None:
+        textures = {"t_lamps": lit.table, "t_chances": lit.chances}
+        textures |= {name: texture for name, texture in self._rays.textures.items() if name != "t_bvh_uv"}
+        uniforms = {"u_rays": (first, count), "u_stream": lit.stream}
+        self._draw(self._shoot[lit.lamps.closed_form], lit.target, rects, textures, uniforms, blend=blend)
+
+    def shoot_tiles(self, slots: NDArray[np.int64]) -> Iterator[None]:
+        """Other leaves are in these slots: the shadow rays that the others have had, in parts."""
+        pool = self._lightmap.pool
+        rects = quads(pool.corners(slots), pool.tile, pool.corners(slots))
+        for lit in self.sets:
+            self._look_unoccluded(lit, rects)
+            table = chances(pool, lit.lamps)
+            self._gpu.release_all(lit.chances)
+            lit.chances = upload(self._gpu, table[..., None])
+            each = lit.count // max(lit.passes, 1)
+            for nth in range(lit.passes):
+                self._trace(lit, rects, nth * each, each, "add" if nth else None)
+                yield
+            self.traced += lit.count * int((pool.surfaces.face[slots] >= 0).sum())
+
+    def resized(self, moves: Moves) -> None:
+        """The tile pool has got another number of slots."""
+        for lit in self.sets:
+            self._gpu.release_all(lit.target)
+            lit.seen = self._lightmap.moved(lit.seen, moves)
+            lit.target = self._gpu.target(lit.seen)
+            if lit.unoccluded is not None:
+                lit.unoccluded = self._lightmap.moved(lit.unoccluded, moves)
+        self._gpu.release_all(self._target, self.light)
+        self._fit()
+
+    def follow(self, scene: Scene) -> None:
+        """Materials are others. Of a set that is one material all is known, whatever it emits, also nothing; another set is lit
+        anew when any of its lamps is another."""
+        alone = [lit.lamps.materials[0] for lit in self.sets if len(lit.lamps.materials) == 1]
+        sets = lamp_sets(self._lightmap.pool, scene, alone)
+        for lit in [lit for lit in self.sets if len(lit.lamps.materials) > 1]:
+            if any(lit.lamps.same_light(lamps) for lamps in sets):
+                sets = [lamps for lamps in sets if not lit.lamps.same_light(lamps)]
+            else:
+                self.drop(lit)
+        for lamps in sets:
+            self.add(lamps)
+
+    def catch_up(self) -> Iterator[None]:
+        """The shadow rays to sets that came later, as many as the others have had, in parts."""
+        wanted, passes = max(((lit.count, lit.passes) for lit in self.sets), default=(0, 0))
+        for lit in self.sets:
+            while lit.count < wanted:
+                self._shoot_at(lit, wanted // passes)
+                yield
+
+    def sum(self, scene: Scene) -> None:
+        """Bring ``light`` up to date, with what the lamps emit now."""
+        self._target.clear()
+        for lit in self.sets:
+            exitance = lit.lamps.exitance_in(scene)
+            if lit.count and exitance.any():
+                closed = lit.lamps.closed_form
+                self._add[closed].draw(
+                    self._target,
+                    textures={"t_shadow_rays": lit.seen}
+                    | ({} if lit.unoccluded is None else {"t_unoccluded": lit.unoccluded}),
+                    uniforms={
+                        "u_exitance": tuple((exitance / self._lightmap.unit).tolist()),
+                        "u_count": (lit.count, lit.passes),
+                    },
+                    blend="add",
+                )
+
+    def forget(self) -> None:
+        """No set is known."""
+        for lit in list(self.sets):
+            self.drop(lit)
+        self.traced = self._streams = 0
+        self._target.clear()
+
+    @property
+    def memory(self) -> int:
+        """Bytes on the GPU."""
+        width, height = self._lightmap.size
+        return width * height * (16 + sum(16 + 4 * lit.lamps.closed_form for lit in self.sets))
+
+    def release(self) -> None:
+        self.forget()
+        self._gpu.release_all(self._target, self.light)

@@ -1,0 +1,138 @@
+"""Lamps are the triangles that emit, in sets that share one exitance: what shadow rays are sent to.
+
+A set is one material, so that another exitance of it scales the light it gives and costs no ray. Beyond so many, materials share
+a set, and shadow rays choose among them. Materials with an image of what they emit are in none: their light is brought by the
+rays that hit them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.lightmap.tile_pool import TilePool
+from app.scene.model import F32, F64, Scene
+
+ALONE = 8  # materials that are a set of their own, the strongest ones
+CLOSED_FORM = 256  # triangles of a set, up to which all of them are summed up in closed form
+CHANCES = 1 << 24  # of lamps in tiles: beyond, they are the same in all tiles
+
+
+@dataclass(frozen=True, eq=False)
+class LampSet:
+    """materials: that emit in it. exitance: E = πL of it, RGB [W/m²]. rows (n, 4, 4) f32: its triangles, see lamp.glsl. strength
+    (n,): mean of RGB of each triangle's exitance, over that of the set."""
+
+    materials: tuple[int, ...]
+    exitance: F64
+    rows: F32
+    strength: F64
+
+    @property
+    def closed_form(self) -> bool:
+        """Whether its light is a closed form times visibility."""
+        return len(self.materials) == 1 and len(self.rows) <= CLOSED_FORM
+
+    def same_light(self, other: LampSet) -> bool:
+        """Whether the other one gives the same light."""
+        return (
+            self.materials == other.materials
+            and np.array_equal(self.exitance, other.exitance)
+            and np.array_equal(self.rows, other.rows)
+        )
+
+    def exitance_in(self, scene: Scene) -> F64:
+        """E of the set where materials may be others than when it was made, RGB [W/m²]."""
+        alone = len(self.materials) == 1
+        return np.pi * np.array(scene.materials[self.materials[0]].emission) if alone else self.exitance
+
+
+def by_rays(scene: Scene) -> tuple[int, ...]:
+    """Materials whose light is brought by the rays that hit them."""
+    return tuple(i for i, m in enumerate(scene.materials) if m.emits and m.emission_texture is not None)
+
+
+def lamp_sets(pool: TilePool, scene: Scene, alone: Sequence[int] = ()) -> list[LampSet]:
+    """Of all other materials that emit, but those that are a set already, ``alone``."""
+    left_out = {*by_rays(scene), *alone}
+    area = np.bincount(scene.material_ids, scene.normals_areas[1], len(scene.materials))
+    power = area * np.array([sum(m.emission) for m in scene.materials])
+    emitting = [i for i in np.argsort(-power, kind="stable").tolist() if power[i] > 0 and i not in left_out]
+    more = max(ALONE - len(alone), 0)
+    groups = [(i,) for i in emitting[:more]]
+    if rest := tuple(emitting[more:]):
+        groups.append(rest)
+    return [lamp_set(pool, scene, group) for group in groups]
+
+
+def lamp_set(pool: TilePool, scene: Scene, materials: tuple[int, ...]) -> LampSet:
+    """Of the triangles of these materials."""
+    exitance = np.pi * np.array([scene.materials[i].emission for i in materials])
+    base = exitance[0] if len(materials) == 1 else np.full(3, exitance.max())
+    which = np.flatnonzero(np.isin(scene.material_ids, materials))
+    corners = pool.space.local_from_world(scene.corners[which])
+    of_material = np.zeros((len(scene.materials), 3))
+    of_material[list(materials)] = exitance
+    relative = of_material[scene.material_ids[which]] / np.maximum(base, 1e-300)
+    rows = np.zeros((len(which), 4, 4), np.float32)
+    rows[:, 0, :3] = corners[:, 0]
+    rows[:, 0, 3] = scene.normals_areas[1][which] / pool.space.scale**2
+    rows[:, 1, :3] = corners[:, 1] - corners[:, 0]
+    rows[:, 1, 3] = scene.sides[which]
+    rows[:, 2, :3] = corners[:, 2] - corners[:, 0]
+    rows[:, 3, :3] = relative
+    return LampSet(materials, base, rows, relative.mean(1))
+
+
+def chances(pool: TilePool, lamps: LampSet) -> F32:
+    """(slots, n) f32, summed up along lamps, the last 1: the probability with which the shadow rays of a tile choose each lamp.
+
+    In proportion to a bound of what it may give to any texel of the tile: its power, times the largest cosine at the lamp, over
+    the least squared distance, which is not taken as less than the lamp's own area. One row, by power, where there are too many.
+    """
+    area = lamps.rows[:, 0, 3].astype(np.float64)
+    weight = np.maximum(area * lamps.strength, 1e-300)
+    if pool.tiles * len(area) > CHANCES:
+        return _summed_up(weight[None])
+    centre, radius = _spheres(pool)
+    corner, u, v = (lamps.rows[:, row, :3].astype(np.float64) for row in range(3))
+    middle = corner + (u + v) / 3
+    normal = np.cross(u, v) / (2 * area[:, None])
+    extent = np.sqrt(np.maximum((u**2).sum(1), (v**2).sum(1)))
+    out = np.empty((pool.tiles, len(area)), np.float32)
+    step = max(1, (1 << 20) // len(area))
+    for first in range(0, pool.tiles, step):
+        part = slice(first, first + step)
+        way = centre[part, None] - middle
+        distance = np.linalg.norm(way, axis=2)
+        reach = radius[part, None] + extent
+        height = np.einsum("tlk,lk->tl", way, normal)
+        height = np.where(lamps.rows[:, 1, 3] > 0, np.abs(height), height) + reach
+        near = np.maximum(distance - reach, 0.0)
+        cosine = np.clip(height / np.maximum(distance, 1e-30), 0.0, 1.0)
+        bound = weight * cosine / np.maximum(near**2, area)
+        bound[~(bound.sum(1) > 0)] = weight  # behind all lamps: no light comes, whatever is chosen
+        out[part] = _summed_up(bound)
+    return out
+
+
+def _summed_up(bound: F64) -> F32:
+    total = np.cumsum(bound, axis=1)
+    out = np.asarray(total / total[:, -1:], np.float32)
+    out[:, -1] = 1.0
+    return out
+
+
+def _spheres(pool: TilePool) -> tuple[F64, NDArray[np.float64]]:
+    """Around the texels of each slot: centres (slots, 3) and radii, solver space."""
+    covered = pool.surfaces.face >= 0
+    at = np.where(covered[..., None], pool.space.local_from_world(pool.surfaces.position), np.nan)
+    at = at.reshape(pool.tiles, -1, 3)
+    empty = ~covered.reshape(pool.tiles, -1).any(1)
+    at[empty] = 0.0
+    low, high = np.nanmin(at, axis=1), np.nanmax(at, axis=1)
+    texel = np.sqrt(pool.surfaces.area.reshape(pool.tiles, -1).max(1)) / pool.space.scale
+    return (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2 + texel

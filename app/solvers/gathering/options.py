@@ -1,0 +1,28 @@
+"""The knobs of gathering."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.options import Options, option
+
+
+@dataclass(frozen=True)
+class GatheringOptions(Options):
+    """``smooth`` acts on what is shown, the rest on the next rays: none restarts the solution."""
+
+    noise: float = option(
+        2e-3,
+        "converged when the noise that is left, RMS over all surfaces, is so much of the mean irradiance",
+        minimum=1e-5,
+        maximum=1,
+        logarithmic=True,
+    )
+    ray_memory: int = option(
+        1024,
+        "memory for what rays hit; those beyond it are traced again in each bounce",
+        unit="MiB",
+        minimum=0,
+        maximum=65_536,
+    )
+    smooth: bool = option(True, "smooth indirect light within charts, by as much as it is noisy")

@@ -1,0 +1,311 @@
+"""Gathering finds the light of every texel along rays that are traced once [Kahl22].
+
+    H = H_direct + 1/N Σ_k B(hit_k),    B = ρH
+
+A piece of work is some rays more of each texel, what they hit kept (hits.py); shadow rays to the lamps (direct.py); the bounces
+along all that is kept (bounces.py); and the light that is shown (compose.py). Other materials cost no ray: the bounces are solved
+again along what is kept.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.gpu import Framebuffer, Gpu, ReadBack, Texture
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.quadtree import Change
+from app.lightmap.tile_pool import Moves
+from app.scene.model import Material
+from app.solvers.base import EnergyBalance, Inspection, Progress
+from app.solvers.gathering.balance import Balance
+from app.solvers.gathering.bounces import Bounces, steps_to
+from app.solvers.gathering.compose import Compose
+from app.solvers.gathering.direct import DirectLight
+from app.solvers.gathering.hits import GROUP, Hits
+from app.solvers.gathering.lamps import by_rays
+from app.solvers.gathering.options import GatheringOptions
+from app.solvers.gathering.origins import Origins
+from app.visibility.rays import RayScene
+
+BATCH = 16  # rays
+SYSTEM = 64  # rays of each texel along which bounces are solved; all of them then gather once more
+CHANGES_PER_RAY = 16  # leaves that split or merge at once: bounded work for a frame
+LOOK_AGAIN = 2  # times as many rays, when leaves did not change at the last look
+SHADOW_RAYS = 4  # from each texel to each set of lamps, for GROUP rays
+FIRST_STEPS = 2  # of the bounces, before an edit is first shown
+SOLVED = 1e-3  # of the bounces, that may be missing
+
+
+class Gathering:
+    """Gathers the light of one lightmap. Whoever makes it releases it.
+
+    issued: rays of each texel.
+    """
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: GatheringOptions) -> None:
+        self.gpu, self.lightmap, self.options = gpu, lightmap, options
+        self.rays = RayScene(gpu, lightmap.pool)
+        self.origins = Origins(gpu, lightmap)
+        self.hits = Hits(gpu, lightmap, self.rays, self.origins)
+        self.direct = DirectLight(gpu, lightmap, self.rays, self.origins)
+        self.bounces, self._compose = Bounces(gpu, lightmap), Compose(gpu, lightmap, self.origins)
+        self._balance = Balance(gpu, lightmap)
+        self._under_way: Generator[None, None, int] | None = None
+        self._judged: list[tuple[int, ReadBack]] = []
+        self._progress = Progress(0, 1.0, np.zeros(3))
+        self._edited, self._shown = False, 0
+        self._fresh: set[int] = set()  # slots whose leaves have no rays yet
+        self._look_at = 0  # rays at which leaves are looked at again
+        self._size = lightmap.size
+        if lightmap.refinement is not None:
+            lightmap.refinement.follower = self
+        self.issued = 0
+        self.reset()
+
+    # -- work ----------------------------------------------------------------------------------------------------------
+
+    def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
+        """About ``amount`` rays more of each texel, whole groups of them, in parts. Returns how many."""
+        self._finish()
+        count = -(-min(amount, BATCH) // GROUP) * GROUP
+        if self._edited:
+            self._under_way = self._follow_edit()
+        elif self._leaves_wait:
+            self._under_way = self._follow_leaves(bands)
+        else:
+            self._under_way = self._gather_more(count, bands)
+        return self._under_way
+
+    def _gather_more(self, count: int, bands: int) -> Generator[None, None, int]:
+        """So many rays more of each texel, and the light that they bring."""
+        first = self.issued
+        kept = min(count, max(self.hits.room(self.options.ray_memory) - self.hits.count, 0))
+        yield from self.hits.trace(kept, bands)
+        yield from self.direct.shoot(SHADOW_RAYS * count // GROUP)
+        self.direct.sum(self.lightmap.scene)
+        self.issued = first + count
+        if first < SYSTEM or (first & (first - 1)) == 0:
+            yield from self._solve(first == 0)
+        else:
+            yield from self.bounces.gather(self.hits, first, count, anew=False)
+        self._show(self.issued)
+        self._judged.append((self.issued, self._compose.judge()))
+        return count
+
+    @property
+    def _leaves_wait(self) -> bool:
+        """Whether leaves of quadtrees come and go, or are to be looked at."""
+        refinement = self.lightmap.refinement
+        return refinement is not None and self.issued > 0 and (self._refining or self.issued >= self._look_at)
+
+    @property
+    def _refining(self) -> bool:
+        refinement = self.lightmap.refinement
+        return refinement is not None and (bool(self._fresh) or not refinement.stable)
+
+    def _follow_leaves(self, bands: int) -> Generator[None, None, int]:
+        """Trace for fresh leaves what the others have traced, and look at all leaves once more."""
+        refinement = self.lightmap.refinement
+        assert refinement is not None
+        if self._fresh:
+            slots = np.array(sorted(self._fresh), np.int64)
+            self._fresh.clear()
+            self.origins.write(slots)
+            yield from self.hits.trace_tiles(slots)
+            yield from self.direct.shoot_tiles(slots)
+            self.direct.sum(self.lightmap.scene)
+            yield from self._solve(from_nothing=False)
+            self._show(self.issued)
+            self._judged.append((self.issued, self._compose.judge()))
+        yield from refinement.look(CHANGES_PER_RAY * BATCH, bands, self.issued)
+        if refinement.stable:
+            self._look_at = LOOK_AGAIN * self.issued
+        return 0
+
+    def _solve(self, from_nothing: bool) -> Iterator[None]:
+        """The bounces along some of the rays, then what all of them find."""
+        system = min(SYSTEM, self.issued)
+        steps = steps_to(SOLVED if from_nothing else SOLVED**0.5, self.bounces.reflected)
+        yield from self.bounces.solve(self.hits, self.direct.light, system, steps)
+        yield from self.bounces.gather(self.hits, 0, self.issued, anew=True)
+
+    def _follow_edit(self) -> Generator[None, None, int]:
+        """The light of other materials, along the rays that are there: soon, along some of them, and once no more edits come
+        along all. No ray is traced, but to lamps that were off."""
+        while self._edited:
+            self._edited = False
+            yield from self.direct.catch_up()
+            self.direct.sum(self.lightmap.scene)
+            few = min(BATCH, self.issued)
+            yield from self.bounces.solve(self.hits, self.direct.light, few, FIRST_STEPS)
+            yield from self.bounces.gather(self.hits, 0, few, anew=True)
+            self._show(few)
+            yield
+            if not self._edited:
+                yield from self._solve(from_nothing=True)
+                self._show(self.issued)
+        self._judged.append((self.issued, self._compose.judge()))
+        return 0
+
+    def _show(self, rays: int) -> None:
+        """What so many rays of each texel have gathered."""
+        self._compose.draw(self.direct.light, self.bounces.gathered, rays, smooth=self.options.smooth)
+        self._shown = rays
+
+    def _finish(self) -> None:
+        """End the work that is under way, if any; of its own parts this asks nothing."""
+        if self._under_way is not None and inspect.getgeneratorstate(self._under_way) != inspect.GEN_RUNNING:
+            for _ in self._under_way:
+                pass
+            self._under_way = None
+
+    # -- how far it is -------------------------------------------------------------------------------------------------
+
+    def poll(self, *, wait: bool = False) -> Progress:
+        """The newest progress that has arrived, a piece of work late; with ``wait`` that of the last."""
+        if wait:
+            self._finish()
+        while len(self._judged) > (0 if wait else 1):
+            done, judged = self._judged.pop(0)
+            noise = self._compose.noise(judged)
+            self._progress = Progress(done, noise, self._progress.escaped)
+        refining, refinement = self._refining, self.lightmap.refinement
+        converged = self._progress.remaining <= self.options.noise and not self._edited and not refining
+        note = None if refinement is None else refinement.note
+        return replace(self._progress, converged=converged, refining=refining, note=note)
+
+    def settle(self) -> Progress:
+        """End the work under way, and wait for the GPU."""
+        return self.poll(wait=True)
+
+    def energy(self) -> EnergyBalance:
+        """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
+        self._finish()
+        return self._balance.measure(self.hits)
+
+    # -- beginning, and other options ----------------------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Forget all light and all rays."""
+        if self._under_way is not None:
+            self._under_way.close()
+            self._under_way = None
+        for _, judged in self._judged:
+            judged.take()
+        self._judged.clear()
+        if self.lightmap.refinement is not None:
+            self.lightmap.refinement.begin_again()
+        if self._fresh:
+            self.origins.write(np.array(sorted(self._fresh), np.int64))
+            self._fresh.clear()
+        self._look_at = 0
+        self.lightmap.clear()
+        self.hits.forget()
+        self.direct.forget()
+        self.bounces.clear()
+        scene = self.lightmap.scene
+        self.bounces.set_materials(by_rays(scene))
+        self.direct.follow(scene)
+        self.issued, self._edited = 0, False
+        self._progress = Progress(0, 1.0 if scene.emits else 0.0, np.zeros(3))
+
+    def set_options(self, options: GatheringOptions) -> None:
+        """Use other knobs from the next rays on; what is shown follows at once."""
+        self._finish()
+        smooth, self.options = self.options.smooth, options
+        if self.issued and options.smooth != smooth:
+            self._show(self._shown)
+
+    def set_materials(self, materials: tuple[Material, ...]) -> None:
+        """Other albedos and emissions: the whole new solution, along the rays that are there."""
+        self.lightmap.set_materials(materials)
+        if not self.issued:
+            self.reset()
+            return
+        self.bounces.set_materials(by_rays(self.lightmap.scene))
+        self.direct.follow(self.lightmap.scene)
+        self._edited = True
+
+    # -- leaves that come and go, see app/lightmap/refinement.py -------------------------------------------------------
+
+    @property
+    def carried(self) -> list[tuple[Texture, Framebuffer]]:
+        return []
+
+    def options_changed(self) -> None:
+        pass
+
+    def leaves_changed(self, change: Change) -> None:
+        old, new = (change.parents, change.children) if change.split else (change.children, change.parents)
+        self._fresh = self._fresh - set(old.tolist()) | set(new.tolist())
+
+    def slots_will_move(self) -> None:
+        self.poll(wait=True)
+
+    def resized(self, moves: Moves) -> None:
+        now = dict(zip(moves.old.tolist(), moves.new.tolist(), strict=True))
+        self._fresh = {now.get(slot, slot) for slot in self._fresh}
+        self.origins.resized(moves)
+        self.hits.resized(self._size, moves)
+        self._size = self.lightmap.size
+        self.direct.resized(moves)
+        self.bounces.resized(moves)
+        self._compose.resized()
+        self._balance.resized()
+
+    # -- what there is to see ------------------------------------------------------------------------------------------
+
+    @property
+    def resolved(self) -> Mapping[str, Any]:
+        """Rays of each texel whose hits are kept."""
+        return {"kept_rays": self.hits.count}
+
+    def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
+        """How much is traced and kept."""
+        return Inspection(facts={"Rays traced": f"{self.traced:,}", "Kept hits": f"{self.hits.memory / 2**20:.0f} MiB"})
+
+    @property
+    def traced(self) -> int:
+        """Rays of all texels so far, to lamps as well."""
+        return self.hits.traced + self.direct.traced
+
+    def passes(self, amount: int) -> dict[str, Callable[[], None]]:
+        """Each part of a piece of work by itself, to be timed."""
+        count = -(-min(amount, BATCH) // GROUP) * GROUP
+        return {
+            "trace": lambda: _whole(self.hits.trace(count, 1)),
+            "shadow rays": lambda: _whole(self.direct.shoot(SHADOW_RAYS * count // GROUP)),
+            "bounce": lambda: _whole(self.bounces.solve(self.hits, self.direct.light, count, 1)),
+            "show": lambda: self._show(max(self.issued, GROUP)),
+        }
+
+    def warm_up(self) -> Iterator[None]:
+        """Every pass."""
+        for run in self.passes(GROUP).values():
+            run()
+            self.gpu.ctx.finish()
+            yield
+
+    def release(self) -> None:
+        if self._under_way is not None:
+            self._under_way.close()
+        for _, judged in self._judged:
+            judged.take()
+        refinement = self.lightmap.refinement
+        if refinement is not None and refinement.follower is self:
+            refinement.follower = None
+        for part in (self._balance, self._compose, self.bounces, self.direct, self.hits, self.origins, self.rays):
+            part.release()
+
+
+def _whole(parts: Iterator[None]) -> None:
+    for _ in parts:
+        pass
+
+
+__all__ = ["BATCH", "Gathering"]
