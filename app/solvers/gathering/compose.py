@@ -1,4 +1,8 @@
-"""Composing writes the light that is shown, direct and indirect, and says how noisy it is."""
+"""Composing writes the light that is shown, direct and indirect, and says how noisy it is.
+
+Indirect light is known on points, and smoothed among them by as much as it is noisy; texels that are finer, where quadtrees are,
+interpolate it. Direct light is known on every texel.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +15,21 @@ from app.solvers.gathering.origins import Origins
 
 
 class Compose:
-    """Of one lightmap. Whoever makes it releases it."""
+    """Of one lightmap, with its points. Whoever makes it releases it.
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, origins: Origins) -> None:
-        self._gpu, self._lightmap, self._origins = gpu, lightmap, origins
+    indirect: of the points [stored units], a: variance of the mean of RGB. variance: of H of the lightmap, of the mean of RGB.
+    """
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, origins: Origins, points: Lightmap, at: Origins) -> None:
+        """origins: of the lightmap's texels; at: of the points."""
+        self._gpu, self._lightmap, self._origins, self._points, self._at = gpu, lightmap, origins, points, at
         reads = lightmap.defines("MATERIAL_BITS", "TILE")
-        self._draw = {s: Pass(gpu, "solvers/gathering/compose", defines={"SMOOTH": s} | reads) for s in (True, False)}
+        self._finer = points is not lightmap
+        self._smooth = {s: Pass(gpu, "solvers/gathering/smooth", defines={"SMOOTH": s} | reads) for s in (True, False)}
+        self._compose = Pass(gpu, "solvers/gathering/compose", defines={"FINER": self._finer} | reads)
         self._judge = Pass(gpu, "solvers/gathering/noise", defines=lightmap.defines("TILE"))
+        self.indirect = gpu.texture(points.size, 4, "f4")
+        self._indirect_target = gpu.target(self.indirect)
         self._target: Framebuffer | None = None
         self._of: Texture | None = None
         self._fit()
@@ -27,19 +39,31 @@ class Compose:
         self._noise = self._gpu.texture((self._lightmap.columns, self._lightmap.rows), 4, "f4")
         self._noise_target = self._gpu.target(self._noise)
 
-    def draw(self, direct: Texture, gathered: Texture, rays: int, *, smooth: bool) -> None:
-        """Write H of the lightmap: the direct light, and what so many rays of each texel have gathered."""
+    def smooth(self, gathered: Texture, rays: int, *, smooth: bool) -> None:
+        """Bring ``indirect`` up to date with what so many rays of each point have gathered."""
+        textures, uniforms = {"t_gathered": gathered}, {"u_rays": float(max(rays, 1))}
+        if smooth:
+            textures |= {"t_origin_normal": self._at.normals} | self._points.textures("t_pages", "t_leaves")
+            uniforms |= self._places  # type: ignore[arg-type]
+        self._smooth[smooth].draw(self._indirect_target, textures=textures, uniforms=uniforms)
+
+    def draw(self, direct: Texture) -> None:
+        """Write H of the lightmap, the direct light and ``indirect``."""
         lightmap = self._lightmap
         if (irradiance := lightmap.texture("t_irradiance")) is not self._of:
             self._forget_target()
             self._target, self._of = self._gpu.target(irradiance, self.variance), irradiance
         assert self._target is not None
-        textures, uniforms = {"t_direct": direct, "t_gathered": gathered}, {"u_rays": float(max(rays, 1))}
-        if smooth:
-            own = self._origins.textures
-            textures |= {n: own[n] for n in ("t_origin", "t_origin_normal")} | lightmap.textures("t_pages", "t_leaves")
-            uniforms |= {"u_pages": (float(lightmap.columns), lightmap.pool.pages_per_texel)}  # type: ignore[dict-item]
-        self._draw[smooth].draw(self._target, textures=textures, uniforms=uniforms)
+        textures, uniforms = {"t_direct": direct, "t_indirect": self.indirect}, {}
+        if self._finer:
+            textures |= {"t_own_leaves": lightmap.texture("t_leaves"), "t_own_normal": self._origins.normals}
+            textures |= {"t_origin_normal": self._at.normals} | self._points.textures("t_pages", "t_leaves")
+            uniforms = self._places
+        self._compose.draw(self._target, textures=textures, uniforms=uniforms)
+
+    @property
+    def _places(self) -> dict[str, tuple[float, float]]:
+        return {"u_pages": (float(self._points.columns), self._points.pool.pages_per_texel)}
 
     def judge(self) -> ReadBack:
         """How noisy each tile is, on its way: see noise.frag.glsl."""
@@ -47,19 +71,11 @@ class Compose:
         self._judge.draw(self._noise_target, textures=textures)
         return ReadBack(self._gpu, self._noise_target)
 
-    def noise(self, judged: ReadBack) -> float:
-        """RMS noise over all surfaces, over the mean irradiance [-]."""
-        tiles = tile_noise(judged)
-        variance, light, area = tiles[:, :3].sum(0)
-        return float(np.sqrt(max(variance * area, 0.0)) / light) if light > 0 else 0.0
-
     def resized(self) -> None:
         """The tile pool has got another number of slots."""
-        self._gpu.release_all(self._noise_target, self._noise)
-        variance = self.variance
-        self._fit()
         self._forget_target()
-        self._gpu.release_all(variance)
+        self._gpu.release_all(self._noise_target, self._noise, self.variance)
+        self._fit()
 
     def _forget_target(self) -> None:
         if self._target is not None:
@@ -68,9 +84,11 @@ class Compose:
 
     def release(self) -> None:
         self._forget_target()
-        self._gpu.release_all(self._noise_target, self._noise, self.variance)
+        self._gpu.release_all(self._noise_target, self._noise, self.variance, self._indirect_target, self.indirect)
 
 
-def tile_noise(judged: ReadBack) -> F64:
-    """(slots, 4) as noise.frag.glsl says."""
-    return np.frombuffer(judged.take(), np.float32).reshape(-1, 4).astype(np.float64)
+def noise_of(judged: ReadBack) -> float:
+    """RMS noise over all surfaces, over the mean irradiance [-], see noise.frag.glsl."""
+    tiles: F64 = np.frombuffer(judged.take(), np.float32).reshape(-1, 4).astype(np.float64)
+    variance, light, area = tiles[:, :3].sum(0)
+    return float(np.sqrt(max(variance * area, 0.0)) / light) if light > 0 else 0.0

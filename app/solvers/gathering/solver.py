@@ -19,12 +19,12 @@ import numpy as np
 from app.gpu import Framebuffer, Gpu, ReadBack, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
-from app.lightmap.tile_pool import Moves
+from app.lightmap.tile_pool import Moves, TilePool
 from app.scene.model import Material
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.gathering.balance import Balance
 from app.solvers.gathering.bounces import Bounces, steps_to
-from app.solvers.gathering.compose import Compose
+from app.solvers.gathering.compose import Compose, noise_of
 from app.solvers.gathering.direct import DirectLight
 from app.solvers.gathering.hits import GROUP, Hits
 from app.solvers.gathering.lamps import by_rays
@@ -50,18 +50,23 @@ class Gathering:
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: GatheringOptions) -> None:
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
         self.rays = RayScene(gpu, lightmap.pool)
+        # the points between which light bounces are the texels of level 0, whatever leaves are finer
+        adaptive = lightmap.refinement is not None
+        self.points = Lightmap(gpu, TilePool(lightmap.scene, lightmap.charts)) if adaptive else lightmap
         self.origins = Origins(gpu, lightmap)
-        self.hits = Hits(gpu, lightmap, self.rays, self.origins)
+        self._at = Origins(gpu, self.points) if adaptive else self.origins
+        self.hits = Hits(gpu, self.points, self.rays, self._at)
         self.direct = DirectLight(gpu, lightmap, self.rays, self.origins)
-        self.bounces, self._compose = Bounces(gpu, lightmap), Compose(gpu, lightmap, self.origins)
-        self._balance = Balance(gpu, lightmap)
+        self.at_points = DirectLight(gpu, self.points, self.rays, self._at) if adaptive else self.direct
+        self.bounces = Bounces(gpu, self.points)
+        self._compose = Compose(gpu, lightmap, self.origins, self.points, self._at)
+        self._balance = Balance(gpu, self.points)
         self._under_way: Generator[None, None, int] | None = None
         self._judged: list[tuple[int, ReadBack]] = []
         self._progress = Progress(0, 1.0, np.zeros(3))
         self._edited, self._shown = False, 0
         self._fresh: set[int] = set()  # slots whose leaves have no rays yet
         self._look_at = 0  # rays at which leaves are looked at again
-        self._size = lightmap.size
         if lightmap.refinement is not None:
             lightmap.refinement.follower = self
         self.issued = 0
@@ -86,8 +91,9 @@ class Gathering:
         first = self.issued
         kept = min(count, max(self.hits.room(self.options.ray_memory) - self.hits.count, 0))
         yield from self.hits.trace(kept, bands)
-        yield from self.direct.shoot(SHADOW_RAYS * count // GROUP)
-        self.direct.sum(self.lightmap.scene)
+        for direct in self._directs:
+            yield from direct.shoot(SHADOW_RAYS * count // GROUP)
+            direct.sum(self.lightmap.scene)
         self.issued = first + count
         if first < SYSTEM or (first & (first - 1)) == 0:
             yield from self._solve(first == 0)
@@ -109,18 +115,16 @@ class Gathering:
         return refinement is not None and (bool(self._fresh) or not refinement.stable)
 
     def _follow_leaves(self, bands: int) -> Generator[None, None, int]:
-        """Trace for fresh leaves what the others have traced, and look at all leaves once more."""
+        """Send for fresh leaves the shadow rays that the others have sent, and look at all leaves once more."""
         refinement = self.lightmap.refinement
         assert refinement is not None
         if self._fresh:
             slots = np.array(sorted(self._fresh), np.int64)
             self._fresh.clear()
             self.origins.write(slots)
-            yield from self.hits.trace_tiles(slots)
             yield from self.direct.shoot_tiles(slots)
             self.direct.sum(self.lightmap.scene)
-            yield from self._solve(from_nothing=False)
-            self._show(self.issued)
+            self._compose.draw(self.direct.light)
             self._judged.append((self.issued, self._compose.judge()))
         yield from refinement.look(CHANGES_PER_RAY * BATCH, bands, self.issued)
         if refinement.stable:
@@ -131,7 +135,7 @@ class Gathering:
         """The bounces along some of the rays, then what all of them find."""
         system = min(SYSTEM, self.issued)
         steps = steps_to(SOLVED if from_nothing else SOLVED**0.5, self.bounces.reflected)
-        yield from self.bounces.solve(self.hits, self.direct.light, system, steps)
+        yield from self.bounces.solve(self.hits, self.at_points.light, system, steps)
         yield from self.bounces.gather(self.hits, 0, self.issued, anew=True)
 
     def _follow_edit(self) -> Generator[None, None, int]:
@@ -139,10 +143,11 @@ class Gathering:
         along all. No ray is traced, but to lamps that were off."""
         while self._edited:
             self._edited = False
-            yield from self.direct.catch_up()
-            self.direct.sum(self.lightmap.scene)
+            for direct in self._directs:
+                yield from direct.catch_up()
+                direct.sum(self.lightmap.scene)
             few = min(BATCH, self.issued)
-            yield from self.bounces.solve(self.hits, self.direct.light, few, FIRST_STEPS)
+            yield from self.bounces.solve(self.hits, self.at_points.light, few, FIRST_STEPS)
             yield from self.bounces.gather(self.hits, 0, few, anew=True)
             self._show(few)
             yield
@@ -154,8 +159,14 @@ class Gathering:
 
     def _show(self, rays: int) -> None:
         """What so many rays of each texel have gathered."""
-        self._compose.draw(self.direct.light, self.bounces.gathered, rays, smooth=self.options.smooth)
+        self._compose.smooth(self.bounces.gathered, rays, smooth=self.options.smooth)
+        self._compose.draw(self.direct.light)
         self._shown = rays
+
+    @property
+    def _directs(self) -> tuple[DirectLight, ...]:
+        """On the points, and on texels where they are others."""
+        return (self.direct,) if self.at_points is self.direct else (self.at_points, self.direct)
 
     def _finish(self) -> None:
         """End the work that is under way, if any; of its own parts this asks nothing."""
@@ -172,7 +183,7 @@ class Gathering:
             self._finish()
         while len(self._judged) > (0 if wait else 1):
             done, judged = self._judged.pop(0)
-            noise = self._compose.noise(judged)
+            noise = noise_of(judged)
             self._progress = Progress(done, noise, self._progress.escaped)
         refining, refinement = self._refining, self.lightmap.refinement
         converged = self._progress.remaining <= self.options.noise and not self._edited and not refining
@@ -186,7 +197,7 @@ class Gathering:
     def energy(self) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
         self._finish()
-        return self._balance.measure(self.hits)
+        return self._balance.measure(self.hits, self.at_points.light, self._compose.indirect)
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
 
@@ -206,11 +217,11 @@ class Gathering:
         self._look_at = 0
         self.lightmap.clear()
         self.hits.forget()
-        self.direct.forget()
         self.bounces.clear()
+        for direct in self._directs:
+            direct.forget()
+        self._set_materials()
         scene = self.lightmap.scene
-        self.bounces.set_materials(by_rays(scene))
-        self.direct.follow(scene)
         self.issued, self._edited = 0, False
         self._progress = Progress(0, 1.0 if scene.emits else 0.0, np.zeros(3))
 
@@ -227,9 +238,18 @@ class Gathering:
         if not self.issued:
             self.reset()
             return
-        self.bounces.set_materials(by_rays(self.lightmap.scene))
-        self.direct.follow(self.lightmap.scene)
+        self._set_materials()
         self._edited = True
+
+    def _set_materials(self) -> None:
+        """Let points and lamps follow the lightmap's materials."""
+        scene = self.lightmap.scene
+        if self.points is not self.lightmap:
+            self.points.set_materials(scene.materials)
+            self.points.unit = self.lightmap.unit
+        self.bounces.set_materials(by_rays(scene))
+        for direct in self._directs:
+            direct.follow(scene)
 
     # -- leaves that come and go, see app/lightmap/refinement.py -------------------------------------------------------
 
@@ -251,12 +271,8 @@ class Gathering:
         now = dict(zip(moves.old.tolist(), moves.new.tolist(), strict=True))
         self._fresh = {now.get(slot, slot) for slot in self._fresh}
         self.origins.resized(moves)
-        self.hits.resized(self._size, moves)
-        self._size = self.lightmap.size
         self.direct.resized(moves)
-        self.bounces.resized(moves)
         self._compose.resized()
-        self._balance.resized()
 
     # -- what there is to see ------------------------------------------------------------------------------------------
 
@@ -272,15 +288,15 @@ class Gathering:
     @property
     def traced(self) -> int:
         """Rays of all texels so far, to lamps as well."""
-        return self.hits.traced + self.direct.traced
+        return self.hits.traced + sum(direct.traced for direct in self._directs)
 
     def passes(self, amount: int) -> dict[str, Callable[[], None]]:
         """Each part of a piece of work by itself, to be timed."""
         count = -(-min(amount, BATCH) // GROUP) * GROUP
         return {
             "trace": lambda: _whole(self.hits.trace(count, 1)),
-            "shadow rays": lambda: _whole(self.direct.shoot(SHADOW_RAYS * count // GROUP)),
-            "bounce": lambda: _whole(self.bounces.solve(self.hits, self.direct.light, count, 1)),
+            "shadow rays": lambda: _whole(self.at_points.shoot(SHADOW_RAYS * count // GROUP)),
+            "bounce": lambda: _whole(self.bounces.solve(self.hits, self.at_points.light, count, 1)),
             "show": lambda: self._show(max(self.issued, GROUP)),
         }
 
@@ -299,8 +315,20 @@ class Gathering:
         refinement = self.lightmap.refinement
         if refinement is not None and refinement.follower is self:
             refinement.follower = None
-        for part in (self._balance, self._compose, self.bounces, self.direct, self.hits, self.origins, self.rays):
+        parts: tuple[Any, ...] = (
+            self._balance,
+            self._compose,
+            self.bounces,
+            *self._directs,
+            self.hits,
+            self.origins,
+            self.rays,
+        )
+        for part in parts:
             part.release()
+        if self.points is not self.lightmap:
+            self._at.release()
+            self.points.release()
 
 
 def _whole(parts: Iterator[None]) -> None:

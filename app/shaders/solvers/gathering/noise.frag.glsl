@@ -1,4 +1,4 @@
-// What is left to do in a tile, one texel per slot: (Σ variance A, Σ H A, Σ A, Σ variance of the indirect light A), H the mean of RGB.
+// What is left to do in a tile, one texel per slot: (Σ variance A, Σ H A, Σ A), H the mean of RGB.
 #include "common/tile.glsl"
 
 uniform sampler2D t_position_area;

@@ -1,4 +1,5 @@
-// The k-th ray of a texel, and what it hits [Kahl22]. It is the same whenever it is traced.
+// The k-th ray of a point, and what it hits [Kahl22]. It is the same whenever it is traced.
+#include "common/texel_at.glsl"
 #include "solvers/gathering/hit.glsl"
 #include "solvers/gathering/origin.glsl"
 #include "visibility/rays.glsl"
@@ -10,5 +11,6 @@ uint trace(Origin o, int k) {
     Hit hit = closest_hit(start_of(o, share.zw), cosine_direction(o.normal, share.xy), 0.0, 2.0 * FAR);
     if (hit.slot < 0) return no_texel(ESCAPED);
     vec2 place = place_of(hit);
-    return place.x < 0.0 ? no_texel(BLACK) : hit_of(ivec2(place));
+    ivec2 px = place.x < 0.0 ? ivec2(-1) : texel_px_at(place);
+    return px.y < 0 ? no_texel(BLACK) : hit_of(px);
 }
