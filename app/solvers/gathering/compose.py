@@ -6,12 +6,16 @@ interpolate it. Direct light is known on every texel.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from app.gpu import Framebuffer, Gpu, Pass, ReadBack, Texture
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
 from app.solvers.gathering.origins import Origins
+
+RADIUS = 4  # of the window that indirect light is smoothed over, in points
 
 
 class Compose:
@@ -25,7 +29,12 @@ class Compose:
         self._gpu, self._lightmap, self._origins, self._points, self._at = gpu, lightmap, origins, points, at
         reads = lightmap.defines("MATERIAL_BITS", "TILE")
         self._finer = points is not lightmap
-        self._smooth = {s: Pass(gpu, "solvers/gathering/smooth", defines={"SMOOTH": s} | reads) for s in (True, False)}
+        self._aim = Pass(gpu, "solvers/gathering/pilot", defines=reads)
+        self._smooth = {
+            radius: Pass(gpu, "solvers/gathering/smooth", defines={"RADIUS": radius} | reads) for radius in (RADIUS, 0)
+        }
+        self._pilot = gpu.texture(points.size, 2, "f4")
+        self._pilot_target = gpu.target(self._pilot)
         self._compose = Pass(gpu, "solvers/gathering/compose", defines={"FINER": self._finer} | reads)
         self._judge = Pass(gpu, "solvers/gathering/noise", defines=lightmap.defines("TILE"))
         self.indirect = gpu.texture(points.size, 4, "f4")
@@ -41,11 +50,12 @@ class Compose:
 
     def smooth(self, gathered: Texture, rays: int, *, smooth: bool) -> None:
         """Bring ``indirect`` up to date with what so many rays of each point have gathered."""
-        textures, uniforms = {"t_gathered": gathered}, {"u_rays": float(max(rays, 1))}
-        if smooth:
-            textures |= {"t_origin_normal": self._at.normals} | self._points.textures("t_pages", "t_leaves")
-            uniforms |= self._places  # type: ignore[arg-type]
-        self._smooth[smooth].draw(self._indirect_target, textures=textures, uniforms=uniforms)
+        textures = {"t_gathered": gathered, "t_origin_normal": self._at.normals}
+        textures |= self._points.textures("t_pages", "t_leaves")
+        uniforms = {"u_rays": float(max(rays, 1))} | self._places
+        self._aim.draw(self._pilot_target, textures=textures, uniforms=uniforms)
+        how = self._smooth[RADIUS if smooth else 0]
+        how.draw(self._indirect_target, textures=textures | {"t_pilot": self._pilot}, uniforms=uniforms)
 
     def draw(self, direct: Texture) -> None:
         """Write H of the lightmap, the direct light and ``indirect``."""
@@ -62,7 +72,7 @@ class Compose:
         self._compose.draw(self._target, textures=textures, uniforms=uniforms)
 
     @property
-    def _places(self) -> dict[str, tuple[float, float]]:
+    def _places(self) -> dict[str, Any]:
         return {"u_pages": (float(self._points.columns), self._points.pool.pages_per_texel)}
 
     def judge(self) -> ReadBack:
@@ -85,6 +95,7 @@ class Compose:
     def release(self) -> None:
         self._forget_target()
         self._gpu.release_all(self._noise_target, self._noise, self.variance, self._indirect_target, self.indirect)
+        self._gpu.release_all(self._pilot_target, self._pilot)
 
 
 def noise_of(judged: ReadBack) -> float:
