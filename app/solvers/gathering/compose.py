@@ -75,9 +75,10 @@ class Compose:
     def _places(self) -> dict[str, Any]:
         return {"u_pages": (float(self._points.columns), self._points.pool.pages_per_texel)}
 
-    def judge(self) -> ReadBack:
+    def judge(self, direct: Texture) -> ReadBack:
         """How noisy each tile is, on its way: see noise.frag.glsl."""
-        textures = self._lightmap.textures("t_position_area", "t_irradiance") | {"t_variance": self.variance}
+        textures = self._lightmap.textures("t_position_area", "t_irradiance")
+        textures |= {"t_variance": self.variance, "t_direct": direct}
         self._judge.draw(self._noise_target, textures=textures)
         return ReadBack(self._gpu, self._noise_target)
 
@@ -98,8 +99,10 @@ class Compose:
         self._gpu.release_all(self._pilot_target, self._pilot)
 
 
-def noise_of(judged: ReadBack) -> float:
-    """RMS noise over all surfaces, over the mean irradiance [-], see noise.frag.glsl."""
+def noise_of(judged: ReadBack) -> tuple[float, float]:
+    """RMS noise over all surfaces, over the mean irradiance [-], and that of direct light alone, see noise.frag.glsl."""
     tiles: F64 = np.frombuffer(judged.take(), np.float32).reshape(-1, 4).astype(np.float64)
-    variance, light, area = tiles[:, :3].sum(0)
-    return float(np.sqrt(max(variance * area, 0.0)) / light) if light > 0 else 0.0
+    both, light, area, direct = tiles.sum(0)
+    if light <= 0:
+        return 0.0, 0.0
+    return float(np.sqrt(max(both * area, 0.0)) / light), float(np.sqrt(max(direct * area, 0.0)) / light)

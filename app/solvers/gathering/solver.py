@@ -25,7 +25,7 @@ from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.gathering.balance import Balance
 from app.solvers.gathering.bounces import Bounces, steps_to
 from app.solvers.gathering.compose import Compose, noise_of
-from app.solvers.gathering.direct import DirectLight
+from app.solvers.gathering.direct import PASS, DirectLight
 from app.solvers.gathering.hits import GROUP, Hits
 from app.solvers.gathering.lamps import by_rays
 from app.solvers.gathering.options import GatheringOptions
@@ -33,12 +33,15 @@ from app.solvers.gathering.origins import Origins
 from app.visibility.rays import RayScene
 
 BATCH = 16  # rays
-SYSTEM = 64  # rays of each texel along which bounces are solved; all of them then gather once more
+SYSTEM = 32  # rays of each texel along which bounces are solved; all of them then gather once more
 CHANGES_PER_RAY = 16  # leaves that split or merge at once: bounded work for a frame
 LOOK_AGAIN = 2  # times as many rays, when leaves did not change at the last look
 SHADOW_RAYS = 4  # from each texel to each set of lamps, for GROUP rays
 FIRST_STEPS = 2  # of the bounces, before an edit is first shown
+SHADOW_COST = 0.5  # of a shadow ray, beside a ray: it ends at the first hit
+MOST_SHADOW_RAYS = 4  # to each set, for a ray
 SOLVED = 1e-3  # of the bounces, that may be missing
+ALIKE = 3e-2  # of what solutions along other rays differ by, that may be missing
 
 
 class Gathering:
@@ -65,6 +68,7 @@ class Gathering:
         self._judged: list[tuple[int, ReadBack]] = []
         self._progress = Progress(0, 1.0, np.zeros(3))
         self._edited, self._shown = False, 0
+        self._noise = 1.0, 0.0
         self._fresh: set[int] = set()  # slots whose leaves have no rays yet
         self._look_at = 0  # rays at which leaves are looked at again
         if lightmap.refinement is not None:
@@ -92,7 +96,7 @@ class Gathering:
         kept = min(count, max(self.hits.room(self.options.ray_memory) - self.hits.count, 0))
         yield from self.hits.trace(kept, bands)
         for direct in self._directs:
-            yield from direct.shoot(SHADOW_RAYS * count // GROUP)
+            yield from direct.shoot(self._shadow_rays(count))
             direct.sum(self.lightmap.scene)
         self.issued = first + count
         if first < SYSTEM or (first & (first - 1)) == 0:
@@ -100,7 +104,7 @@ class Gathering:
         else:
             yield from self.bounces.gather(self.hits, first, count, anew=False)
         self._show(self.issued)
-        self._judged.append((self.issued, self._compose.judge()))
+        self._judged.append((self.issued, self._compose.judge(self.direct.light)))
         return count
 
     @property
@@ -125,18 +129,36 @@ class Gathering:
             yield from self.direct.shoot_tiles(slots)
             self.direct.sum(self.lightmap.scene)
             self._compose.draw(self.direct.light)
-            self._judged.append((self.issued, self._compose.judge()))
+            self._judged.append((self.issued, self._compose.judge(self.direct.light)))
         yield from refinement.look(CHANGES_PER_RAY * BATCH, bands, self.issued)
         if refinement.stable:
             self._look_at = LOOK_AGAIN * self.issued
         return 0
 
     def _solve(self, from_nothing: bool) -> Iterator[None]:
-        """The bounces along some of the rays, then what all of them find."""
-        system = min(SYSTEM, self.issued)
-        steps = steps_to(SOLVED if from_nothing else SOLVED**0.5, self.bounces.reflected)
-        yield from self.bounces.solve(self.hits, self.at_points.light, system, steps)
+        """The bounces along a few of the rays, then along some, then what all of them find."""
+        few, some = min(BATCH, self.issued), min(SYSTEM, self.issued)
+        if from_nothing:
+            yield from self.bounces.solve(
+                self.hits, self.at_points.light, few, steps_to(SOLVED, self.bounces.reflected)
+            )
+        if some > few or not from_nothing:
+            yield from self.bounces.solve(
+                self.hits, self.at_points.light, some, steps_to(ALIKE, self.bounces.reflected)
+            )
         yield from self.bounces.gather(self.hits, 0, self.issued, anew=True)
+
+    def _shadow_rays(self, count: int) -> int:
+        """How many shadow rays go with so many rays more: as many as make the whole the least noisy for its cost. Of variances
+        D / d and I / n and a cost c of each shadow ray, those of all sets, beside a ray, that is d / n = √(D / (I c))."""
+        both, direct = self._noise
+        indirect = max(both**2 - direct**2, 0.0)
+        if not self.direct.count or not indirect > 0:
+            return SHADOW_RAYS * count // GROUP
+        D, I = direct**2 * self.direct.count, indirect * self.issued  # noqa: E741
+        ratio = np.sqrt(D / (I * SHADOW_COST * len(self.direct.sets)))
+        wanted = ratio * (self.issued + count) - self.direct.count
+        return int(np.clip(wanted, PASS, MOST_SHADOW_RAYS * count))
 
     def _follow_edit(self) -> Generator[None, None, int]:
         """The light of other materials, along the rays that are there: soon, along some of them, and once no more edits come
@@ -154,7 +176,7 @@ class Gathering:
             if not self._edited:
                 yield from self._solve(from_nothing=True)
                 self._show(self.issued)
-        self._judged.append((self.issued, self._compose.judge()))
+        self._judged.append((self.issued, self._compose.judge(self.direct.light)))
         return 0
 
     def _show(self, rays: int) -> None:
@@ -183,8 +205,8 @@ class Gathering:
             self._finish()
         while len(self._judged) > (0 if wait else 1):
             done, judged = self._judged.pop(0)
-            noise = noise_of(judged)
-            self._progress = Progress(done, noise, self._progress.escaped)
+            self._noise = noise_of(judged)
+            self._progress = Progress(done, self._noise[0], self._progress.escaped)
         refining, refinement = self._refining, self.lightmap.refinement
         converged = self._progress.remaining <= self.options.noise and not self._edited and not refining
         note = None if refinement is None else refinement.note
@@ -222,7 +244,7 @@ class Gathering:
             direct.forget()
         self._set_materials()
         scene = self.lightmap.scene
-        self.issued, self._edited = 0, False
+        self.issued, self._edited, self._noise = 0, False, (1.0, 0.0)
         self._progress = Progress(0, 1.0 if scene.emits else 0.0, np.zeros(3))
 
     def set_options(self, options: GatheringOptions) -> None:
