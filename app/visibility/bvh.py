@@ -30,9 +30,8 @@ LEAF = 4  # triangles, at most
 STEP = 1.0  # cost of a node, in triangles
 DEEPEST = 28  # levels of inner nodes, where halving allows it: a ray's stack holds as many
 NOWHERE = 1e30  # along each axis
-MARGIN = (
-    2.0**-24
-)  # of the largest coordinate: corners are rounded to it, and rays along a face of a box are inside of it
+# Of the largest coordinate: corners are rounded to it on the GPU, and what runs along a side of a box is inside of it
+MARGIN = 2.0**-24
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from app.lightmap.tile_pool import TilePool
 from app.scene import shapes
 from app.scene.load import load_scene
 from app.scene.model import F64
+from app.visibility.bvh import build_bvh
 from app.visibility.rays import corners_of
 
 ULP = 2.0**-24  # of a float32 near 1
@@ -125,7 +126,8 @@ def test_rays_along_the_axes_in_the_planes_of_edges_and_walls(gpu: Gpu) -> None:
     positions, triangles = cube(8)
     pool = bare_pool(positions, triangles)
     lines = np.unique(corners_of(pool))
-    lines = np.concatenate([lines, (lines[1:] + lines[:-1]) / 2, [0.0, -0.0]])
+    sides = build_bvh(corners_of(pool)).nodes[:, [1, 3], :3]  # upper ones of boxes
+    lines = np.concatenate([lines, (lines[1:] + lines[:-1]) / 2, np.unique(sides[sides < lines[-1]]), [0.0, -0.0]])
     grid = np.stack(np.meshgrid(lines, lines, [0.0, -0.0, lines[3]], indexing="ij"), -1).reshape(-1, 3)
     for axis in range(3):
         origins = np.roll(grid, axis + 1, axis=1)  # the third coordinate is along the ray
