@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from app.scene import shapes
 from app.scene.load import load_scene
 from app.scene.model import F64
 from app.visibility.bvh import build_bvh
+from app.visibility.bvh_table import node_table
 from app.visibility.rays import corners_of
 
 ULP = 2.0**-24  # of a float32 near 1
@@ -26,7 +29,7 @@ def soup(rng: np.random.Generator, count: int) -> F64:
     return rng.uniform(-1, 1, (count, 1, 3)) + size * rng.normal(size=(count, 3, 3))
 
 
-def pool_of(corners: F64) -> object:
+def pool_of(corners: F64) -> Any:
     return bare_pool(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
 
 
@@ -40,11 +43,19 @@ def rounding(corners: F64, directions: F64, distance: F64) -> F64:
     return np.asarray(ROUNDINGS * ULP * reach * (1 + longest * longest / seen))
 
 
+@pytest.mark.parametrize("plain", [0.0, 1e4])
 @pytest.mark.parametrize("count", [4096, pytest.param(1 << 20, marks=pytest.mark.long)])
-def test_rays_meet_what_they_meet_in_double_precision(gpu: Gpu, rng: np.random.Generator, count: int) -> None:
-    pool = pool_of(soup(rng, 200))
+def test_rays_meet_what_they_meet_in_double_precision(
+    gpu: Gpu, rng: np.random.Generator, count: int, plain: float
+) -> None:
+    """plain: size of a triangle under all others, beside which these are small."""
+    triangles = soup(rng, 200)
+    triangles[0] = np.array([[-1, -1, -1], [1, -1, -1], [0, 1, -1]]) * [plain or 1, plain or 1, 2]
+    pool = pool_of(triangles)
     corners = corners_of(pool)
-    origins = rng.uniform(-0.7, 0.7, (count, 3)).astype(np.float32).astype(np.float64)
+    assert node_table(build_bvh(corners))[1] == (plain == 0.0), "whole cells do not fit the boxes beside a plain"
+    origins = rng.uniform(-0.7, 0.7, (count, 3)) / pool.space.scale * np.sqrt(3)
+    origins = (origins - pool.space.centre / pool.space.scale).astype(np.float32).astype(np.float64)
     directions = unit(rng, count).astype(np.float32).astype(np.float64)
     with batch(gpu, pool, origins, directions) as rays:
         hits = rays.closest()
@@ -187,7 +198,8 @@ def test_a_thin_wall_is_met_on_the_near_side(gpu: Gpu, rng: np.random.Generator)
     """1e-5 of the scene's radius thick."""
     thick = 1e-5
     quad = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    near, far = quad + [0, 0, thick / 2], quad[::-1] - [0, 0, thick / 2]
+    half = np.array([0, 0, thick / 2])
+    near, far = quad + half, quad[::-1] - half
     walls = np.concatenate([sheet[[[0, 1, 2], [0, 2, 3]]] for sheet in (near, far)])
     walls /= np.sqrt(2)  # radius 1
     pool = pool_of(walls)
