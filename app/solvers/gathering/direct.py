@@ -83,7 +83,6 @@ class DirectLight:
         unoccluded = gpu.texture(size, 1, "f4") if lamps.closed_form else None
         self._streams += 1
         self.sets.append(Lit(lamps, table, chance, seen, target, unoccluded, STREAM + self._streams))
-        self._look_unoccluded(self.sets[-1], self._everywhere)
 
     def _look_unoccluded(self, lit: Lit, rects: F32) -> None:
         """Σ F of a set with a closed form, in these rectangles."""
@@ -135,6 +134,8 @@ class DirectLight:
 
     def _shoot_at(self, lit: Lit, count: int) -> None:
         """One pass of shadow rays to a set."""
+        if not lit.count:
+            self._look_unoccluded(lit, self._everywhere)
         self._trace(lit, self._everywhere, lit.count, count, "add")
         lit.count += count
         self.traced += count * self._lightmap.texel_count

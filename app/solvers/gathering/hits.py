@@ -20,7 +20,7 @@ from app.scene.model import F32
 from app.solvers.gathering.origins import Origins
 from app.visibility.rays import RayScene
 
-GROUP = 8  # rays whose mean is one sample of the noise, see gather.frag.glsl
+GROUP = 4  # rays whose mean is one sample of the noise, see gather.frag.glsl
 PAGES = 4  # along the edge of a bank, where textures may be so large
 BYTES = 4  # for each hit
 

@@ -32,11 +32,11 @@ from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.origins import Origins
 from app.visibility.rays import RayScene
 
-BATCH = 16  # rays
+BATCH, FIRST = 16, 8  # rays of each texel at once, and at first
 SYSTEM = 32  # rays of each texel along which bounces are solved; all of them then gather once more
 CHANGES_PER_RAY = 16  # leaves that split or merge at once: bounded work for a frame
 LOOK_AGAIN = 2  # times as many rays, when leaves did not change at the last look
-SHADOW_RAYS = 4  # from each texel to each set of lamps, for GROUP rays
+SHADOW_RAYS = 4  # from each texel to each set of lamps, for FIRST rays
 FIRST_STEPS = 2  # of the bounces, before an edit is first shown
 SHADOW_COST = 0.5  # of a shadow ray, beside a ray: it ends at the first hit
 MOST_SHADOW_RAYS = 4  # to each set, for a ray
@@ -81,7 +81,7 @@ class Gathering:
     def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
         """About ``amount`` rays more of each texel, whole groups of them, in parts. Returns how many."""
         self._finish()
-        count = -(-min(amount, BATCH) // GROUP) * GROUP
+        count = -(-min(amount, BATCH if self.issued else FIRST) // GROUP) * GROUP
         if self._edited:
             self._under_way = self._follow_edit()
         elif self._leaves_wait:
@@ -154,7 +154,7 @@ class Gathering:
         both, direct = self._noise
         indirect = max(both**2 - direct**2, 0.0)
         if not self.direct.count or not indirect > 0:
-            return SHADOW_RAYS * count // GROUP
+            return SHADOW_RAYS * count // FIRST
         D, I = direct**2 * self.direct.count, indirect * self.issued  # noqa: E741
         ratio = np.sqrt(D / (I * SHADOW_COST * len(self.direct.sets)))
         wanted = ratio * (self.issued + count) - self.direct.count
@@ -317,7 +317,7 @@ class Gathering:
         count = -(-min(amount, BATCH) // GROUP) * GROUP
         return {
             "trace": lambda: _whole(self.hits.trace(count, 1)),
-            "shadow rays": lambda: _whole(self.at_points.shoot(SHADOW_RAYS * count // GROUP)),
+            "shadow rays": lambda: _whole(self.at_points.shoot(SHADOW_RAYS)),
             "bounce": lambda: _whole(self.bounces.solve(self.hits, self.at_points.light, count, 1)),
             "show": lambda: self._show(max(self.issued, GROUP)),
         }

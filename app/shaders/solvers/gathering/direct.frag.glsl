@@ -10,7 +10,7 @@
 #include "solvers/gathering/origin.glsl"
 #include "visibility/rays.glsl"
 
-uniform sampler2D t_chances;  // of each lamp in each tile, summed up
+uniform sampler2D t_chances;  // of each lamp in each tile, or the same in all, summed up
 uniform ivec2 u_rays;         // the first, and how many
 uniform int u_stream;         // of random numbers
 
@@ -35,7 +35,7 @@ void main() {
     out_direct = vec4(0.0);
     if (!o.there) return;
     ivec2 slot = px / TILE;
-    int tile = slot.y * textureSize(t_leaves, 0).x + slot.x;
+    int tile = min(slot.y * textureSize(t_leaves, 0).x + slot.x, textureSize(t_chances, 0).y - 1);
     float all = 0.0;
     vec3 seen = vec3(0.0);
     for (int k = u_rays.x; k < u_rays.x + u_rays.y; ++k) {

@@ -11,7 +11,7 @@ uniform ivec3 u_bank;  // size of a page [texels], pages side by side
 uniform sampler2D t_outgoing;
 uniform ivec2 u_rays;  // the first, and how many
 
-const int GROUP = 8;  // rays
+const int GROUP = 4;  // rays
 
 layout(location = 0) out vec4 out_light;  // a: Σ over groups (Σ mean of RGB)²
 

@@ -8,7 +8,7 @@ uniform float u_rays;
 
 layout(location = 0) out vec2 out_pilot;  // of the mean of RGB
 
-const float GROUP = 8.0;  // rays, see gather.frag.glsl
+const float GROUP = 4.0;  // rays, see gather.frag.glsl
 
 void main() {
     Window w = window_at(ivec2(gl_FragCoord.xy));

@@ -1,9 +1,12 @@
 // Σ_j F_ij over the lamps of a set, as if nothing stood between: Lambert's closed form [Lambert1760; Baum89], the mean over 2×2 places
-// of the texel.
+// of the texel where that is near.
 #include "solvers/gathering/lamp.glsl"
 #include "solvers/gathering/origin.glsl"
 
 layout(location = 0) out float out_unoccluded;
+
+// (r / texel)² from where on the light changes so little in a texel that its middle tells: F ~ 1/r², so by (texel / r)² / 4
+const float FAR_TEXELS = 100.0;
 
 float edge(vec3 a, vec3 b, vec3 normal) {
     vec3 axis = cross(a, b);
@@ -35,12 +38,14 @@ void main() {
     Origin o = load_origin(ivec2(gl_FragCoord.xy));
     out_unoccluded = 0.0;
     if (!o.there) return;
-    int places = o.square ? 4 : 1;
+    float texel2 = max(dot(o.u, o.u), dot(o.v, o.v));
     for (int nth = 0; nth < lamp_count(); ++nth) {
         Lamp lamp = load_lamp(nth);
-        vec3 facing = cross(lamp.u, lamp.v);
+        vec3 facing = cross(lamp.u, lamp.v), middle = lamp.corner + (lamp.u + lamp.v) / 3.0 - o.position;
+        float reach2 = max(dot(lamp.u, lamp.u), dot(lamp.v, lamp.v));
+        int places = dot(middle, middle) > reach2 + FAR_TEXELS * texel2 ? 1 : 4;
         for (int k = 0; k < places; ++k) {
-            vec3 a = lamp.corner - start_of(o, o.square ? vec2(k & 1, k >> 1) * 0.5 + 0.25 : vec2(0.5));
+            vec3 a = lamp.corner - start_of(o, places == 4 ? vec2(k & 1, k >> 1) * 0.5 + 0.25 : vec2(0.5));
             float height = -dot(a, facing) / (2.0 * lamp.area);
             if (height <= COPLANAR && !(lamp.two_sided && height < -COPLANAR)) continue;
             // seen from its front its corners go clockwise about the normal of who looks
