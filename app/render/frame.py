@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from app.gpu import Framebuffer, Gpu, Pass, Texture
@@ -53,6 +55,7 @@ class FrameRenderer:
         display: DisplayOptions,
         *,
         reference: Reference | None = None,
+        offered: Mapping[str, Texture] | None = None,
         shooter: Rect | None = None,
         scale: Scale | None = None,
         samples: int = 1,
@@ -60,7 +63,8 @@ class FrameRenderer:
     ) -> None:
         """Draw into the lower left ``size`` (width, height) [px] of ``target``.
 
-        reference: for ``display.show`` and for layers that compare; None where there is none.
+        reference: for ``display.show`` and for layers that compare; None where there is none. offered: what layers need that a
+        solver must offer, see app/render/layers.py.
         shooter: the patch to mark for ``display.last_shooter``: (u, v, u, v) in atlas texels. scale: of the false colour; left
         out, it is found from the light, which waits for the GPU.
         samples: per pixel along each axis. whole: show all light as it is now; False bounds the work of a frame, a large
@@ -68,7 +72,7 @@ class FrameRenderer:
         """
         kind = measured(display)
         layer = LAYER.get(kind, display.layer)
-        scale = None if kind == "off" else scale or false_colour_scale(display, lightmap)
+        scale = None if kind == "off" else scale or false_colour_scale(display, lightmap, offered)
         clip_from_local = view.clip_from_local(size[0] / size[1], lightmap.space)
         surfaces = self._surfaces_of(lightmap, display.interpolation)
         picture = self._picture_for(target, size, samples)
@@ -82,6 +86,7 @@ class FrameRenderer:
             display,
             scale=scale,
             reference=reference,
+            offered=offered,
             shooter=shooter,
             whole=whole,
         )

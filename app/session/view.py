@@ -5,7 +5,7 @@ A view has a session, never the reverse: a session that bakes or measures has no
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -13,9 +13,9 @@ from app.gpu import Framebuffer, Texture
 from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
 from app.render.exposure import exposure_of
-from app.render.false_colour import Scale
+from app.render.false_colour import Scale, false_colour_scale
 from app.render.frame import FrameRenderer
-from app.render.layers import LAYER_SHADERS
+from app.render.layers import LAYER_SHADERS, layers_with
 from app.render.options import DisplayOptions
 from app.render.pick import with_texel
 from app.render.resolve import Reference
@@ -77,11 +77,21 @@ class View:
             self.camera,
             self.shown,
             reference=self._reference(whole=whole),
+            offered=self._offered,
             shooter=self._last_shooter,
             scale=scale,
             samples=samples,
             whole=whole,
         )
+
+    def false_colour_scale(self) -> Scale:
+        """Of what is shown, which is in false colour. Waits for the GPU."""
+        return false_colour_scale(self.shown, self.session.lightmap, self._offered)
+
+    @property
+    def _offered(self) -> Mapping[str, Texture]:
+        """What the layer that is shown needs of the solver."""
+        return self.session.solver.layers if LAYER_SHADERS[self.shown.layer].offered else {}
 
     def expose(self) -> None:
         """Set the exposure from the light of the scene."""
@@ -116,7 +126,13 @@ class View:
     @property
     def shown(self) -> DisplayOptions:
         """The display options, as far as there is what they ask for."""
-        return self._without_reference if self.session.compared.comparison is None else self.display
+        display = self._without_reference if self.session.compared.comparison is None else self.display
+        return display if display.layer in self.layers else display.replace(layer="combined")
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """What the solver that is chosen allows to be shown."""
+        return layers_with(self.session.family.layers)
 
     def drop_reference(self) -> None:
         """Show the solution alone again."""

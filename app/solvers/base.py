@@ -17,6 +17,13 @@ from app.options import Options
 from app.scene.model import F64, Material
 
 Rect = tuple[float, float, float, float]  # (u, v, u, v) in the virtual atlas [texels of level 0]
+# What a solver may know of every texel besides its light, see app/render/layers.py for how that is shown
+LAYERS = {
+    "residual": "r, RGB [stored units]: exitance that is still pending",
+    "direct": "the part of H that came straight from lamps, RGB [stored units]",
+    "variance": "variance of the mean of H over RGB [stored units²]",
+    "rays": "rays traced from it",
+}
 
 
 @dataclass(frozen=True)
@@ -127,6 +134,11 @@ class Solver(Protocol[OptionsT]):
     def resolved(self) -> Mapping[str, Any]:
         """The values in this scene of options that were left unset, by name."""
 
+    @property
+    def layers(self) -> Mapping[str, Texture]:
+        """What it knows of every texel of the tile pool besides H, by name: those of LAYERS that its family has, to be shown.
+        Valid until it works again."""
+
     def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
         """What there is to see of the last piece of work, and of a texel (column, row) of the tile pool. With ``images`` it draws
         its pictures, and what takes as long; it may then wait for the GPU."""
@@ -141,4 +153,4 @@ class Solver(Protocol[OptionsT]):
         """Give back what is on the GPU, but for the lightmap."""
 
 
-__all__ = ["EnergyBalance", "Inspection", "Progress", "Rect", "Solver"]
+__all__ = ["LAYERS", "EnergyBalance", "Inspection", "Progress", "Rect", "Solver"]

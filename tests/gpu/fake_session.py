@@ -13,7 +13,8 @@ from app.estimate.error import ErrorEstimate
 from app.gpu import Gpu
 from app.lightmap.options import LightmapOptions
 from app.render.camera import CameraView
-from app.render.options import DisplayOptions
+from app.render.false_colour import Scale, false_colour_scale
+from app.render.options import LAYERS, DisplayOptions
 from app.scene.model import Material
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Inspection, ShootingOptions
 
@@ -113,6 +114,13 @@ class FakeSession:
         self.image = None
         self.picked = None
         self.insets: list[tuple[tuple[int, int], bool]] = []
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        return LAYERS[:8]
+
+    def false_colour_scale(self) -> Scale:
+        return false_colour_scale(self.display, self.lightmap)
 
     @property
     def shown(self) -> DisplayOptions:

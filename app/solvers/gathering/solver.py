@@ -27,6 +27,7 @@ from app.solvers.gathering.bounces import Bounces, steps_to
 from app.solvers.gathering.compose import Compose
 from app.solvers.gathering.direct import DirectLight
 from app.solvers.gathering.hits import GROUP, Hits
+from app.solvers.gathering.inspectable import Inspectable
 from app.solvers.gathering.lamps import by_rays
 from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.origins import Origins
@@ -55,6 +56,7 @@ class Gathering:
         self.direct = DirectLight(gpu, lightmap, self.rays, self.origins)
         self.bounces, self._compose = Bounces(gpu, lightmap), Compose(gpu, lightmap, self.origins)
         self._balance = Balance(gpu, lightmap)
+        self._inspectable = Inspectable(gpu, lightmap, self.direct, self._compose)
         self._under_way: Generator[None, None, int] | None = None
         self._judged: list[tuple[int, ReadBack]] = []
         self._progress = Progress(0, 1.0, np.zeros(3))
@@ -265,6 +267,10 @@ class Gathering:
         """Rays of each texel whose hits are kept."""
         return {"kept_rays": self.hits.count}
 
+    @property
+    def layers(self) -> Mapping[str, Texture]:
+        return self._inspectable.layers(self._shown)
+
     def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
         """How much is traced and kept."""
         return Inspection(facts={"Rays traced": f"{self.traced:,}", "Kept hits": f"{self.hits.memory / 2**20:.0f} MiB"})
@@ -299,7 +305,16 @@ class Gathering:
         refinement = self.lightmap.refinement
         if refinement is not None and refinement.follower is self:
             refinement.follower = None
-        for part in (self._balance, self._compose, self.bounces, self.direct, self.hits, self.origins, self.rays):
+        for part in (
+            self._inspectable,
+            self._balance,
+            self._compose,
+            self.bounces,
+            self.direct,
+            self.hits,
+            self.origins,
+            self.rays,
+        ):
             part.release()
 
 
