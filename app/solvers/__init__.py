@@ -9,7 +9,8 @@ from typing import Any
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.options import Options
-from app.solvers.base import EnergyBalance, Inspection, Progress, Rect, Solver
+from app.solvers.base import HEMISPHERE, EnergyBalance, Inspection, Progress, Rays, Rect, Solver
+from app.solvers.gathering.inspectable import SEEN
 from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.solver import BATCH as RAYS
 from app.solvers.gathering.solver import Gathering
@@ -69,17 +70,20 @@ SOLVERS: dict[str, Family] = {
         threshold="noise",
         shows=("smooth",),
         layers=("direct", "variance", "rays"),
+        pictures={HEMISPHERE: SEEN},
     ),
 }
 DEFAULT_SOLVER = "shooting"
 
 __all__ = [
     "DEFAULT_SOLVER",
+    "HEMISPHERE",
     "SOLVERS",
     "EnergyBalance",
     "Family",
     "Inspection",
     "Progress",
+    "Rays",
     "Rect",
     "ShootingOptions",
     "Solver",

@@ -180,6 +180,9 @@ class FakeSession:
         )
         return SimpleNamespace(inspect=lambda texel=None, *, images=False: shown)
 
+    def inspect(self, texel: tuple[int, int] | None = None) -> Inspection:
+        return self.solver.inspect(texel, images=True)
+
     def read_again(self, picked: object) -> object:
         self.calls.append(("read_again",))
         return picked

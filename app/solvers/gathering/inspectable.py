@@ -4,17 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from app.gpu import Framebuffer, Gpu, Texture
+import numpy as np
+
+from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
+from app.scene.model import F64
+from app.solvers.base import Inspection, Rays
 from app.solvers.gathering.compose import Compose
 from app.solvers.gathering.direct import DirectLight
+from app.solvers.gathering.hits import Hits
+from app.solvers.gathering.origins import Origins
+
+MOST_RAYS = 4096  # of a texel that are looked at: the first ones are spread as evenly as all
+SEEN = (
+    "What the kept rays of the picked texel bring, seen from it along its normal and flattened so that equal areas bring equal "
+    "light: a cell for each ray, exposed like the picture. What comes straight from lamps is not in it: shadow rays look at them"
+)
 
 
 class Inspectable:
     """Of one lightmap. Whoever makes it releases it."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, direct: DirectLight, compose: Compose) -> None:
-        self._gpu, self._lightmap, self._direct, self._compose = gpu, lightmap, direct, compose
+    def __init__(
+        self, gpu: Gpu, lightmap: Lightmap, origins: Origins, hits: Hits, direct: DirectLight, compose: Compose
+    ) -> None:
+        self._gpu, self._lightmap, self._origins, self._hits = gpu, lightmap, origins, hits
+        self._direct, self._compose = direct, compose
+        self._look = Pass(gpu, "solvers/gathering/kept_rays", defines=lightmap.defines("MATERIAL_BITS", "TILE"))
         self._rays: tuple[Texture, Framebuffer] | None = None
 
     def layers(self, rays: int) -> Mapping[str, Texture]:
@@ -30,6 +46,60 @@ class Inspectable:
         counts, target = self._rays
         target.clear(float(rays))
         return counts
+
+    def inspect(self, texel: tuple[int, int] | None, outgoing: Texture | None) -> Inspection:
+        """How much is traced and kept; of a texel (column, row), its direct and indirect light, and with ``outgoing``, see
+        bounces.py, its rays. Waits for the GPU where a texel is given."""
+        traced, memory = self._hits.traced + self._direct.traced, self._hits.memory
+        facts = {"Rays traced": f"{traced:,}", "Kept hits": f"{memory / 2**20:.0f} MiB"}
+        if texel is None or any(at >= size for at, size in zip(texel, self._lightmap.size, strict=True)):
+            return Inspection(facts=facts)
+        return Inspection(
+            facts=facts,
+            texel_facts={"Kept rays": f"{self._hits.count:,}"},
+            texel_light=self._parts(texel),
+            rays=None if outgoing is None else self.rays(texel, outgoing),
+        )
+
+    def _parts(self, texel: tuple[int, int]) -> dict[str, F64]:
+        """Direct and indirect H [W/m²]."""
+        target = self._gpu.target(self._direct.light)
+        stored = np.frombuffer(target.read((*texel, 1, 1), 3, dtype="f4", alignment=1), np.float32)
+        self._gpu.release_all(target)
+        direct = stored.astype(np.float64) * self._lightmap.unit
+        return {"direct": direct, "indirect": self._lightmap.light_at(texel)[0] - direct}
+
+    def rays(self, texel: tuple[int, int], outgoing: Texture) -> Rays | None:
+        """The kept rays of a texel, and what they find of ``outgoing``; None where there are none. Waits for the GPU."""
+        hits, lightmap = self._hits, self._lightmap
+        count = min(hits.count, MOST_RAYS)
+        if count == 0:
+            return None
+        textures = [self._gpu.texture((count, 1), 4, "f4") for _ in range(3)]
+        target = self._gpu.target(*textures)
+        first = 0
+        while first < count:
+            kept, rays, first = hits.bank_of(first)
+            self._look.draw(
+                target,
+                textures=self._origins.textures
+                | lightmap.textures("t_pages", "t_position_area")
+                | {"t_hits": kept, "t_outgoing": outgoing},
+                uniforms={
+                    "u_texel": texel,
+                    "u_first": first,
+                    "u_rows": lightmap.charts.size[1],
+                    "u_pages_of_bank": (*lightmap.size, hits.edge),
+                    "u_pages": (float(lightmap.columns), lightmap.pool.pages_per_texel),
+                },
+                viewport=(first, 0, min(rays, count - first), 1),
+            )
+            first += rays
+        start, end, light = (
+            np.frombuffer(texture.read(), np.float32).reshape(-1, 4)[:, :3].copy() for texture in textures
+        )
+        self._gpu.release_all(target, *textures)
+        return Rays(start, end, light * np.float32(lightmap.unit))
 
     def release(self) -> None:
         if self._rays is not None:

@@ -56,7 +56,7 @@ class Gathering:
         self.direct = DirectLight(gpu, lightmap, self.rays, self.origins)
         self.bounces, self._compose = Bounces(gpu, lightmap), Compose(gpu, lightmap, self.origins)
         self._balance = Balance(gpu, lightmap)
-        self._inspectable = Inspectable(gpu, lightmap, self.direct, self._compose)
+        self._inspectable = Inspectable(gpu, lightmap, self.origins, self.hits, self.direct, self._compose)
         self._under_way: Generator[None, None, int] | None = None
         self._judged: list[tuple[int, ReadBack]] = []
         self._progress = Progress(0, 1.0, np.zeros(3))
@@ -272,8 +272,8 @@ class Gathering:
         return self._inspectable.layers(self._shown)
 
     def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
-        """How much is traced and kept."""
-        return Inspection(facts={"Rays traced": f"{self.traced:,}", "Kept hits": f"{self.hits.memory / 2**20:.0f} MiB"})
+        """How much is traced and kept; of a texel, its rays, and what they bring."""
+        return self._inspectable.inspect(texel, self.bounces.outgoing if images else None)
 
     @property
     def traced(self) -> int:
