@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app.gpu import Gpu
+from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.options import Options, option
 from app.scene.model import Material
@@ -61,6 +61,10 @@ class Constant:
 
     @property
     def resolved(self) -> Mapping[str, Any]:
+        return {}
+
+    @property
+    def layers(self) -> Mapping[str, Texture]:
         return {}
 
     def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 from app.commands.report import report, summary
-from app.commands.steps import check_reference, open_scene, session_options, solve
+from app.commands.steps import check_display, open_scene, session_options, solve
 from app.errors import UserError
 from app.gpu import gpu_context
 from app.options import from_flags
@@ -26,7 +26,7 @@ __all__ = ["shot"]
 def shot(flags: argparse.Namespace, note: str | None = None) -> int:
     """Solve and save a picture. note: what else the user should know. Raises UserError."""
     _check_file(flags.output)
-    check_reference(flags)
+    check_display(flags)
     console = Console(quiet=flags.json)
     with gpu_context() as gpu:
         session = Session(gpu, **session_options(flags))

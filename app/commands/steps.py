@@ -10,7 +10,7 @@ from app.commands.report import notes
 from app.errors import UserError
 from app.lightmap.options import LightmapOptions
 from app.options import from_flags
-from app.render.layers import LAYER_SHADERS
+from app.render.layers import LAYER_SHADERS, layers_with
 from app.render.options import DisplayOptions
 from app.scene.load import NO_LIGHT
 from app.session.run import NotFiniteError, Stop
@@ -19,7 +19,7 @@ from app.session.stats import Stats
 from app.solvers import SOLVERS
 from app.util.console import Console
 
-__all__ = ["check_reference", "open_scene", "session_options", "solve"]
+__all__ = ["check_display", "open_scene", "session_options", "solve"]
 
 
 def session_options(flags: argparse.Namespace) -> dict[str, Any]:
@@ -33,9 +33,12 @@ def session_options(flags: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def check_reference(flags: argparse.Namespace) -> None:
-    """Raise UserError for what cannot be shown without a reference."""
+def check_display(flags: argparse.Namespace) -> None:
+    """Raise UserError for what cannot be shown without a reference, or with this solver."""
     display = from_flags(DisplayOptions, flags)
+    if display.layer not in layers_with(SOLVERS[flags.solver].layers):
+        able = [name for name, family in SOLVERS.items() if display.layer in layers_with(family.layers)]
+        raise UserError(f"--layer {display.layer}: needs --solver {' or '.join(able)}")
     for name, asks in (("layer", LAYER_SHADERS[display.layer].compares), ("show", display.show != "solution")):
         if asks and flags.reference is None:
             raise UserError(f"--{name} {getattr(display, name)}: needs a --reference")

@@ -8,7 +8,7 @@ from typing import Any
 
 from app.bake import prepare_directory
 from app.commands.shot import shot
-from app.commands.steps import check_reference, session_options
+from app.commands.steps import check_display, session_options
 from app.errors import UserError
 from app.options import from_flags
 from app.render.options import DisplayOptions
@@ -38,7 +38,7 @@ def view_or_shot(flags: argparse.Namespace) -> int:
 
 def view(flags: argparse.Namespace) -> int:
     """Open the window on a scene. Raises UserError."""
-    check_reference(flags)
+    check_display(flags)
     from app.scene.library import scene_names
     from app.scene.load import LOADERS
     from app.viewer.window import run_window

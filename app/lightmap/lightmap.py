@@ -100,6 +100,17 @@ class Lightmap(LightTextures):
         H, r = (np.frombuffer(data, _DTYPES[dtype]).astype(np.float64) * scale for data in raw)
         return H, r
 
+    def normal_at(self, texel: tuple[int, int]) -> F64:
+        """Unit normal of what lies in the middle of one texel (column, row) of the tile pool; up where nothing does."""
+        column, row = texel
+        tile = self.pool.tile
+        slot = row // tile * self.columns + column // tile
+        face = int(self.pool.surfaces.face[slot, row % tile, column % tile]) if slot < self.pool.tiles else -1
+        if face < 0:
+            return np.array([0.0, 1.0, 0.0])
+        normal = self.scene.normals_areas[0][self.charts.face_triangle[face]]
+        return np.asarray(-normal if self.charts.face_back[face] else normal, np.float64)
+
     def albedo(self) -> F32:
         """ρ of every texel (tiles, t, t, 3) f32; 0 where nothing is covered."""
         return self._factor([m.albedo for m in self.scene.materials], self.pool.albedo_tiles)

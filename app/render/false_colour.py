@@ -6,10 +6,12 @@ those that its tools give for the same scene. Y is luminance from linear Rec.709
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
+from app.gpu import Texture
 from app.lightmap.lightmap import Lightmap
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
@@ -23,7 +25,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec.709 [IEC 61966-2-1]
 SHARES = (1.0, 99.0)
 DECADES = (0.5, 3.0)  # of a logarithmic scale: fewer would be noise, more cannot be told apart
 NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # ends of a scale, times a power of ten
-UNITS = {"illuminance": "lx", "luminance": "cd/m²", "error": "%"}
+UNITS = {"illuminance": "lx", "luminance": "cd/m²", "error": "%", "expected error": "%", "rays": "per texel"}
 LAYER = {"illuminance": "irradiance", "luminance": "combined"}  # the layer whose radiance is measured
 VIRIDIS = np.array(
     [
@@ -50,24 +52,32 @@ ERRORS = Scale(0.1, 100.0, UNITS["error"])  # the same in every picture, so that
 
 
 def measured(display: DisplayOptions) -> str:
-    """What is shown in false colour: ``illuminance``, ``luminance``, ``error``, or ``off`` for nothing. Errors go first."""
-    return "error" if LAYER_SHADERS[display.layer].compares else display.false_colour
+    """What is shown in false colour, a key of UNITS, or ``off`` for nothing. Layers that are no colours go first."""
+    return LAYER_SHADERS[display.layer].measures or display.false_colour
 
 
 def value_per_radiance(kind: str) -> float:
-    """What a layer's radiance of 1 W/(sr m²) measures: lx for irradiance (shown as H/π), cd/m² for radiance B/π; of an error,
-    which is no radiance, %."""
-    if kind == "error":
+    """What a layer's radiance of 1 W/(sr m²) measures: lx for irradiance (shown as H/π), cd/m² for radiance B/π. Errors [%] and
+    counts are no radiance."""
+    if UNITS[kind] == "%":
         return 100.0
+    if kind == "rays":
+        return 1.0
     return WHITE_EFFICACY * np.pi if kind == "illuminance" else WHITE_EFFICACY
 
 
-def false_colour_scale(display: DisplayOptions, lightmap: Lightmap) -> Scale:
+def false_colour_scale(
+    display: DisplayOptions, lightmap: Lightmap, offered: Mapping[str, Texture] | None = None
+) -> Scale:
     """The scale of the display's false colour, found from the light on what does not emit and rounded to short numbers; only its
-    lower end where ``false_colour_max`` gives the upper one. Waits for the GPU. Of errors it is always the same."""
+    lower end where ``false_colour_max`` gives the upper one. Waits for the GPU. Of errors it is always the same; of counts it
+    reaches from 0 to the highest of those that are ``offered``."""
     kind, high, low = measured(display), display.false_colour_max, 0.0
-    if kind == "error":
+    if UNITS[kind] == "%":
         return ERRORS
+    if kind == "rays":
+        counts = np.frombuffer((offered or {})["rays"].read(), np.float32)
+        return Scale(0.0, _nice_above(float(counts.max())), UNITS[kind])
     if not high or display.false_colour_log:
         darkest, brightest = _ends(kind, lightmap)
         high = high or _nice_above(brightest)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from app.gpu import Framebuffer, Gpu, Pass, Texture
@@ -11,6 +13,7 @@ from app.render.camera import CameraView
 from app.render.false_colour import LAYER, Scale, false_colour_scale, measured
 from app.render.options import DisplayOptions
 from app.render.pick import Picker, PickHit
+from app.render.ray_picture import RayPicture
 from app.render.resolve import Reference
 from app.render.surfaces import Rect, Surfaces
 
@@ -53,22 +56,25 @@ class FrameRenderer:
         display: DisplayOptions,
         *,
         reference: Reference | None = None,
+        offered: Mapping[str, Texture] | None = None,
         shooter: Rect | None = None,
+        rays: RayPicture | None = None,
         scale: Scale | None = None,
         samples: int = 1,
         whole: bool = True,
     ) -> None:
         """Draw into the lower left ``size`` (width, height) [px] of ``target``.
 
-        reference: for ``display.show`` and for layers that compare; None where there is none.
-        shooter: the patch to mark for ``display.last_shooter``: (u, v, u, v) in atlas texels. scale: of the false colour; left
-        out, it is found from the light, which waits for the GPU.
+        reference: for ``display.show`` and for layers that compare; None where there is none. offered: what layers need that a
+        solver must offer, see app/render/layers.py.
+        shooter: the patch to mark for ``display.last_shooter``: (u, v, u, v) in atlas texels. rays: to draw. scale: of the
+        false colour; left out, it is found from the light, which waits for the GPU.
         samples: per pixel along each axis. whole: show all light as it is now; False bounds the work of a frame, a large
         lightmap is then brought up to date over several. Raises GpuError for a picture larger than a texture can be.
         """
         kind = measured(display)
         layer = LAYER.get(kind, display.layer)
-        scale = None if kind == "off" else scale or false_colour_scale(display, lightmap)
+        scale = None if kind == "off" else scale or false_colour_scale(display, lightmap, offered)
         clip_from_local = view.clip_from_local(size[0] / size[1], lightmap.space)
         surfaces = self._surfaces_of(lightmap, display.interpolation)
         picture = self._picture_for(target, size, samples)
@@ -82,11 +88,14 @@ class FrameRenderer:
             display,
             scale=scale,
             reference=reference,
+            offered=offered,
             shooter=shooter,
             whole=whole,
         )
         self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
         self._background.draw(picture.target, uniforms={"u_height_px": float(picture.size[1])}, depth=True)
+        if rays is not None:
+            rays.draw(picture.target, clip_from_local, picture.size, display, samples)
         if picture.own:
             present = Pass(self._gpu, "render/present", defines={"SAMPLES": samples}, label="present")
             present.draw(target, textures={"t_picture": picture.colour}, viewport=(0, 0, *size))

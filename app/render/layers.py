@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 
 from app.render.options import LAYERS
@@ -11,29 +12,41 @@ from app.render.options import LAYERS
 class Layer:
     """shader: its file. light: the lightmap's texture that it shows as radiance, exposed; None for what is no light and
     is shown as it is. smooth: whether its texels may be interpolated. checker: depth of the texel checker. compares: whether it
-    is of a reference, too. defines: those of the lightmap's that the shader declares."""
+    is of a reference, too. measures: in false colour, whatever the display says, what it measures. offered: what a solver must
+    know of every texel for it, see app/solvers/base.py. defines: those of the lightmap's that the shader declares."""
 
     shader: str
     light: str | None = None
     smooth: bool = True
     checker: float = 0.0
     compares: bool = False
+    measures: str = ""
+    offered: str = ""
     defines: tuple[str, ...] = ()
 
     @property
     def received(self) -> bool:
         """Whether it shows light received, which a reference has too."""
-        return self.light == "t_irradiance" and not self.compares
+        return self.light == "t_irradiance" and not self.compares and not self.offered
 
 
 LAYER_SHADERS = {
     "combined": Layer("combined", "t_irradiance", defines=("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")),
     "irradiance": Layer("irradiance", "t_irradiance"),
-    "residual": Layer("residual", "t_residual"),
+    "residual": Layer("offered_light", "t_residual", offered="residual"),
     "albedo": Layer("albedo", defines=("MATERIAL_BITS", "ALBEDO_TEXTURE")),
     "charts": Layer("charts", smooth=False, checker=0.12, defines=("MATERIAL_BITS",)),
     "leaves": Layer("leaves", smooth=False, checker=0.12, defines=("TILE",)),
     "texels": Layer("texels", smooth=False, checker=0.25, defines=("MATERIAL_BITS",)),
-    "error": Layer("error", "t_irradiance", compares=True),
+    "error": Layer("error", "t_irradiance", compares=True, measures="error"),
+    "direct": Layer("offered_light", "t_irradiance", offered="direct"),
+    "indirect": Layer("indirect", "t_irradiance", offered="direct"),
+    "rays": Layer("count", measures="rays", offered="rays"),
+    "expected-error": Layer("deviation", "t_irradiance", measures="expected error", offered="variance"),
 }
 assert tuple(LAYER_SHADERS) == LAYERS
+
+
+def layers_with(offered: Container[str]) -> tuple[str, ...]:
+    """Those that can be shown where a solver offers so much."""
+    return tuple(name for name, layer in LAYER_SHADERS.items() if not layer.offered or layer.offered in offered)

@@ -6,7 +6,10 @@ from dataclasses import dataclass
 
 from app.options import Options, option
 
-LAYERS = ("combined", "irradiance", "residual", "albedo", "charts", "leaves", "texels", "error")
+LAYERS = (
+    *("combined", "irradiance", "residual", "albedo", "charts", "leaves", "texels", "error"),
+    *("direct", "indirect", "rays", "expected-error"),
+)
 TONE_MAPS = ("clamp", "reinhard", "aces", "agx", "neutral")
 INTERPOLATIONS = ("nearest", "bilinear", "bicubic")
 SHOWN = ("solution", "reference", "split")
@@ -17,7 +20,8 @@ FALSE_COLOURS = ("off", "illuminance", "luminance")  # lux, cd/m²
 class DisplayOptions(Options):
     layer: str = option(
         "combined",
-        "what is shown: B, H, r, albedo, charts, quadtree levels, texel density or error",
+        "what is shown: B, H, r, albedo, charts, quadtree levels, texel density or error; where the solver has it direct or "
+        "indirect light, rays per texel, or the error that it expects",
         choices=LAYERS,
     )
     show: str = option("solution", "whose light: the solution's, a reference's, or both side by side", choices=SHOWN)

@@ -84,12 +84,13 @@ class DisplayTexels:
         scale: Scale | None,
         whole: bool,
         reference: Reference | None = None,
+        offered: Mapping[str, Texture],
         instead: bool = False,
     ) -> dict[str, Texture]:
         """Bring the display texels up to date; the textures that surfaces bind.
 
         If not ``whole``, those of leaves that have changed, and TEXELS_PER_FRAME others, in turn. reference: for layers that
-        compare, or, ``instead``, to be shown in place of the lightmap's irradiance.
+        compare, or, ``instead``, to be shown in place of the lightmap's irradiance. offered: for layers that a solver must offer.
         """
         layer, lightmap = LAYER_SHADERS[layer_name], self._lightmap
         if self._version != lightmap.version:
@@ -102,6 +103,7 @@ class DisplayTexels:
         }
         textures = self._tables | lightmap.textures(*LAYER_TABLES)
         textures |= {"t_light": lightmap.texture(layer.light)} if layer.light else {}
+        textures |= {"t_offered": offered[layer.offered]} if layer.offered else {}
         if reference is not None:
             textures["t_reference"], uniforms["u_dark"] = reference
         if reference is not None and instead:

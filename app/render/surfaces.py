@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from app.gpu import Framebuffer, Gpu, Pass, Texture
@@ -42,17 +43,19 @@ class Surfaces:
         *,
         scale: Scale | None = None,
         reference: Reference | None = None,
+        offered: Mapping[str, Texture] | None = None,
         shooter: Rect | None = None,
         whole: bool = True,
     ) -> None:
         """Draw the layer into ``target``, which has depth, over what is there.
 
         scale: of the false colour, where one is on. reference: for layers that compare, and to be shown as ``display.show`` asks,
-        where the layer is of received light. shooter: the patch to mark: lower and upper corner (u, v, u, v) in atlas texels.
+        where the layer is of received light. offered: what a solver knows of every texel, for layers that need it. shooter: the
+        patch to mark: lower and upper corner (u, v, u, v) in atlas texels.
         whole: see ``DisplayTexels.resolve``; else one of many, in which new leaves shine.
         """
         self._live = not whole
-        wanted: dict[str, Any] = {"scale": scale, "reference": reference}
+        wanted: dict[str, Any] = {"scale": scale, "reference": reference, "offered": offered or {}}
         shown: list[tuple[dict[str, Texture], Part]] = []
         left, right = _parts(layer_name, display, reference, target.size)
         if right is not None and reference is not None:

@@ -17,7 +17,7 @@ from app.solvers import Solver
 @dataclass(frozen=True)
 class Picked:
     """A picked point. Indices are the scene's and its charts'; texel (column, row) in the tile pool; facts: what the
-    solver says of it, name and value; position [m], area [m²]; B, E, H, r are
+    solver says of it, name and value; parts: of H, RGB [W/m²] by name; position [m], area [m²]; B, E, H, r are
     RGB [W/m²]. A side without texels has chart and facet -1 and area 0: it only emits. hit: with which it can be read again."""
 
     triangle: int
@@ -28,6 +28,7 @@ class Picked:
     facet: int
     texel: tuple[int, int]
     facts: Mapping[str, str]
+    parts: Mapping[str, RGB]
     position: RGB
     normal: RGB
     area: float
@@ -49,9 +50,11 @@ def picked_from_hit(lightmap: Lightmap, hit: PickHit, solver: Solver[Any]) -> Pi
         albedo, E = np.zeros(3), np.zeros(3)
     H, r, area, texel, chart = np.zeros(3), np.zeros(3), 0.0, (0, 0), -1
     facts: Mapping[str, str] = {}
+    parts: Mapping[str, RGB] = {}
     if hit.tile is not None and hit.tile_texel is not None and hit.texel is not None:
         texel, (column, row) = hit.texel, hit.tile_texel
-        at, facts = (hit.tile, row, column), solver.inspect(texel).texel_facts
+        at, inspection = (hit.tile, row, column), solver.inspect(texel)
+        facts, parts = inspection.texel_facts, {name: _rgb(part) for name, part in inspection.texel_light.items()}
         H, r = lightmap.light_at(texel)
         area = float(lightmap.pool.surfaces.area[at])
         face = int(lightmap.pool.surfaces.face[at])
@@ -69,6 +72,7 @@ def picked_from_hit(lightmap: Lightmap, hit: PickHit, solver: Solver[Any]) -> Pi
         facet=-1 if hit.facet is None else hit.facet,
         texel=texel,
         facts=facts,
+        parts=parts,
         position=hit.position,
         normal=_rgb(normal),
         area=area,

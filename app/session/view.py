@@ -5,7 +5,9 @@ A view has a session, never the reverse: a session that bakes or measures has no
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,28 +15,36 @@ from app.gpu import Framebuffer, Texture
 from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
 from app.render.exposure import exposure_of
-from app.render.false_colour import Scale
+from app.render.false_colour import Scale, false_colour_scale
 from app.render.frame import FrameRenderer
-from app.render.layers import LAYER_SHADERS
+from app.render.layers import LAYER_SHADERS, layers_with
 from app.render.options import DisplayOptions
 from app.render.pick import with_texel
+from app.render.ray_picture import RayPicture
 from app.render.resolve import Reference
 from app.render.surfaces import Rect
 from app.scene.model import Camera
 from app.session.picking import Picked, picked_from_hit
 from app.session.session import Session
+from app.solvers import HEMISPHERE, Inspection, Rays
+
+RAYS_SECONDS = 0.25  # between two looks at the rays that are drawn, while light moves
 
 
 class View:
     """A camera in the open scene, how its light is displayed, and the renderer. Whoever makes it releases it, before the session.
 
-    It is made before a scene opens: camera is set then.
+    It is made before a scene opens: camera is set then. marked: the texel (column, row) of the tile pool whose rays are drawn,
+    where the solver has any.
     """
 
     def __init__(self, session: Session, display: DisplayOptions | None = None) -> None:
         self.session, self.display = session, display or DisplayOptions()
         self.camera: CameraView
-        self._renderer = FrameRenderer(session.gpu)
+        self.marked: tuple[int, int] | None = None
+        self._renderer, self._rays = FrameRenderer(session.gpu), RayPicture(session.gpu)
+        self._rays_of: object = None
+        self._rays_due = 0.0
         session.follow(self._prepare, self._opened)
 
     def _prepare(self, lightmap: Lightmap) -> Callable[[], None]:
@@ -77,11 +87,22 @@ class View:
             self.camera,
             self.shown,
             reference=self._reference(whole=whole),
+            offered=self._offered,
             shooter=self._last_shooter,
+            rays=self._marked_rays(whole=whole),
             scale=scale,
             samples=samples,
             whole=whole,
         )
+
+    def false_colour_scale(self) -> Scale:
+        """Of what is shown, which is in false colour. Waits for the GPU."""
+        return false_colour_scale(self.shown, self.session.lightmap, self._offered)
+
+    @property
+    def _offered(self) -> Mapping[str, Texture]:
+        """What the layer that is shown needs of the solver."""
+        return self.session.solver.layers if LAYER_SHADERS[self.shown.layer].offered else {}
 
     def expose(self) -> None:
         """Set the exposure from the light of the scene."""
@@ -92,6 +113,37 @@ class View:
     def atlas_image(self, size: tuple[int, int], *, turned: bool = False) -> Texture | None:
         """The virtual atlas with what was drawn last, v up or to the right; None before the first picture."""
         return self._renderer.atlas(self.session.lightmap, size, turned=turned)
+
+    # -- what the solver shows of itself -------------------------------------------------------------------------------
+
+    def inspect(self, texel: tuple[int, int] | None = None) -> Inspection:
+        """What there is to see of the solver's last work, and of a texel (column, row) of the tile pool; its rays as a picture,
+        too. Its pictures are valid until it works or is asked again."""
+        inspection = self.session.solver.inspect(texel, images=True)
+        if texel is None or inspection.rays is None:
+            return inspection
+        self._take_rays(inspection.rays, texel)
+        image = self._rays.hemisphere(self.display)
+        return inspection if image is None else replace(inspection, images={**inspection.images, HEMISPHERE: image})
+
+    def _marked_rays(self, *, whole: bool) -> RayPicture | None:
+        """Those of the marked texel; if not ``whole``, not newer than a look a moment ago."""
+        if self.marked is None or HEMISPHERE not in self.session.family.pictures:
+            return None
+        asked = self.session.lightmap, self.session.solver, self.marked
+        if whole or asked != self._rays_of or time.perf_counter() >= self._rays_due:
+            rays = self.session.solver.inspect(self.marked, images=True).rays
+            if rays is None:
+                return None
+            self._take_rays(rays, self.marked)
+        return self._rays
+
+    def _take_rays(self, rays: Rays, texel: tuple[int, int]) -> None:
+        lightmap = self.session.lightmap
+        right = self.camera.world_from_camera[:3, 0]
+        self._rays.show(rays.start, rays.end, rays.light / np.float32(np.pi), lightmap.normal_at(texel), right)
+        self._rays_of = lightmap, self.session.solver, texel
+        self._rays_due = time.perf_counter() + RAYS_SECONDS
 
     @property
     def _last_shooter(self) -> Rect | None:
@@ -116,7 +168,13 @@ class View:
     @property
     def shown(self) -> DisplayOptions:
         """The display options, as far as there is what they ask for."""
-        return self._without_reference if self.session.compared.comparison is None else self.display
+        display = self._without_reference if self.session.compared.comparison is None else self.display
+        return display if display.layer in self.layers else display.replace(layer="combined")
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """What the solver that is chosen allows to be shown."""
+        return layers_with(self.session.family.layers)
 
     def drop_reference(self) -> None:
         """Show the solution alone again."""
@@ -138,4 +196,5 @@ class View:
         return Reference(comparison.texels.texture, float(np.sqrt(3.0)) * comparison.dark)
 
     def release(self) -> None:
+        self._rays.release()
         self._renderer.release()

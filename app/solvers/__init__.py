@@ -9,7 +9,8 @@ from typing import Any
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.options import Options
-from app.solvers.base import EnergyBalance, Inspection, Progress, Rect, Solver
+from app.solvers.base import HEMISPHERE, EnergyBalance, Inspection, Progress, Rays, Rect, Solver
+from app.solvers.gathering.inspectable import SEEN
 from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.solver import BATCH as RAYS
 from app.solvers.gathering.solver import Gathering
@@ -27,7 +28,7 @@ class Family:
     is left of what it has to do, as in "0.1 % unshot". batch: work that it does at once when nothing waits for it. keeps_light:
     whether it can begin with light that another solver has left in the lightmap; else it begins anew. threshold: the option that
     says how little may remain when it has converged. pictures: captions of the images of its Inspection, and what they show.
-    shows: options that change the light that is shown without any work.
+    shows: options that change the light that is shown without any work. layers: names of what its solvers know of every texel.
     """
 
     title: str
@@ -41,6 +42,7 @@ class Family:
     keeps_light: bool = False
     pictures: Mapping[str, str] = field(default_factory=dict)
     shows: tuple[str, ...] = ()
+    layers: tuple[str, ...] = ()
 
 
 SOLVERS: dict[str, Family] = {
@@ -55,6 +57,7 @@ SOLVERS: dict[str, Family] = {
         threshold="residual",
         pictures=PICTURES,
         shows=("ambient",),
+        layers=("residual",),
     ),
     "gathering": Family(
         title="Gathering",
@@ -66,17 +69,21 @@ SOLVERS: dict[str, Family] = {
         batch=RAYS,
         threshold="noise",
         shows=("smooth",),
+        layers=("direct", "variance", "rays"),
+        pictures={HEMISPHERE: SEEN},
     ),
 }
 DEFAULT_SOLVER = "shooting"
 
 __all__ = [
     "DEFAULT_SOLVER",
+    "HEMISPHERE",
     "SOLVERS",
     "EnergyBalance",
     "Family",
     "Inspection",
     "Progress",
+    "Rays",
     "Rect",
     "ShootingOptions",
     "Solver",

@@ -14,9 +14,17 @@ import numpy as np
 
 from app.gpu import Texture
 from app.options import Options
-from app.scene.model import F64, Material
+from app.scene.model import F32, F64, Material
 
 Rect = tuple[float, float, float, float]  # (u, v, u, v) in the virtual atlas [texels of level 0]
+HEMISPHERE = "Hemisphere"  # caption of the picture that a view makes of the rays of an Inspection
+# What a solver may know of every texel besides its light, see app/render/layers.py for how that is shown
+LAYERS = {
+    "residual": "r, RGB [stored units]: exitance that is still pending",
+    "direct": "the part of H that came straight from lamps, RGB [stored units]",
+    "variance": "variance of the mean of H over RGB [stored units²]",
+    "rays": "rays traced from it",
+}
 
 
 @dataclass(frozen=True)
@@ -71,17 +79,30 @@ class EnergyBalance:
 
 
 @dataclass(frozen=True)
+class Rays:
+    """Along which a texel receives light: where each starts and ends (n, 3) f32 [solver space], and the radiosity that it brings,
+    RGB (n, 3) f32 [W/m²], of which the mean is irradiance."""
+
+    start: F32
+    end: F32
+    light: F32
+
+
+@dataclass(frozen=True)
 class Inspection:
     """What a solver shows of its last piece of work, and of one texel.
 
     images: pictures by caption, the solver's own: valid until it works again. rectangles: places of the virtual atlas to mark, by
-    name. facts: what there is to say, name and value. texel_facts: the same of the texel that was asked for.
+    name. facts: what there is to say, name and value. texel_facts: the same of the texel that was asked for. texel_light: parts
+    of its H by name, RGB [W/m²]. rays: of that texel, where light comes along rays; with images only.
     """
 
     images: Mapping[str, Texture] = field(default_factory=dict)
     rectangles: Mapping[str, Rect] = field(default_factory=dict)
     facts: Mapping[str, str] = field(default_factory=dict)
     texel_facts: Mapping[str, str] = field(default_factory=dict)
+    texel_light: Mapping[str, F64] = field(default_factory=dict)
+    rays: Rays | None = None
 
 
 OptionsT = TypeVar("OptionsT", bound=Options)
@@ -127,6 +148,11 @@ class Solver(Protocol[OptionsT]):
     def resolved(self) -> Mapping[str, Any]:
         """The values in this scene of options that were left unset, by name."""
 
+    @property
+    def layers(self) -> Mapping[str, Texture]:
+        """What it knows of every texel of the tile pool besides H, by name: those of LAYERS that its family has, to be shown.
+        Valid until it works again."""
+
     def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
         """What there is to see of the last piece of work, and of a texel (column, row) of the tile pool. With ``images`` it draws
         its pictures, and what takes as long; it may then wait for the GPU."""
@@ -141,4 +167,4 @@ class Solver(Protocol[OptionsT]):
         """Give back what is on the GPU, but for the lightmap."""
 
 
-__all__ = ["EnergyBalance", "Inspection", "Progress", "Rect", "Solver"]
+__all__ = ["HEMISPHERE", "LAYERS", "EnergyBalance", "Inspection", "Progress", "Rays", "Rect", "Solver"]

@@ -132,7 +132,9 @@ def _refresh(view: View, state: State, seconds: float) -> None:
 
 
 def _marker(view: View, state: State) -> None:
-    """A ring around the picked point."""
+    """A ring around the picked point, and the rays of its texel."""
+    drawn = state.draw_rays and state.picked is not None and state.picked.area > 0
+    view.marked = state.picked.texel if drawn and state.picked is not None else None
     if state.picked is None:
         return
     left, top, width, height = state.view_px

@@ -78,7 +78,8 @@ class State:
     live: whether frames follow each other, so that there is a rate of them.
     texture_id: makes a texture of the host drawable; legend: the scale of what is shown now; stats: of the session,
     asked once per frame (None without a scene). atlas, adaptive: edited, not yet applied. view_px: the 3-D view (left, top,
-    width, height) [display units]. inspected: what the solver showed last, and of which light. reference: of a solve in the
+    width, height) [display units]. inspected: what the solver showed last, and of which light. draw_rays: those of the
+    picked texel, in the room. reference: of a solve in the
     background; layer: to go back to from the error.
     """
 
@@ -101,6 +102,7 @@ class State:
     fps: float = 0.0
     picked: Picked | None = None
     picked_age: float = 0.0
+    draw_rays: bool = True
     inspected: tuple[object, Any] | None = None
     inspected_age: float = 0.0
     inset: tuple[object, Any] | None = None

@@ -30,12 +30,13 @@ def edit_options(
     skip: Iterable[str] = (),
     starts: Mapping[str, Any] | None = None,
     units: Mapping[str, str] | None = None,
+    choices: Mapping[str, tuple[str, ...]] | None = None,
 ) -> OptionsT:
     """One widget per declared option; returns ``options`` itself, or a checked copy where something was changed.
 
     A right-click or double-click puts the default back. Labels of options that are not at their default are bright.
-    ``starts`` are the values that optional ones have while they are not given one, and begin with when they are; ``units`` what
-    is shown instead of the declared unit.
+    ``starts`` are the values that optional ones have while they are not given one, and begin with when they are; ``units`` and
+    ``choices`` what is shown instead of those that are declared.
     """
     imgui.push_id(type(options).__name__)
     changes: dict[str, Any] = {}
@@ -43,7 +44,8 @@ def edit_options(
     for spec in _specs(kind):
         if spec.name not in skip:
             value = getattr(options, spec.name)
-            shown_as = dataclasses.replace(spec, unit=units[spec.name]) if units and spec.name in units else spec
+            unit = (units or {}).get(spec.name, spec.unit)
+            shown_as = dataclasses.replace(spec, unit=unit, choices=(choices or {}).get(spec.name, spec.choices))
             edited = edit_option(shown_as, value, (starts or {}).get(spec.name))
             if edited != value:
                 changes[spec.name] = edited

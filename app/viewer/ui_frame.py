@@ -16,7 +16,7 @@ from PIL import Image
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, ShaderError, Texture
 from app.gpu.imgui import ImguiRenderer
-from app.render.false_colour import Scale, colour_map, false_colour_scale, measured
+from app.render.false_colour import Scale, colour_map, measured
 from app.render.resolve import BORDER, TEXELS_PER_FRAME, display_size
 from app.session.view import View
 from app.ui import theme
@@ -124,10 +124,10 @@ class UiFrame:
         kind = measured(display)
         if kind == "off":
             return None
-        asked = (lightmap, kind, display.false_colour_log, display.false_colour_max)
+        asked = (lightmap, view.session.solver, kind, display.false_colour_log, display.false_colour_max)
         now = time.perf_counter()
         if self._scale is None or asked != self._scale_of or (now >= self._scale_due and not display.false_colour_max):
-            self._scale = false_colour_scale(display, lightmap)
+            self._scale = view.false_colour_scale()
             self._scale_of = asked
             cost = time.perf_counter() - now
             self._scale_due = now + max(SCALE_SECONDS, cost / SCALE_SHARE)

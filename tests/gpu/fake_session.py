@@ -13,7 +13,8 @@ from app.estimate.error import ErrorEstimate
 from app.gpu import Gpu
 from app.lightmap.options import LightmapOptions
 from app.render.camera import CameraView
-from app.render.options import DisplayOptions
+from app.render.false_colour import Scale, false_colour_scale
+from app.render.options import LAYERS, DisplayOptions
 from app.scene.model import Material
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Inspection, ShootingOptions
 
@@ -115,6 +116,13 @@ class FakeSession:
         self.insets: list[tuple[tuple[int, int], bool]] = []
 
     @property
+    def layers(self) -> tuple[str, ...]:
+        return LAYERS[:8]
+
+    def false_colour_scale(self) -> Scale:
+        return false_colour_scale(self.display, self.lightmap)
+
+    @property
     def shown(self) -> DisplayOptions:
         return self.display
 
@@ -171,6 +179,9 @@ class FakeSession:
             {} if self.image is None else {caption: self.image}, {}, {"Smaller than a sample": "3 triangles"}
         )
         return SimpleNamespace(inspect=lambda texel=None, *, images=False: shown)
+
+    def inspect(self, texel: tuple[int, int] | None = None) -> Inspection:
+        return self.solver.inspect(texel, images=True)
 
     def read_again(self, picked: object) -> object:
         self.calls.append(("read_again",))

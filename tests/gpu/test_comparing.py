@@ -266,11 +266,11 @@ def test_light_not_yet_shot_is_not_the_reference_s(gpu: Gpu, box: Lightmap) -> N
 
 def test_layers_without_received_light_have_no_other_side(gpu: Gpu, box: Lightmap) -> None:
     texels, reference = reference_of(gpu, box, even(box, (1.0, 1.0, 1.0)))
-    for layer in ("albedo", "residual", "charts"):
+    offered = {"residual": box.texture("t_residual"), "direct": box.texture("t_irradiance")}
+    for layer in ("albedo", "residual", "charts", "direct", "indirect"):
         display = PLAIN.replace(layer=layer)
-        assert (
-            picture(gpu, box, display.replace(show="reference"), reference=reference) == picture(gpu, box, display)
-        ).all()
+        both = picture(gpu, box, display.replace(show="reference"), reference=reference, offered=offered)
+        assert (both == picture(gpu, box, display, offered=offered)).all()
     texels.release()
 
 

@@ -38,7 +38,9 @@ def test_the_lamp_does_not_flicker_through_its_ceiling(
     """0.1 mm between them: every pixel whose ray meets the lamp first shows it, none else."""
     lamp_centre = np.array([0.278, 0.5487, 0.2795])
     view = looking_at(np.array(eye), lamp_centre)
-    image = picture(gpu, box, PLAIN.replace(layer="residual"), view=view)
+    image = picture(
+        gpu, box, PLAIN.replace(layer="residual"), view=view, offered={"residual": box.texture("t_residual")}
+    )
     bright = (image > 250).all(-1)
     pixels = some_pixels(rng, 1500)
     triangle, _ = hits(box.scene, view, pixels)

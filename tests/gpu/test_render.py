@@ -45,7 +45,7 @@ def test_pixels_show_their_texel(gpu: Gpu, box: Lightmap, rng: np.random.Generat
     display = DisplayOptions(layer=layer, tone_map=tone, interpolation="nearest", exposure=-1.5)
     renderer = FrameRenderer(gpu)
     target = gpu.target(gpu.texture(SIZE, 4, "f1"))
-    renderer.render(target, SIZE, box, view_of(box), display)
+    renderer.render(target, SIZE, box, view_of(box), display, offered={"residual": box.texture("t_residual")})
     shown = np.frombuffer(target.read(components=3), np.uint8).reshape(SIZE[1], SIZE[0], 3)[::-1] / 255
     compared = 0
     for x, y in some_pixels(rng, 60):

@@ -149,6 +149,11 @@ class Hits:
             first, count = first + some, count - some
             yield
 
+    def bank_of(self, ray: int) -> tuple[Texture, int, int]:
+        """Where a ray of each texel is kept: in which texture, with how many others, and the first of them."""
+        nth = ray // self.bank
+        return self._banks[nth].hits, min(self.bank, self.count - nth * self.bank), nth * self.bank
+
     def lost(self) -> tuple[Texture, int]:
         """How many rays of each texel left the scene, and how many ended on black sides, see lost.frag.glsl, of so many."""
         width, height = self._points.size

@@ -27,6 +27,7 @@ from app.solvers.gathering.bounces import Bounces, steps_to
 from app.solvers.gathering.compose import Compose, noise_of
 from app.solvers.gathering.direct import PASS, DirectLight
 from app.solvers.gathering.hits import GROUP, Hits
+from app.solvers.gathering.inspectable import Inspectable
 from app.solvers.gathering.lamps import by_rays
 from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.origins import Origins
@@ -64,6 +65,7 @@ class Gathering:
         self.bounces = Bounces(gpu, self.points)
         self._compose = Compose(gpu, lightmap, self.origins, self.points, self._at)
         self._balance = Balance(gpu, self.points)
+        self._inspectable = Inspectable(gpu, lightmap, self.points, self._at, self.hits, self._directs, self._compose)
         self._under_way: Generator[None, None, int] | None = None
         self._judged: list[tuple[int, ReadBack]] = []
         self._progress = Progress(0, 1.0, np.zeros(3))
@@ -303,9 +305,13 @@ class Gathering:
         """Rays of each texel whose hits are kept."""
         return {"kept_rays": self.hits.count}
 
+    @property
+    def layers(self) -> Mapping[str, Texture]:
+        return self._inspectable.layers(self._shown)
+
     def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
-        """How much is traced and kept."""
-        return Inspection(facts={"Rays traced": f"{self.traced:,}", "Kept hits": f"{self.hits.memory / 2**20:.0f} MiB"})
+        """How much is traced and kept; of a texel, its rays, and what they bring."""
+        return self._inspectable.inspect(texel, self.bounces.outgoing if images else None)
 
     @property
     def traced(self) -> int:
@@ -338,6 +344,7 @@ class Gathering:
         if refinement is not None and refinement.follower is self:
             refinement.follower = None
         parts: tuple[Any, ...] = (
+            self._inspectable,
             self._balance,
             self._compose,
             self.bounces,

@@ -260,6 +260,10 @@ class Shooting:
         """The level that shoots in the end, and the edge of a full face of the visibility map [px]."""
         return {"level": self.batch.phases.finest.level, "resolution": self.batch.see.resolution}
 
+    @property
+    def layers(self) -> Mapping[str, Texture]:
+        return {"residual": self.lightmap.texture("t_residual")}
+
     def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
         """What ``last_shot`` saw, its patch, and the patch of a texel."""
         shot, facts, pictures, of_texel = self.last_shot, {"Projection": self.options.projection}, {}, {}

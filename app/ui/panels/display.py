@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 
 from app.render.false_colour import UNITS, measured
+from app.render.options import FALSE_COLOURS
 from app.ui import widgets
 from app.ui.panels import compare
 from app.ui.state import State
@@ -21,9 +22,10 @@ COMPARED = ("show", "split")  # the Compare panel has them
 def draw(view: View, state: State) -> None:
     """The whole panel: DisplayOptions, one widget each; the false-colour scale only while it is used."""
     kind = measured(view.shown)
-    skip = {"off": SCALED, "error": (*SCALED, *DEVELOPED)}.get(kind, DEVELOPED)
+    skip = SCALED if kind == "off" else DEVELOPED if kind in FALSE_COLOURS else (*SCALED, *DEVELOPED)
     unit = {"false_colour_max": UNITS[kind]} if kind in UNITS else {}
-    edited = widgets.edit_options(view.display, skip=(*skip, *COMPARED), units=unit)
+    display = view.display if view.display.layer in view.layers else view.shown
+    edited = widgets.edit_options(display, skip=(*skip, *COMPARED), units=unit, choices={"layer": view.layers})
     if edited.layer == "error" and view.display.layer != "error":
         state.act(lambda: compare.show(view, state, "error"))  # which says so where there is no reference
     else:

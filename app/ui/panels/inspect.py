@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
 
+from app.render.ray_picture import LINES
+from app.solvers import HEMISPHERE
 from app.ui import theme, widgets
 from app.ui.panels import atlas
 from app.ui.state import State
@@ -15,6 +17,8 @@ if TYPE_CHECKING:
     from app.session.view import View
 
 REFRESH_SECONDS = 0.25  # between two pictures of it
+DISC_SHARE = 0.8  # of the panel's width
+SYMBOL_EM = 1.0, 1.4  # width of the column of symbols, without and with indices
 
 
 def draw(view: View, state: State) -> None:
@@ -32,16 +36,22 @@ def draw(view: View, state: State) -> None:
 
 
 def _solver(view: View, state: State) -> None:
-    """What the solver shows of its last work: a fold for each of its pictures, with what there is to say below the first."""
+    """What the solver shows of its last work and of the picked texel: a fold for each of its pictures, with what there is to say
+    below the first."""
     state.inspected_age += imgui.get_io().delta_time
     for nth, (caption, meaning) in enumerate(view.session.family.pictures.items()):
-        if not widgets.fold(caption):
+        of_texel = caption == HEMISPHERE
+        if (of_texel and _texel(state) is None) or not widgets.fold(caption):
             continue
         inspection = _inspection(view, state)
+        if of_texel:
+            widgets.labelled("Rays in the room")
+            state.draw_rays = imgui.checkbox("##rays", state.draw_rays)[1]
+            widgets.tooltip(f"Draw the first {LINES} rays of the picked texel, each in the light that it brings")
         image = inspection.images.get(caption)
         if image is None or state.texture_id is None:
             continue
-        width = widgets.steady_width()
+        width = widgets.steady_width() * (DISC_SHARE if of_texel else 1.0)
         imgui.image(
             imgui.ImTextureRef(state.texture_id(image)),
             imgui.ImVec2(width, width * image.size[1] / image.size[0]),
@@ -55,11 +65,16 @@ def _solver(view: View, state: State) -> None:
 
 def _inspection(view: View, state: State) -> Any:
     """With pictures, made anew a few times a second, and whenever the textures behind them may be others."""
-    session = view.session
-    source = session.lightmap, session.solver, session.options
+    session, texel = view.session, _texel(state)
+    source = session.lightmap, session.solver, session.options, texel, view.display
     if state.inspected is None or state.inspected[0] != source or state.inspected_age >= REFRESH_SECONDS:
-        state.inspected, state.inspected_age = (source, session.solver.inspect(images=True)), 0.0
+        state.inspected, state.inspected_age = (source, view.inspect(texel)), 0.0
     return state.inspected[1]
+
+
+def _texel(state: State) -> tuple[int, int] | None:
+    """The one that was picked, if its side has texels."""
+    return state.picked.texel if state.picked is not None and state.picked.area > 0 else None
 
 
 def _surface(view: View, picked: Picked) -> None:
@@ -86,13 +101,16 @@ def _light(view: View, picked: Picked) -> None:
         ("B", picked.B, "radiosity: all light that leaves"),
         ("E", picked.E, "exitance of its own"),
         ("H", picked.H, "irradiance: light received"),
+        *((f"H{name[0]}", part, f"the {name} part of it") for name, part in picked.parts.items()),
         *([] if right is None else [("R", right, "irradiance of the reference")]),
-        ("r", picked.r, "residual: not yet shot"),
+        *([("r", picked.r, "residual: not yet shot")] if "residual" in view.session.family.layers else []),
         ("ρ", picked.albedo, "albedo"),
     )
     if not imgui.begin_table("light", 4, imgui.TableFlags_.sizing_stretch_prop):
         return
-    imgui.table_setup_column("", imgui.TableColumnFlags_.width_fixed, imgui.get_font_size())
+    imgui.table_setup_column(
+        "", imgui.TableColumnFlags_.width_fixed, imgui.get_font_size() * SYMBOL_EM[bool(picked.parts)]
+    )
     for channel in ("red", "green", "blue"):
         imgui.table_setup_column(channel)
     imgui.table_headers_row()

@@ -56,3 +56,12 @@ vec3 cosine_direction(vec3 normal, vec2 share) {
     float r = sqrt(share.x), phi = 2.0 * PI * share.y;
     return frame_of(normal) * vec3(r * cos(phi), r * sin(phi), sqrt(max(1.0 - share.x, 0.0)));
 }
+
+const uint GATHER = 0u;  // stream of random numbers
+
+// The k-th ray of a texel, the same whenever it is asked for. [Kahl22]
+void kth_ray(Origin o, int k, out vec3 start, out vec3 direction) {
+    vec4 share = numbers(o.place, GATHER, k);
+    start = start_of(o, share.zw);
+    direction = cosine_direction(o.normal, share.xy);
+}

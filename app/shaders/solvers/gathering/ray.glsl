@@ -4,11 +4,10 @@
 #include "solvers/gathering/origin.glsl"
 #include "visibility/rays.glsl"
 
-const uint GATHER = 0u;  // stream of random numbers
-
 uint trace(Origin o, int k) {
-    vec4 share = numbers(o.place, GATHER, k);
-    Hit hit = closest_hit(start_of(o, share.zw), cosine_direction(o.normal, share.xy), 0.0, 2.0 * FAR);
+    vec3 start, direction;
+    kth_ray(o, k, start, direction);
+    Hit hit = closest_hit(start, direction, 0.0, 2.0 * FAR);
     if (hit.slot < 0) return no_texel(ESCAPED);
     vec2 place = place_of(hit);
     ivec2 px = place.x < 0.0 ? ivec2(-1) : texel_px_at(place);
