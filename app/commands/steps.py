@@ -58,7 +58,8 @@ def open_scene(
 
 def solve(session: Session, flags: argparse.Namespace, console: Console) -> NotFiniteError | None:
     """Solve. What broke the light is returned: what there is can still be written."""
-    stop = Stop(work=flags.work, seconds=flags.time)
+    error, rms = (None if asked is None else asked / 100 for asked in (flags.error, flags.error_rms))
+    stop = Stop(flags.work, flags.time, error, rms)
 
     def say(stats: Stats) -> None:
         tell(f"{stats.done} {stats.unit}, {stats.remaining:.3%} {stats.remains}", session.run.share_done(stop))

@@ -40,6 +40,10 @@ class ErrorEstimate(NamedTuple):
     median: float
     points: int
 
+    def within(self, *, median: float | None = None, rms: float | None = None) -> bool:
+        """Whether it is as little as asked for, where it is."""
+        return (median is None or self.median <= median) and (rms is None or self.rms <= rms)
+
 
 class ErrorEstimator:
     """Estimates the error of one lightmap, from so many hemicubes (``maps``) at a time. Whoever makes it releases it."""

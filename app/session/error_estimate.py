@@ -18,7 +18,8 @@ class RunningEstimate:
     """The error estimate of the open scene's light, worked out in parts. Whoever makes it calls ``release`` before the lightmap
     is released.
 
-    error: None as long as it is not known, or where nothing is lit; share: of the points that have been looked from.
+    error: None as long as it is not known, or where nothing is lit; share: of the points that have been looked from. seconds:
+    that the next one may take, unless fewer points would be too few.
     """
 
     def __init__(self, gpu: Gpu) -> None:
@@ -27,7 +28,7 @@ class RunningEstimate:
         self._parts: Generator[float, None, ErrorEstimate | None] | None = None
         self._of: object = None
         self.error: ErrorEstimate | None = None
-        self.share = 0.0
+        self.share, self.seconds = 0.0, SECONDS
 
     def knows(self, state: object) -> bool:
         """Whether all is known of the light in this state."""
@@ -41,7 +42,7 @@ class RunningEstimate:
             if self._expectation is None:
                 maps = MAPS if len(lightmap.scene.triangles) < MANY else 1
                 self._expectation = ErrorEstimator(self._gpu, lightmap, maps)
-            self._of, self._parts = state, self._expectation.parts(returned, SECONDS)
+            self._of, self._parts = state, self._expectation.parts(returned, self.seconds)
         elif self._parts is not None:
             try:
                 self.share = next(self._parts)
