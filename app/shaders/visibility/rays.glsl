@@ -34,7 +34,7 @@ ivec2 entry_px(int entry, int texels) { return ivec2((entry & ((1 << ROW_BITS) -
 struct Shear {
     bool first, second;  // whether the first, the second axis is the third one here; the next ones then are the first and second
     vec2 slope;
-    float inverse;  // of the component; where it is negative, first and second axis change places, so that no side does
+    float inverse;  // of the component; where it is negative, left and right have changed places
 };
 
 vec3 turned(Shear shear, vec3 v) { return shear.first ? v.yzx : shear.second ? v.zxy : v; }
@@ -52,7 +52,7 @@ Shear shear_along(vec3 direction) {
 vec3 sheared(Shear shear, vec3 v) {
     v = turned(shear, v);
     precise vec3 s = vec3(v.xy - shear.slope * v.z, v.z * shear.inverse);
-    return shear.inverse < 0.0 ? s.yxz : s;
+    return s;
 }
 
 float edge(vec2 p, vec2 q) {
@@ -68,10 +68,12 @@ void meet(inout Hit hit, int slot, vec3 origin, Shear shear, float nearest) {
     vec3 c = sheared(shear, texelFetch(t_bvh_triangles, px + ivec2(2, 0), 0).xyz - origin);
     vec3 sides = vec3(edge(c.xy, b.xy), edge(a.xy, c.xy), edge(b.xy, a.xy));
     float sum = sides.x + sides.y + sides.z;  // 0: seen edge-on, or degenerate
-    bool inside = sum > 0.0 ? all(greaterThanEqual(sides, vec3(0.0))) : sum < 0.0 && all(lessThanEqual(sides, vec3(0.0)));
+    float least = min(sides.x, min(sides.y, sides.z)), most = max(sides.x, max(sides.y, sides.z));
+    bool inside = sum != 0.0 && (least >= 0.0 || most <= 0.0);
     sides /= sum;
     float distance = dot(sides, vec3(a.z, b.z, c.z));
-    if (inside && distance >= nearest && distance < hit.distance) hit = Hit(distance, slot, sides.yz, sum > 0.0);
+    if (inside && distance >= nearest && distance < hit.distance)
+        hit = Hit(distance, slot, sides.yz, (sum > 0.0) == (shear.inverse > 0.0));
 }
 
 // (first, last) distance within a box; it is met where first <= last.
