@@ -29,6 +29,15 @@ def room(rng: np.random.Generator) -> F64:
     return np.concatenate([np.array(shapes.box((1, 1, 1)).positions)[shapes.box((1, 1, 1)).triangles] + 0.5, *heaps])
 
 
+def corridor(rng: np.random.Generator) -> F64:
+    """Most of it near one end."""
+    corners = soup(rng, 1500)
+    return (corners - corners[:, :1]) * 0.01 + corners[:, :1] ** [12, 1, 6]
+
+
+SCENES = {"soup": lambda rng: soup(rng, 1500), "ball": lambda rng: ball(3), "room": room, "corridor": corridor}
+
+
 def leaves_of(bvh: Bvh) -> list[tuple[int, int, F64, int]]:
     """Of each leaf: first slot, triangles, the box (2, 3) in its parent, levels above."""
     found, todo = [], [(0, 1, np.array([[-np.inf] * 3, [np.inf] * 3]))]
@@ -90,7 +99,7 @@ def test_triangles_that_no_place_parts(rng: np.random.Generator, kind: str) -> N
 
 @pytest.mark.parametrize("kind", ["soup", "ball", "room"])
 def test_cells_hold_the_boxes(rng: np.random.Generator, kind: str) -> None:
-    corners = {"soup": soup(rng, 2000), "ball": ball(4), "room": room(rng)}[kind] - 0.5
+    corners = SCENES[kind](rng) - 0.5
     bvh = build_bvh(corners)
     table, gridded = node_table(bvh)
     assert gridded and table.shape == (len(bvh.nodes) + 1, 2, 4)
@@ -133,10 +142,10 @@ def slow_cost(boxes: F64) -> float:
     return whole * STEP + slow_cost(boxes[parted]) + slow_cost(boxes[~parted])
 
 
-@pytest.mark.parametrize("kind", ["soup", "ball", "room"])
+@pytest.mark.parametrize("kind", SCENES)
 def test_it_costs_what_a_slow_build_costs(rng: np.random.Generator, kind: str) -> None:
     """Within a tenth; that cost is the tree's own."""
-    corners = {"soup": soup(rng, 1500), "ball": ball(3), "room": room(rng)}[kind]
+    corners = SCENES[kind](rng)
     boxes = np.stack([corners.min(1), corners.max(1)], 1)
     bvh = build_bvh(corners)
     assert bvh.cost <= 1.1 * slow_cost(boxes) / area(boxes)
