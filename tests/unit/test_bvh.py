@@ -11,7 +11,7 @@ from app.scene.model import F64
 from app.visibility.bvh import DEEPEST, LEAF, STEP, Bvh, build_bvh
 from app.visibility.bvh_table import node_table
 
-BINS = 32  # of the slow build: finer than those of the quick one
+BINS = 16
 
 
 def soup(rng: np.random.Generator, count: int) -> F64:
@@ -25,17 +25,17 @@ def ball(subdivisions: int) -> F64:
 
 def room(rng: np.random.Generator) -> F64:
     """Large walls, and heaps of small triangles in it."""
-    heaps = [0.02 * soup(rng, 500) + rng.random(3) for _ in range(4)]
+    heaps = [0.02 * soup(rng, 200) + rng.random(3) for _ in range(4)]
     return np.concatenate([np.array(shapes.box((1, 1, 1)).positions)[shapes.box((1, 1, 1)).triangles] + 0.5, *heaps])
 
 
 def corridor(rng: np.random.Generator) -> F64:
     """Most of it near one end."""
-    corners = soup(rng, 1500)
+    corners = soup(rng, 800)
     return (corners - corners[:, :1]) * 0.01 + corners[:, :1] ** [12, 1, 6]
 
 
-SCENES = {"soup": lambda rng: soup(rng, 1500), "ball": lambda rng: ball(3), "room": room, "corridor": corridor}
+SCENES = {"soup": lambda rng: soup(rng, 800), "ball": lambda rng: ball(3), "room": room, "corridor": corridor}
 
 
 def leaves_of(bvh: Bvh) -> list[tuple[int, int, F64, int]]:
