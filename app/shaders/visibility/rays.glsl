@@ -6,9 +6,6 @@
 // origin. Edges are decided there by the sign of a difference of two products, which rounding can turn to zero, never to its
 // opposite, and which is the same but for its sign for both triangles of an edge; zero is inside. Boxes: a hit that the triangle
 // test finds may be three roundings outside of its box [Ize13]; BOX_FAR allows for eight.
-//
-// [Woop13] S. Woop, C. Benthin, I. Wald, Watertight ray/triangle intersection, JCGT 2(1), 2013.
-// [Ize13] T. Ize, Robust BVH ray traversal, JCGT 2(2), 2013.
 #define STACK    // entries: levels of inner nodes in the tree
 #define BOX_GRID  // 1: boxes are of whole cells of a grid, in half the texels, 0: of floats
 
@@ -24,7 +21,7 @@ struct Hit {
 };
 
 const int ROW_BITS = 10;  // 2^ROW_BITS nodes, or slots, lie in a row of their texture
-const int COUNT_BITS = 3;  // of a leaf's count, on the stack
+const int COUNT_BITS = 3;  // of a leaf's count, in its name
 const float BOX_FAR = 1.0 + 1.0 / 2097152.0;  // 4 ulp
 const float LEAST = 1e-24;  // of a component of the direction: 0 times its inverse is 0, and a box's margin times it is beyond all
 
