@@ -169,7 +169,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(
 
 
 def test_every_command_explains_itself(capsys: pytest.CaptureFixture[str]) -> None:
-    for line in ("", "view", "shot", "bake", "info", "doctor", "bench", "bench shots", "bench frames"):
+    for line in ("", "view", "shot", "bake", "info", "doctor", "bench", "bench shots", "bench rays", "bench frames"):
         assert code_of(f"{line} --help") == 0
         assert "usage: glowtree" in capsys.readouterr().out
 
