@@ -63,7 +63,7 @@ class Gathering:
         self.direct = DirectLight(gpu, lightmap, self.rays, self.origins)
         self.at_points = DirectLight(gpu, self.points, self.rays, self._at) if adaptive else self.direct
         self.bounces = Bounces(gpu, self.points)
-        self._compose = Compose(gpu, lightmap, self.origins, self.points, self._at)
+        self._compose = Compose(gpu, lightmap, self.origins, self.points, self._at, self.rays)
         self._balance = Balance(gpu, self.points)
         self._inspectable = Inspectable(gpu, lightmap, self.points, self._at, self.hits, self._directs, self._compose)
         self._under_way: Generator[None, None, int] | None = None
