@@ -26,6 +26,7 @@ ENOUGH = 2_000_000  # units of work: a solve that needs more does not converge
 FULL, HEMICUBE = "rgba32f", "hemicube"
 LEAST = 1e-9  # residual that can be asked for
 NOISE = {"small": 0.02, "large": 5e-3}  # that may remain where light is gathered, RMS over all surfaces, over the mean
+FEW_RAYS = 64  # of each texel: the noise of fewer is itself not known
 IMBALANCE = "of single shots' sums, on average: a texel is sampled at its centroid, its shooter's sight at one point"
 EACH = "and each bounce may lose what grazes, (4/R)²"
 NO_NUMBER = "every texel holds a finite number"
@@ -182,8 +183,8 @@ class HardCase:
     scene: of a size. control: a clean scene, solved alike, whose answer it must have. checks: of a solution and of its control's,
     or of the same one twice where there is none. density: texels/m by size, of quadtrees the roots', for a scene that is
     ``scale`` times as large as its control; map: pixels of visibility maps by size. Solved until no more than ``residual``
-    remains, or NOISE, or for so much ``work`` in the solver's unit, or so many ``rays`` where light is gathered. imbalance: of energy that there may be either way, and why; grazes:
-    whether each bounce may lose a little more.
+    remains, or NOISE, or for so much ``work`` in the solver's unit, or so many ``rays`` where light is gathered. imbalance: of
+    energy that there may be either way, and why; grazes: whether each bounce may lose a little more.
     """
 
     name: str
@@ -248,7 +249,12 @@ class HardCase:
         options = method.options(self.map[i], least)
         with opened(gpu, scene, atlas, light, options, method.solver) as (lightmap, solver):
             batch = method.family.batch
-            solve_until(solver, batch, lambda now: now.done >= last or (now.converged and now.remaining <= least))
+            few = FEW_RAYS if gathers else 0
+            solve_until(
+                solver,
+                batch,
+                lambda now: now.done >= last or (now.done >= few and now.converged and now.remaining <= least),
+            )
             done, energy = solver.poll(wait=True).done, solver.energy()
             surfaces = lightmap.pool.surfaces
             covered = surfaces.area > 0
