@@ -236,8 +236,8 @@ def begin(
     solver: str = DEFAULT_SOLVER,
     **options: object,
 ) -> Solution:
-    """The scene before the first shot. options: of LightmapOptions and of solvers, each of which takes its own. Where leaves come and go, texels and
-    density are those of the roots, which uniform texels are as fine as, and shooting levels count from there."""
+    """The scene before any work. options: of LightmapOptions, and of solvers, each of which takes its own. Where leaves come and
+    go, texels and density are those of the roots, which uniform texels are as fine as, and shooting levels count from there."""
     charts = parametrize(scene, texels=texels, density=density, tile=tile)
     held = {spec.name: options.pop(spec.name) for spec in specs(LightmapOptions) if spec.name in options}
     gathers = {spec.name: options.pop(spec.name) for spec in specs(GatheringOptions) if spec.name in options}
