@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -162,7 +163,37 @@ def test_many_lamps_cost_no_more_rays_and_lose_no_light(gpu: Gpu, count: int, ma
     noise = np.sqrt((lit.area**2 * lit.variance).sum()) / 100.0
     assert abs(lit.book.imbalance_share) < 4 * noise + 2 * SOLVED
     assert lit.book.escaped.max() == 0
+    # bounces are those of the direct light that is known by now, not of what few rays said of it: solved again when rays double
+    H, flux = lit.H, (lit.H * lit.area[:, None]).sum()
+    lit.rays.set_materials(lit.lightmap.scene.materials)
+    lit.step(8)
+    lit.rays.settle()
+    assert (lit.H * lit.area[:, None]).sum() == pytest.approx(flux, rel=noise + 2 * SOLVED)
+    assert (lit.H != H).any()
     lit.release()
+
+
+def test_a_lamp_in_many_pieces_gives_the_light_of_one(gpu: Gpu) -> None:
+    """Few triangles are summed in closed form, many by their shadow rays alone: the same light, but for noise, Z = 4."""
+    floor = [[0, 0, 0], [0, 0, 2], [2, 0, 2], [2, 0, 0]]
+    light = []
+    for n in (1, 18):
+        at = np.linspace(0.5, 1.5, n + 1)
+        lamp = [
+            [(x, 0.5, z), (X, 0.5, z), (X, 0.5, Z), (x, 0.5, Z)]
+            for x, X in itertools.pairwise(at)
+            for z, Z in itertools.pairwise(at)
+        ]
+        scene = quads_scene([floor, *lamp], [grey(0.0), grey(0.0, 1.0)], [0] + [1] * len(lamp))
+        lit = gathered(gpu, scene, 512, density=8)
+        assert lit.rays.direct.sets[0].lamps.closed_form == (n == 1)
+        on = lit.object == 0
+        flux, noise = (lit.H[:, 0] * lit.area)[on].sum(), np.sqrt((lit.area**2 * lit.variance)[on].sum())
+        light.append((flux, noise))
+        lit.release()
+    (one, none), (many, noise) = light
+    assert none == pytest.approx(0, abs=1e-6) and 0 < noise < 0.01 * one
+    assert abs(many - one) < 4 * noise
 
 
 # -- what is kept ------------------------------------------------------------------------------------------------------
