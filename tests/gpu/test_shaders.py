@@ -20,6 +20,7 @@ from app.options import specs
 from app.render.layers import LAYER_SHADERS
 from app.render.options import TONE_MAPS
 from app.render.resolve import BORDER, PLACES_WIDTH
+from app.solvers.gathering.compose import RADIUS
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 from app.solvers.shooting.records import BATCH, BLOCK_LEVEL, BLOCK_ROWS, CELL_LEVEL, EMITTER, GROUP, LEVELS, RECORDS
 from app.solvers.shooting.see import ESCAPED_BLOCK
@@ -65,6 +66,11 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "ANY": FLAG,
     "BOX_GRID": FLAG,
     "STACK": (DEEPEST,),
+    "CLOSED_FORM": FLAG,
+    "TRACED": FLAG,
+    "FINER": FLAG,
+    "RADIUS": (0, 1, RADIUS),
+    "DEVIATIONS": (1.5,),
     "VISIBILITY": tuple(range(len(VISIBILITIES))),
 }
 SLOTS = {
