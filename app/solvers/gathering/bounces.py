@@ -34,7 +34,7 @@ def steps_to(tolerance: float, reflected: float) -> int:
 class Bounces:
     """Of one lightmap: ``solution`` is H on every texel [stored units]. Whoever makes it releases it.
 
-    reflected: λ, the mean albedo of the colour that is reflected most.
+    reflected: λ, the mean albedo of the colour that is reflected most. steps: of the last ``solve``.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
@@ -46,7 +46,7 @@ class Bounces:
         self.outgoing = gpu.texture((width, height + 1), 4, "f4")  # one row more: see hit.glsl
         self._outgoing_target = gpu.target(self.outgoing)
         self._outgoing_target.clear()
-        self.reflected = 0.0
+        self.reflected, self.steps = 0.0, 0
         self._sources: Texture | None = None
         self._fit()
 
@@ -60,6 +60,7 @@ class Bounces:
 
     def clear(self) -> None:
         """No light."""
+        self.steps = 0
         for target in (*self._targets, self._gathered_target):
             target.clear()
 
@@ -82,7 +83,7 @@ class Bounces:
 
     def solve(self, hits: Hits, direct: Texture, rays: int, steps: int) -> Iterator[None]:
         """So many steps from the solution as it is, along so many rays of each texel, in parts."""
-        omega = 1.0
+        omega, self.steps = 1.0, steps
         for step in range(steps):
             yield from self.gather(hits, 0, rays, anew=True)
             if step == 1:
