@@ -27,12 +27,11 @@ from app.visibility.bvh_split import Boxes, Ints, Mask, half_area, split_nodes
 ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 LEAF = 4  # triangles, at most
-STEP = 1.0  # cost of a node, in triangles
+STEP = 2.0  # cost of a node, in triangles
 DEEPEST = 28  # levels of inner nodes, where halving allows it: a ray's stack holds as many
 NOWHERE = 1e30  # along each axis
-MARGIN = (
-    2.0**-24
-)  # of the largest coordinate: corners are rounded to it, and rays along a face of a box are inside of it
+# Of the largest coordinate: corners are rounded to it on the GPU, and what runs along a side of a box is inside of it
+MARGIN = 2.0**-24
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +52,10 @@ def build_bvh(corners: F64, tell: Callable[[float], None] | None = None) -> Bvh:
     count = len(corners)
     boxes = Boxes(corners.min(1).astype(np.float32), corners.max(1).astype(np.float32))
     tree = _Tree(count)
-    if 0 < count <= LEAF:
-        tree.order[:] = np.arange(count)
-        tree.references[0, 0], tree.counts[0, 0] = 0, count
-    elif count:
+    if count < 2:
+        tree.add_level(np.array([-1]))
+        tree.add_leaves(np.zeros(count, np.int64), np.arange(count), np.ones(count, np.int64))
+    else:
         _grow(tree, boxes, tell or (lambda share: None))
     return tree.finish(corners)
 
@@ -69,7 +68,20 @@ class _Tree:
         self.references = np.full((max(count, 1), 2), -1, np.int64)
         self.counts = np.zeros((max(count, 1), 2), np.int64)
         self.order = np.zeros(count, np.int32)
-        self.levels = [0, 1]
+        self.levels = [0]
+
+    def add_leaves(self, parent: Ints, first: Ints, counts: Ints) -> None:
+        """parent: twice the node that they are children of, one more for its second child; first: their slots."""
+        self.references.reshape(-1)[parent] = first
+        self.counts.reshape(-1)[parent] = counts
+
+    def add_level(self, parent: Ints) -> None:
+        """Inner nodes, of whom the root has no parent: -1."""
+        begin = self.levels[-1]
+        if len(parent):
+            below = parent >= 0
+            self.references.reshape(-1)[parent[below]] = begin + np.flatnonzero(below)
+            self.levels.append(begin + len(parent))
 
     def finish(self, corners: F64) -> Bvh:
         """Fit the boxes, from the leaves up."""
@@ -97,41 +109,50 @@ class _Tree:
 
 
 def _grow(tree: _Tree, boxes: Boxes, tell: Callable[[float], None]) -> None:
-    """Part the nodes of one level after the other."""
+    """Part the nodes of one level after the other. Of a level, triangles come node by node, from the slots ``first`` on."""
     count = len(boxes.lower)
-    items, counts, first = np.arange(count), np.array([count]), np.array([0])
+    items, counts, first, parent = np.arange(count), np.array([count]), np.array([0]), np.array([-1])
     done = 0
     while len(counts):
-        right = _sides(boxes, counts, DEEPEST - (len(tree.levels) - 2))
-        # Triangles of the left child come before those of the right one, each in their old order
-        node = np.repeat(np.arange(len(counts)), counts)
-        start = np.cumsum(counts) - counts
-        on_right = np.bincount(node, right, len(counts)).astype(np.int64)
-        passed: Ints = np.cumsum(right) - right
-        passed -= passed[start][node]  # triangles of the node before this one that go right
-        place = np.arange(len(items)) - passed
-        middle = start + counts - on_right
-        place[right] = (middle[node] + passed)[right]
-        items, boxes = _placed(items, place), Boxes(_placed(boxes.lower, place), _placed(boxes.upper, place))
-        children = np.stack([counts - on_right, on_right], 1).reshape(-1)
-        firsts = np.stack([first, first + counts - on_right], 1).reshape(-1)
-        is_leaf = children <= LEAF
-        done += int(children[is_leaf].sum())
-        # Note the children
-        begin, end = tree.levels[-2:]
-        inner = np.flatnonzero(~is_leaf)
-        references = firsts.copy()
-        references[inner] = end + np.arange(len(inner))
-        tree.references[begin:end] = references.reshape(-1, 2)
-        tree.counts[begin:end] = np.where(is_leaf, children, 0).reshape(-1, 2)
-        kept = np.repeat(~is_leaf, children)
-        slots = np.repeat(firsts - (np.cumsum(children) - children), children) + np.arange(len(items))
-        tree.order[slots[~kept]] = items[~kept]
-        items, boxes = items[kept], Boxes(boxes.lower[kept], boxes.upper[kept])
-        counts, first = children[inner], firsts[inner]
-        if len(inner):
-            tree.levels.append(end + len(inner))
+        level = len(tree.levels) - 1
+        cost, right = split_nodes(boxes, counts)
+        is_leaf = _leaves(boxes, counts, cost) & (parent >= 0)
+        leaf = np.repeat(is_leaf, counts)
+        slots = np.arange(len(items)) + np.repeat(first - (np.cumsum(counts) - counts), counts)
+        tree.order[slots[leaf]] = items[leaf]
+        tree.add_leaves(parent[is_leaf], first[is_leaf], counts[is_leaf])
+        tree.add_level(parent[~is_leaf])
+        done += int(counts[is_leaf].sum())
         tell(done / count)
+        if is_leaf.any():
+            items, right, boxes = items[~leaf], right[~leaf], Boxes(boxes.lower[~leaf], boxes.upper[~leaf])
+            counts, first, cost = counts[~is_leaf], first[~is_leaf], cost[~is_leaf]
+        if not len(counts):
+            break
+        _halve(boxes, counts, right, ~np.isfinite(cost) | (np.ceil(np.log2(counts / LEAF)) >= DEEPEST - level))
+        place, on_right = _places(counts, right)
+        items, boxes = _placed(items, place), Boxes(_placed(boxes.lower, place), _placed(boxes.upper, place))
+        parent = np.arange(2 * len(counts)) + 2 * tree.levels[-2]
+        first = np.stack([first, first + counts - on_right], 1).reshape(-1)
+        counts = np.stack([counts - on_right, on_right], 1).reshape(-1)
+
+
+def _leaves(boxes: Boxes, counts: Ints, cost: NDArray[np.float32]) -> Mask:
+    """Which nodes stay whole: those of one triangle, and small ones that parting makes no cheaper. cost: of parting."""
+    start = np.cumsum(counts) - counts
+    area = half_area(np.minimum.reduceat(boxes.lower, start), np.maximum.reduceat(boxes.upper, start))
+    return np.asarray((counts == 1) | ((counts <= LEAF) & (area * STEP + cost >= area * counts)))
+
+
+def _places(counts: Ints, right: Mask) -> tuple[Ints, Ints]:
+    """Where each triangle goes, so that in each node those of the left child come before those of the right one, in their old
+    order; how many of each node go right."""
+    node, start = np.repeat(np.arange(len(counts)), counts), np.cumsum(counts) - counts
+    on_right = np.bincount(node, right, len(counts)).astype(np.int64)
+    passed: Ints = np.cumsum(right) - right
+    passed -= passed[start][node]  # triangles of the node before this one that go right
+    middle = start + counts - on_right
+    return np.where(right, middle[node] + passed, np.arange(len(right)) - passed), on_right
 
 
 def _placed(values: NDArray[ScalarT], place: Ints) -> NDArray[ScalarT]:
@@ -140,17 +161,11 @@ def _placed(values: NDArray[ScalarT], place: Ints) -> NDArray[ScalarT]:
     return out
 
 
-def _sides(boxes: Boxes, counts: Ints, levels: int) -> Mask:
-    """Whether each triangle goes to the right child, with so many levels left."""
-    cost, right = split_nodes(boxes, counts)
-    halves = np.ceil(np.log2(counts / LEAF)) >= levels
-    by_count = np.flatnonzero(~np.isfinite(cost) | halves)
-    if len(by_count):
-        chosen = np.zeros(len(counts), bool)
-        chosen[by_count] = True
-        rows = np.flatnonzero(np.repeat(chosen, counts))
-        right[rows] = _halves(boxes.take(rows), counts[by_count])
-    return right
+def _halve(boxes: Boxes, counts: Ints, right: Mask, which: Mask) -> None:
+    """Let half of the triangles of each of these nodes go right, in place."""
+    if which.any():
+        rows = np.flatnonzero(np.repeat(which, counts))
+        right[rows] = _halves(boxes.take(rows), counts[which])
 
 
 def _halves(boxes: Boxes, counts: Ints) -> Mask:

@@ -20,7 +20,7 @@ Mask = NDArray[np.bool_]
 FloatsT = TypeVar("FloatsT", F32, F64)
 
 BINS = 16  # along each axis
-SMALL = 16  # triangles of a node that is parted exactly
+WIDTHS = (2, 4, 8, 16)  # triangles of nodes that are parted exactly, up to each of these together
 CHUNK = 1 << 14  # small nodes at once, so that their tables stay in the caches
 
 
@@ -51,13 +51,13 @@ def split_nodes(boxes: Boxes, counts: Ints) -> tuple[NDArray[np.float32], Mask]:
     where no place parts the centres, and whether a triangle (n,) goes to the right."""
     cost = np.full(len(counts), np.inf, np.float32)
     right = np.zeros(len(boxes.lower), bool)
-    small = counts <= SMALL
-    for mine, split in ((small, _split_small), (~small, _split_binned)):
+    sizes = np.searchsorted(WIDTHS, counts)
+    for size in np.unique(sizes[counts > 1]).tolist():
+        mine, split = (sizes == size) & (counts > 1), _split_small if size < len(WIDTHS) else _split_binned
         if mine.all():
             return split(boxes, counts)
-        if mine.any():
-            rows = np.flatnonzero(np.repeat(mine, counts))
-            cost[mine], right[rows] = split(boxes.take(rows), counts[mine])
+        rows = np.flatnonzero(np.repeat(mine, counts))
+        cost[mine], right[rows] = split(boxes.take(rows), counts[mine])
     return cost, right
 
 

@@ -1,11 +1,11 @@
 """Rays find what they meet first in textures that hold the scene's triangles under a tree of boxes: see visibility/rays.glsl.
 
-All is in the solver space (radius 1), in tables of ENTRIES_A_ROW entries a row, RGBA32F:
+All is in the solver space (radius 1), in tables of ENTRIES_A_ROW entries a row:
 
-    t_bvh_nodes      four texels a node: both children, (lower, reference), (upper, count), see bvh.py
-    t_bvh_triangles  three texels a slot: the corners; a of the first: the triangle in the scene
-    t_bvh_uv         three texels a slot: place in the virtual atlas [texels of level 0] of each corner, on the front and on the
-                     back; -1 where that side has no texels
+    t_bvh_nodes      RGBA32UI  two or four texels a node: boxes and names of both children, see bvh_table.py
+    t_bvh_triangles  RGBA32F   three texels a slot: the corners; a of the first: the triangle in the scene
+    t_bvh_uv         RGBA32F   three texels a slot: place in the virtual atlas [texels of level 0] of each corner, on the front
+                               and on the back; -1 where that side has no texels
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from app.gpu import Gpu, Texture, glsl_constant
 from app.lightmap.tile_pool import MAX_FACETS, TilePool
 from app.scene.model import F32, F64
 from app.visibility.bvh import Bvh, build_bvh
+from app.visibility.bvh_table import Words, node_table
 
 ENTRIES_A_ROW = 1 << int(glsl_constant("visibility/rays.glsl", "ROW_BITS"))
 
@@ -40,13 +41,14 @@ class RayScene:
         triangles = np.zeros((len(corners), 3, 4), np.float32)
         triangles[..., :3] = corners[self.bvh.order]
         triangles[:, 0, 3] = self.bvh.order
-        tables = {
-            "t_bvh_nodes": self.bvh.nodes,
+        nodes, grid = node_table(self.bvh)
+        tables: dict[str, F32 | Words] = {
+            "t_bvh_nodes": nodes,
             "t_bvh_triangles": triangles,
             "t_bvh_uv": places_of(pool)[self.bvh.order],
         }
         self.textures: dict[str, Texture] = {name: _uploaded(gpu, table) for name, table in tables.items()}
-        self.defines: dict[str, object] = {"STACK": self.bvh.depth}
+        self.defines: dict[str, object] = {"STACK": self.bvh.depth, "BOX_GRID": grid}
 
     @property
     def memory(self) -> int:
@@ -73,10 +75,11 @@ def places_of(pool: TilePool) -> F32:
     return places
 
 
-def _uploaded(gpu: Gpu, table: F32) -> Texture:
+def _uploaded(gpu: Gpu, table: F32 | Words) -> Texture:
     """Entries (n, texels, 4) in rows of ENTRIES_A_ROW, the last one filled up."""
     count, texels, _ = table.shape
     rows = max(1, -(-count // ENTRIES_A_ROW))
-    filled = np.zeros((rows * ENTRIES_A_ROW, texels, 4), np.float32)
+    filled = np.zeros((rows * ENTRIES_A_ROW, texels, 4), table.dtype)
     filled[:count] = table
-    return gpu.texture((ENTRIES_A_ROW * texels, rows), 4, "f4", filled.tobytes())
+    dtype = "u4" if table.dtype == np.uint32 else "f4"
+    return gpu.texture((ENTRIES_A_ROW * texels, rows), 4, dtype, filled.tobytes())

@@ -63,6 +63,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "COUNT": FLAG,
     "INTEGER": FLAG,
     "ANY": FLAG,
+    "BOX_GRID": FLAG,
     "STACK": (DEEPEST,),
     "VISIBILITY": tuple(range(len(VISIBILITIES))),
 }

@@ -9,9 +9,10 @@
 //
 // [Woop13] S. Woop, C. Benthin, I. Wald, Watertight ray/triangle intersection, JCGT 2(1), 2013.
 // [Ize13] T. Ize, Robust BVH ray traversal, JCGT 2(2), 2013.
-#define STACK  // entries: levels of inner nodes in the tree
+#define STACK    // entries: levels of inner nodes in the tree
+#define BOX_GRID  // 1: boxes are of whole cells of a grid, in half the texels, 0: of floats
 
-uniform sampler2D t_bvh_nodes;      // four texels a node: both children, (lower, reference), (upper, count)
+uniform usampler2D t_bvh_nodes;     // one texel a child, or two, both children of a node in turn: see app/visibility/bvh_table.py
 uniform sampler2D t_bvh_triangles;  // three texels a slot: the corners; a of the first: the triangle in the scene
 uniform sampler2D t_bvh_uv;         // three texels a slot: at each corner, place in the virtual atlas of the front and of the back
 
@@ -29,20 +30,29 @@ const float LEAST = 1e-24;  // of a component of the direction: 0 times its inve
 
 ivec2 entry_px(int entry, int texels) { return ivec2((entry & ((1 << ROW_BITS) - 1)) * texels, entry >> ROW_BITS); }
 
-// What the triangle test makes of a direction: rows of the shear that turns it into the third axis.
-mat3 sheared_from_local(vec3 direction) {
+// What the triangle test makes of a direction: its largest component is the third axis, along which the others are sheared away.
+struct Shear {
+    bool first, second;  // whether the first, the second axis is the third one here; the next ones then are the first and second
+    vec2 slope;
+    float inverse;  // of the component; where it is negative, first and second axis change places, so that no side does
+};
+
+vec3 turned(Shear shear, vec3 v) { return shear.first ? v.yzx : shear.second ? v.zxy : v; }
+
+Shear shear_along(vec3 direction) {
     vec3 size = abs(direction);
-    vec3 z = size.x > size.y && size.x > size.z ? vec3(1, 0, 0) : size.y > size.z ? vec3(0, 1, 0) : vec3(0, 0, 1);
-    vec3 x = z.zxy, y = z.yzx;
-    float along = 1.0 / dot(direction, z);
-    x -= z * (dot(direction, x) * along);
-    y -= z * (dot(direction, y) * along);
-    return transpose(along < 0.0 ? mat3(y, x, z * along) : mat3(x, y, z * along));
+    bool first = size.x > size.y && size.x > size.z;
+    Shear shear = Shear(first, !first && size.y > size.z, vec2(0.0), 0.0);
+    vec3 d = turned(shear, direction);
+    shear.slope = d.xy / d.z;
+    shear.inverse = 1.0 / d.z;
+    return shear;
 }
 
-vec3 sheared(mat3 sheared_from_local, vec3 v) {
-    precise vec3 s = sheared_from_local * v;
-    return s;
+vec3 sheared(Shear shear, vec3 v) {
+    v = turned(shear, v);
+    precise vec3 s = vec3(v.xy - shear.slope * v.z, v.z * shear.inverse);
+    return shear.inverse < 0.0 ? s.yxz : s;
 }
 
 float edge(vec2 p, vec2 q) {
@@ -51,18 +61,17 @@ float edge(vec2 p, vec2 q) {
 }
 
 // Replaces ``hit`` where the triangle of a slot is met after ``nearest`` and before it.
-void meet(inout Hit hit, int slot, vec3 origin, mat3 sheared_from_local, float nearest) {
+void meet(inout Hit hit, int slot, vec3 origin, Shear shear, float nearest) {
     ivec2 px = entry_px(slot, 3);
-    vec3 a = sheared(sheared_from_local, texelFetch(t_bvh_triangles, px, 0).xyz - origin);
-    vec3 b = sheared(sheared_from_local, texelFetch(t_bvh_triangles, px + ivec2(1, 0), 0).xyz - origin);
-    vec3 c = sheared(sheared_from_local, texelFetch(t_bvh_triangles, px + ivec2(2, 0), 0).xyz - origin);
+    vec3 a = sheared(shear, texelFetch(t_bvh_triangles, px, 0).xyz - origin);
+    vec3 b = sheared(shear, texelFetch(t_bvh_triangles, px + ivec2(1, 0), 0).xyz - origin);
+    vec3 c = sheared(shear, texelFetch(t_bvh_triangles, px + ivec2(2, 0), 0).xyz - origin);
     vec3 sides = vec3(edge(c.xy, b.xy), edge(a.xy, c.xy), edge(b.xy, a.xy));
-    if (any(lessThan(sides, vec3(0.0))) && any(greaterThan(sides, vec3(0.0)))) return;
-    float sum = sides.x + sides.y + sides.z;
-    if (sum == 0.0) return;  // seen edge-on, or degenerate
+    float sum = sides.x + sides.y + sides.z;  // 0: seen edge-on, or degenerate
+    bool inside = sum > 0.0 ? all(greaterThanEqual(sides, vec3(0.0))) : sum < 0.0 && all(lessThanEqual(sides, vec3(0.0)));
     sides /= sum;
     float distance = dot(sides, vec3(a.z, b.z, c.z));
-    if (distance >= nearest && distance < hit.distance) hit = Hit(distance, slot, sides.yz, sum > 0.0);
+    if (inside && distance >= nearest && distance < hit.distance) hit = Hit(distance, slot, sides.yz, sum > 0.0);
 }
 
 // (first, last) distance within a box; it is met where first <= last.
@@ -71,45 +80,64 @@ vec2 within(vec3 lower, vec3 upper, vec3 origin, vec3 inverse, float nearest, fl
     vec3 enter = min(p, q), leave = max(p, q);
     return vec2(
         max(max(enter.x, enter.y), max(enter.z, nearest)),
-        min(min(leave.x, leave.y) * BOX_FAR, min(leave.z * BOX_FAR, farthest))
+        min(min(leave.x, min(leave.y, leave.z)) * BOX_FAR, farthest)
     );
 }
 
-// A child as one number: an inner node, or below zero a leaf.
-int child(float reference, float count) {
-    return count > 0.0 ? ~(int(reference) << COUNT_BITS | int(count)) : int(reference);
+struct Child {
+    vec3 lower, upper;  // of its box; of cells, counted from the grid's corner
+    int node;           // below zero: a leaf, ~(first slot << COUNT_BITS | triangles)
+};
+
+Child load_child(int node, int which) {
+#if BOX_GRID
+    uvec4 c = texelFetch(t_bvh_nodes, entry_px(node, 2) + ivec2(which, 0), 0);
+    return Child(vec3(c.xyz & 0xFFFFu), vec3(c.xyz >> 16), int(c.w));
+#else
+    ivec2 px = entry_px(node, 4) + ivec2(2 * which, 0);
+    uvec4 l = texelFetch(t_bvh_nodes, px, 0), u = texelFetch(t_bvh_nodes, px + ivec2(1, 0), 0);
+    return Child(uintBitsToFloat(l.xyz), uintBitsToFloat(u.xyz), int(l.w));
+#endif
 }
 
+// Loops end where nodes do, not before: a software rasteriser runs what a loop holds once more for all rays when only its test
+// comes first. So inner nodes are walked until all rays have a leaf, then triangles until none has.
 Hit walk(vec3 origin, vec3 direction, float nearest, float farthest, bool any_will_do) {
+    const int DONE = ~0;  // a leaf without triangles
     Hit hit = Hit(farthest, -1, vec2(0.0), false);
-    mat3 sheared_from_local = sheared_from_local(direction);
-    vec3 inverse = 1.0 / mix(direction, vec3(LEAST), lessThan(abs(direction), vec3(LEAST)));
-    int stack[STACK];
-    int top = 0, node = 0;
-    while (true) {
-        bool next = true;
-        if (node >= 0) {
-            ivec2 px = entry_px(node, 4);
-            vec4 lower_0 = texelFetch(t_bvh_nodes, px, 0), upper_0 = texelFetch(t_bvh_nodes, px + ivec2(1, 0), 0);
-            vec4 lower_1 = texelFetch(t_bvh_nodes, px + ivec2(2, 0), 0), upper_1 = texelFetch(t_bvh_nodes, px + ivec2(3, 0), 0);
-            vec2 in_0 = within(lower_0.xyz, upper_0.xyz, origin, inverse, nearest, hit.distance);
-            vec2 in_1 = within(lower_1.xyz, upper_1.xyz, origin, inverse, nearest, hit.distance);
-            bool meets_0 = in_0.x <= in_0.y, meets_1 = in_1.x <= in_1.y;
-            bool first_1 = meets_1 && (!meets_0 || in_1.x < in_0.x);
-            int child_0 = child(lower_0.w, upper_0.w), child_1 = child(lower_1.w, upper_1.w);
-            if (meets_0 && meets_1) stack[top++] = first_1 ? child_0 : child_1;
-            next = !(meets_0 || meets_1);
-            node = first_1 ? child_1 : child_0;
-        } else {
-            int first = ~node >> COUNT_BITS, end = first + (~node & ((1 << COUNT_BITS) - 1));
-            for (int slot = first; slot < end; ++slot) meet(hit, slot, origin, sheared_from_local, nearest);
-            if (any_will_do && hit.slot >= 0) break;
-        }
-        if (next) {
-            if (top == 0) break;
-            node = stack[--top];
-        }
-    }
+    Shear shear = shear_along(direction);
+    vec3 box_origin = origin;
+    vec3 box_inverse = 1.0 / mix(direction, vec3(LEAST), lessThan(abs(direction), vec3(LEAST)));
+#if BOX_GRID
+    vec3 corner = uintBitsToFloat(texelFetch(t_bvh_nodes, ivec2(0, 0), 0).xyz);
+    vec3 cells = uintBitsToFloat(texelFetch(t_bvh_nodes, ivec2(1, 0), 0).xyz);  // in a length of 1
+    box_origin = (origin - corner) * cells;
+    box_inverse /= cells;
+#endif
+    int stack[STACK + 1];
+    stack[0] = DONE;
+    int top = 1, node = BOX_GRID;  // the entry before the root holds the grid
+    do {
+        do {
+            Child a = load_child(node, 0), b = load_child(node, 1);
+            vec2 in_a = within(a.lower, a.upper, box_origin, box_inverse, nearest, hit.distance);
+            vec2 in_b = within(b.lower, b.upper, box_origin, box_inverse, nearest, hit.distance);
+            bool meets_a = in_a.x <= in_a.y, meets_b = in_b.x <= in_b.y;
+            bool b_first = meets_b && (!meets_a || in_b.x < in_a.x);
+            stack[top] = b_first ? a.node : b.node;
+            top += int(meets_a && meets_b);
+            node = b_first ? b.node : a.node;
+            if (!meets_a && !meets_b) node = stack[--top];
+        } while (node >= 0);
+        do {
+            int first = ~node >> COUNT_BITS, count = ~node & ((1 << COUNT_BITS) - 1);
+            if (node != DONE) {
+                meet(hit, first + count - 1, origin, shear, nearest);
+                node = count > 1 ? node + 1 : stack[--top];
+            }
+            if (any_will_do && hit.slot >= 0) node = DONE;
+        } while (node < DONE);
+    } while (node != DONE);
     return hit;
 }
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.gpu import Gpu, Pass
+from app.gpu import Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
 from app.solvers.base import EnergyBalance
@@ -17,7 +17,7 @@ from app.solvers.gathering.hits import Hits
 
 
 class Balance:
-    """Of one lightmap. Whoever makes it releases it."""
+    """Of the points. Whoever makes it releases it."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
         self._gpu, self._lightmap = gpu, lightmap
@@ -30,13 +30,13 @@ class Balance:
         self._tiles = [self._gpu.texture(size, 4, "f4") for _ in range(4)]
         self._target = self._gpu.target(*self._tiles)
 
-    def measure(self, hits: Hits) -> EnergyBalance:
+    def measure(self, hits: Hits, direct: Texture, indirect: Texture) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
         lightmap, (lost, rays) = self._lightmap, hits.lost()
-        reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_emission", "t_irradiance"
+        reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_emission"
         self._sum.draw(
             self._target,
-            textures=lightmap.textures(*reads) | {"t_lost": lost},
+            textures=lightmap.textures(*reads) | {"t_lost": lost, "t_direct": direct, "t_indirect": indirect},
             uniforms={"u_unit": lightmap.unit, "u_rays": float(max(rays, 1))},
         )
         sums: list[F64] = [
@@ -53,11 +53,6 @@ class Balance:
             reflectance=sums[3][:3] / max(area, 1e-300),
             area=float(area * square),
         )
-
-    def resized(self) -> None:
-        """The tile pool has got another number of slots."""
-        self.release()
-        self._fit()
 
     def release(self) -> None:
         self._gpu.release_all(self._target, *self._tiles)

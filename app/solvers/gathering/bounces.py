@@ -6,6 +6,9 @@ is linear; the largest eigenvalue of its matrix is about the mean albedo, λ = �
 in O(1/√(1 - λ)) steps where Jacobi needs O(1/(1 - λ)):
 
     H_{n+1} = ω_{n+1} (H_direct + 1/N Σ B(H_n) - H_{n-1}) + H_{n-1},    ω_1 = 1, ω_2 = 2/(2 - λ²), ω_{n+1} = 1/(1 - λ² ω_n / 4)
+
+Where nearly all light is reflected, λ must be taken as less than it is, and what is slow then is the level of the light as a
+whole: one factor brings it to where Σ A H = Σ A (H_direct + 1/N Σ B), the coarsest grid of a multigrid method [Stüben01].
 """
 
 from __future__ import annotations
@@ -17,7 +20,6 @@ import numpy as np
 
 from app.gpu import Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
-from app.lightmap.tile_pool import Moves
 from app.solvers.gathering.hits import Hits
 
 # Texels with few rays do not see each other alike: eigenvalues leave the real axis by about λ/√N, and the iteration diverges
@@ -32,27 +34,30 @@ def steps_to(tolerance: float, reflected: float) -> int:
 
 
 class Bounces:
-    """Of one lightmap: ``solution`` is H on every texel [stored units]. Whoever makes it releases it.
+    """Among the texels of one lightmap, the points: ``solution`` is H on each [stored units]. Whoever makes it releases it.
 
-    reflected: λ, the mean albedo of the colour that is reflected most. steps: of the last ``solve``.
+    reflected: λ, the mean albedo of the colour that is reflected most, textures of albedo taken as white. steps: of the last
+    ``solve``.
     """
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
-        self._gpu, self._lightmap = gpu, lightmap
-        reads = lightmap.defines("MATERIAL_BITS", "TILE", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
+    def __init__(self, gpu: Gpu, points: Lightmap) -> None:
+        self._gpu, self._points = gpu, points
+        reads = points.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
         self._send = Pass(gpu, "solvers/gathering/outgoing", defines=reads)
         self._relax = Pass(gpu, "solvers/gathering/relax")
-        width, height = lightmap.charts.size
+        self._sum = Pass(gpu, "solvers/gathering/rebalance", defines=points.defines("TILE"))
+        self._scale = Pass(gpu, "solvers/gathering/scale")
+        width, height = points.size
         self.outgoing = gpu.texture((width, height + 1), 4, "f4")  # one row more: see hit.glsl
         self._outgoing_target = gpu.target(self.outgoing)
         self._outgoing_target.clear()
+        scene = points.scene
+        area = np.bincount(scene.material_ids, scene.normals_areas[1], len(scene.materials))
+        self._share = area / area.sum()  # of each material
         self.reflected, self.steps = 0.0, 0
         self._sources: Texture | None = None
-        self._fit()
-
-    def _fit(self) -> None:
-        size = self._lightmap.size
-        self._solutions = [self._gpu.texture(size, 4, "f4") for _ in range(2)]
+        size = points.size
+        self._solutions = [gpu.texture(size, 4, "f4") for _ in range(2)]
         self._targets = [self._gpu.target(texture) for texture in self._solutions]
         self.gathered = self._gpu.texture(size, 4, "f4")
         self._gathered_target = self._gpu.target(self.gathered)
@@ -70,15 +75,14 @@ class Bounces:
 
     def set_materials(self, by_rays: Sequence[int]) -> None:
         """The lightmap's materials are others. by_rays: those whose light the rays bring that hit them."""
-        materials, unit = self._lightmap.scene.materials, self._lightmap.unit
+        materials, unit = self._points.scene.materials, self._points.unit
         table = np.zeros((len(materials), 1, 4), np.float32)
         for i in by_rays:
             table[i, 0, :3] = np.pi * np.array(materials[i].emission) / unit
         if self._sources is not None:
             self._gpu.release_all(self._sources)
         self._sources = self._gpu.texture((1, len(materials)), 4, "f4", table.tobytes())
-        area = self._lightmap.pool.surfaces.area
-        mean = (self._lightmap.albedo() * area[..., None]).sum((0, 1, 2)) / max(float(area.sum()), 1e-300)
+        mean = self._share @ np.array([m.albedo for m in materials])
         self.reflected = min(float(mean.max()), MOST_REFLECTED)
 
     def solve(self, hits: Hits, direct: Texture, rays: int, steps: int) -> Iterator[None]:
@@ -86,6 +90,9 @@ class Bounces:
         omega, self.steps = 1.0, steps
         for step in range(steps):
             yield from self.gather(hits, 0, rays, anew=True)
+            if self.reflected >= MOST_REFLECTED and step > 0 and step in (1, steps // 2, steps - 1):
+                self._rebalance(direct, rays)
+                yield from self.gather(hits, 0, rays, anew=True)
             if step == 1:
                 omega = 2 / (2 - self.reflected**2)
             elif step > 1:
@@ -100,6 +107,20 @@ class Bounces:
             )
             yield
 
+    def _rebalance(self, direct: Texture, rays: int) -> None:
+        """Scale the solution, and the one before, to the level at which it is even with what was just gathered from it. Waits for
+        the GPU."""
+        points, size = self._points, (self._points.columns, self._points.rows)
+        sums = [self._gpu.texture(size, 4, "f4") for _ in range(2)]
+        target = self._gpu.target(*sums)
+        textures = {"t_direct": direct, "t_gathered": self.gathered, "t_solution": self.solution}
+        self._sum.draw(target, textures=textures | points.textures("t_position_area"), uniforms={"u_rays": float(rays)})
+        came, missing = (np.frombuffer(t.read(), np.float32).reshape(-1, 4).astype(np.float64).sum(0)[:3] for t in sums)
+        self._gpu.release_all(target, *sums)
+        factor = np.where(missing > 0, came / np.maximum(missing, 1e-300), 1.0)
+        for solution in self._targets:
+            self._scale.draw(solution, uniforms={"u_factor": tuple(factor.tolist())}, blend="multiply")
+
     def gather(self, hits: Hits, first: int, count: int, *, anew: bool) -> Iterator[None]:
         """Add what so many rays of each texel find of the solution to ``gathered``, in parts; ``anew``: to nothing."""
         if anew:
@@ -109,33 +130,18 @@ class Bounces:
 
     def send(self) -> None:
         """B = ρH of the solution."""
-        lightmap = self._lightmap
         assert self._sources is not None
-        reads = "t_pages", "t_leaves", "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_emission"
-        width, height = lightmap.charts.size
+        reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_emission"
         self._send.draw(
             self._outgoing_target,
-            textures=lightmap.textures(*reads) | {"t_sources": self._sources, "t_solution": self.solution},
-            uniforms={
-                "u_pages": (float(lightmap.columns), lightmap.pool.pages_per_texel),
-                "u_depth": lightmap.pool.depth,
-            },
-            viewport=(0, 0, width, height),
+            textures=self._points.textures(*reads) | {"t_sources": self._sources, "t_solution": self.solution},
+            viewport=(0, 0, *self._points.size),
         )
-
-    def resized(self, moves: Moves) -> None:
-        """The tile pool has got another number of slots; what was gathered is gone."""
-        self._gpu.release_all(*self._targets, self._gathered_target, self.gathered, self._solutions.pop())
-        solution = self._lightmap.moved(self._solutions[0], moves)
-        self._fit()
-        self._gpu.release_all(self._targets[0], self._solutions[0])
-        self._solutions[0] = solution
-        self._targets[0] = self._gpu.target(solution)
 
     @property
     def memory(self) -> int:
         """Bytes on the GPU."""
-        (width, height), (columns, rows) = self._lightmap.size, self.outgoing.size
+        (width, height), (columns, rows) = self._points.size, self.outgoing.size
         return int(16 * (3 * width * height + columns * rows))
 
     def release(self) -> None:

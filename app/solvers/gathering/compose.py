@@ -1,6 +1,12 @@
-"""Composing writes the light that is shown, direct and indirect, and says how noisy it is."""
+"""Composing writes the light that is shown, direct and indirect, and says how noisy it is.
+
+Indirect light is known on points, and smoothed among them by as much as it is noisy; texels that are finer, where quadtrees are,
+interpolate it. Direct light is known on every texel.
+"""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -9,15 +15,30 @@ from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
 from app.solvers.gathering.origins import Origins
 
+RADIUS = 4  # of the window that indirect light is smoothed over, in points
+
 
 class Compose:
-    """Of one lightmap. Whoever makes it releases it."""
+    """Of one lightmap, with its points. Whoever makes it releases it.
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, origins: Origins) -> None:
-        self._gpu, self._lightmap, self._origins = gpu, lightmap, origins
+    indirect: of the points [stored units], a: variance of the mean of RGB. variance: of H of the lightmap, of the mean of RGB.
+    """
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, origins: Origins, points: Lightmap, at: Origins) -> None:
+        """origins: of the lightmap's texels; at: of the points."""
+        self._gpu, self._lightmap, self._origins, self._points, self._at = gpu, lightmap, origins, points, at
         reads = lightmap.defines("MATERIAL_BITS", "TILE")
-        self._draw = {s: Pass(gpu, "solvers/gathering/compose", defines={"SMOOTH": s} | reads) for s in (True, False)}
+        self._finer = points is not lightmap
+        self._aim = Pass(gpu, "solvers/gathering/pilot", defines=reads)
+        self._smooth = {
+            radius: Pass(gpu, "solvers/gathering/smooth", defines={"RADIUS": radius} | reads) for radius in (RADIUS, 0)
+        }
+        self._pilot = gpu.texture(points.size, 2, "f4")
+        self._pilot_target = gpu.target(self._pilot)
+        self._compose = Pass(gpu, "solvers/gathering/compose", defines={"FINER": self._finer} | reads)
         self._judge = Pass(gpu, "solvers/gathering/noise", defines=lightmap.defines("TILE"))
+        self.indirect = gpu.texture(points.size, 4, "f4")
+        self._indirect_target = gpu.target(self.indirect)
         self._target: Framebuffer | None = None
         self._of: Texture | None = None
         self._fit()
@@ -27,39 +48,45 @@ class Compose:
         self._noise = self._gpu.texture((self._lightmap.columns, self._lightmap.rows), 4, "f4")
         self._noise_target = self._gpu.target(self._noise)
 
-    def draw(self, direct: Texture, gathered: Texture, rays: int, *, smooth: bool) -> None:
-        """Write H of the lightmap: the direct light, and what so many rays of each texel have gathered."""
+    def smooth(self, gathered: Texture, rays: int, *, smooth: bool) -> None:
+        """Bring ``indirect`` up to date with what so many rays of each point have gathered."""
+        textures = {"t_gathered": gathered, "t_origin_normal": self._at.normals}
+        textures |= self._points.textures("t_pages", "t_leaves")
+        uniforms = {"u_rays": float(max(rays, 1))} | self._places
+        self._aim.draw(self._pilot_target, textures=textures, uniforms=uniforms)
+        how = self._smooth[RADIUS if smooth else 0]
+        how.draw(self._indirect_target, textures=textures | {"t_pilot": self._pilot}, uniforms=uniforms)
+
+    def draw(self, direct: Texture) -> None:
+        """Write H of the lightmap, the direct light and ``indirect``."""
         lightmap = self._lightmap
         if (irradiance := lightmap.texture("t_irradiance")) is not self._of:
             self._forget_target()
             self._target, self._of = self._gpu.target(irradiance, self.variance), irradiance
         assert self._target is not None
-        textures, uniforms = {"t_direct": direct, "t_gathered": gathered}, {"u_rays": float(max(rays, 1))}
-        if smooth:
-            own = self._origins.textures
-            textures |= {n: own[n] for n in ("t_origin", "t_origin_normal")} | lightmap.textures("t_pages", "t_leaves")
-            uniforms |= {"u_pages": (float(lightmap.columns), lightmap.pool.pages_per_texel)}  # type: ignore[dict-item]
-        self._draw[smooth].draw(self._target, textures=textures, uniforms=uniforms)
+        textures, uniforms = {"t_direct": direct, "t_indirect": self.indirect}, {}
+        if self._finer:
+            textures |= {"t_own_leaves": lightmap.texture("t_leaves"), "t_own_normal": self._origins.normals}
+            textures |= {"t_origin_normal": self._at.normals} | self._points.textures("t_pages", "t_leaves")
+            uniforms = self._places
+        self._compose.draw(self._target, textures=textures, uniforms=uniforms)
 
-    def judge(self) -> ReadBack:
+    @property
+    def _places(self) -> dict[str, Any]:
+        return {"u_pages": (float(self._points.columns), self._points.pool.pages_per_texel)}
+
+    def judge(self, direct: Texture) -> ReadBack:
         """How noisy each tile is, on its way: see noise.frag.glsl."""
-        textures = self._lightmap.textures("t_position_area", "t_irradiance") | {"t_variance": self.variance}
+        textures = self._lightmap.textures("t_position_area", "t_irradiance")
+        textures |= {"t_variance": self.variance, "t_direct": direct}
         self._judge.draw(self._noise_target, textures=textures)
         return ReadBack(self._gpu, self._noise_target)
 
-    def noise(self, judged: ReadBack) -> float:
-        """RMS noise over all surfaces, over the mean irradiance [-]."""
-        tiles = tile_noise(judged)
-        variance, light, area = tiles[:, :3].sum(0)
-        return float(np.sqrt(max(variance * area, 0.0)) / light) if light > 0 else 0.0
-
     def resized(self) -> None:
         """The tile pool has got another number of slots."""
-        self._gpu.release_all(self._noise_target, self._noise)
-        variance = self.variance
-        self._fit()
         self._forget_target()
-        self._gpu.release_all(variance)
+        self._gpu.release_all(self._noise_target, self._noise, self.variance)
+        self._fit()
 
     def _forget_target(self) -> None:
         if self._target is not None:
@@ -68,9 +95,14 @@ class Compose:
 
     def release(self) -> None:
         self._forget_target()
-        self._gpu.release_all(self._noise_target, self._noise, self.variance)
+        self._gpu.release_all(self._noise_target, self._noise, self.variance, self._indirect_target, self.indirect)
+        self._gpu.release_all(self._pilot_target, self._pilot)
 
 
-def tile_noise(judged: ReadBack) -> F64:
-    """(slots, 4) as noise.frag.glsl says."""
-    return np.frombuffer(judged.take(), np.float32).reshape(-1, 4).astype(np.float64)
+def noise_of(judged: ReadBack) -> tuple[float, float]:
+    """RMS noise over all surfaces, over the mean irradiance [-], and that of direct light alone, see noise.frag.glsl."""
+    tiles: F64 = np.frombuffer(judged.take(), np.float32).reshape(-1, 4).astype(np.float64)
+    both, light, area, direct = tiles.sum(0)
+    if light <= 0:
+        return 0.0, 0.0
+    return float(np.sqrt(max(both * area, 0.0)) / light), float(np.sqrt(max(direct * area, 0.0)) / light)

@@ -24,12 +24,13 @@ from app.solvers.gathering.lamps import LampSet, chances, lamp_sets
 from app.solvers.gathering.origins import Origins
 from app.visibility.rays import RayScene
 
+PASS = 4  # shadow rays: one sample of the noise
 STREAM = 1  # of random numbers, of the first set
 
 
 @dataclass
 class Lit:
-    """What is known of the light of one set. count: shadow rays of each texel, in so many passes."""
+    """What is known of the light of one set. count: shadow rays of each texel, in passes of PASS."""
 
     lamps: LampSet
     table: Texture
@@ -39,14 +40,13 @@ class Lit:
     unoccluded: Texture | None
     stream: int
     count: int = 0
-    passes: int = 0
 
 
 class DirectLight:
     """On one lightmap: ``light`` holds it [stored units], and in its alpha the variance of the mean of RGB. Whoever makes it
     releases it.
 
-    traced: shadow rays so far, of all texels.
+    traced: shadow rays so far, of all texels. count: of each texel, to each set.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, rays: RayScene, origins: Origins) -> None:
@@ -83,7 +83,6 @@ class DirectLight:
         unoccluded = gpu.texture(size, 1, "f4") if lamps.closed_form else None
         self._streams += 1
         self.sets.append(Lit(lamps, table, chance, seen, target, unoccluded, STREAM + self._streams))
-        self._look_unoccluded(self.sets[-1], self._everywhere)
 
     def _look_unoccluded(self, lit: Lit, rects: F32) -> None:
         """Σ F of a set with a closed form, in these rectangles."""
@@ -113,6 +112,10 @@ class DirectLight:
         self._gpu.release_all(mesh)
 
     @property
+    def count(self) -> int:
+        return max((lit.count for lit in self.sets), default=0)
+
+    @property
     def _everywhere(self) -> F32:
         return np.array([(0, 0, *self._lightmap.size, 0, 0)], np.float32)
 
@@ -123,16 +126,18 @@ class DirectLight:
         self._gpu.release_all(lit.target, lit.seen, lit.table, lit.chances, *optional)
 
     def shoot(self, count: int) -> Iterator[None]:
-        """So many shadow rays more from each texel to each set, in parts."""
+        """So many shadow rays more from each texel to each set, whole passes of them, in parts."""
         for lit in self.sets:
-            self._shoot_at(lit, count)
-            yield
+            for _ in range(max(count // PASS, 1)):
+                self._shoot_at(lit, PASS)
+                yield
 
     def _shoot_at(self, lit: Lit, count: int) -> None:
         """One pass of shadow rays to a set."""
+        if not lit.count:
+            self._look_unoccluded(lit, self._everywhere)
         self._trace(lit, self._everywhere, lit.count, count, "add")
         lit.count += count
-        lit.passes += 1
         self.traced += count * self._lightmap.texel_count
 
     def _trace(self, lit: Lit, rects: F32, first: int, count: int, blend: str | None) -> None:
@@ -150,9 +155,8 @@ class DirectLight:
             table = chances(pool, lit.lamps)
             self._gpu.release_all(lit.chances)
             lit.chances = upload(self._gpu, table[..., None])
-            each = lit.count // max(lit.passes, 1)
-            for nth in range(lit.passes):
-                self._trace(lit, rects, nth * each, each, "add" if nth else None)
+            for first in range(0, lit.count, PASS):
+                self._trace(lit, rects, first, PASS, "add" if first else None)
                 yield
             self.traced += lit.count * int((pool.surfaces.face[slots] >= 0).sum())
 
@@ -182,10 +186,10 @@ class DirectLight:
 
     def catch_up(self) -> Iterator[None]:
         """The shadow rays to sets that came later, as many as the others have had, in parts."""
-        wanted, passes = max(((lit.count, lit.passes) for lit in self.sets), default=(0, 0))
+        wanted = max((lit.count for lit in self.sets), default=0)
         for lit in self.sets:
             while lit.count < wanted:
-                self._shoot_at(lit, wanted // passes)
+                self._shoot_at(lit, PASS)
                 yield
 
     def sum(self, scene: Scene) -> None:
@@ -201,7 +205,7 @@ class DirectLight:
                     | ({} if lit.unoccluded is None else {"t_unoccluded": lit.unoccluded}),
                     uniforms={
                         "u_exitance": tuple((exitance / self._lightmap.unit).tolist()),
-                        "u_count": (lit.count, lit.passes),
+                        "u_count": (lit.count, lit.count // PASS),
                     },
                     blend="add",
                 )

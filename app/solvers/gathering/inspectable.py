@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,13 +24,21 @@ SEEN = (
 
 
 class Inspectable:
-    """Of one lightmap. Whoever makes it releases it."""
+    """Of one lightmap, whose rays are those of its points. Whoever makes it releases it."""
 
     def __init__(
-        self, gpu: Gpu, lightmap: Lightmap, origins: Origins, hits: Hits, direct: DirectLight, compose: Compose
+        self,
+        gpu: Gpu,
+        lightmap: Lightmap,
+        points: Lightmap,
+        origins: Origins,
+        hits: Hits,
+        directs: Sequence[DirectLight],
+        compose: Compose,
     ) -> None:
-        self._gpu, self._lightmap, self._origins, self._hits = gpu, lightmap, origins, hits
-        self._direct, self._compose = direct, compose
+        """origins: of the points; directs: the last on the texels of the lightmap."""
+        self._gpu, self._lightmap, self._points, self._origins, self._hits = gpu, lightmap, points, origins, hits
+        self._directs, self._direct, self._compose = directs, directs[-1], compose
         self._look = Pass(gpu, "solvers/gathering/kept_rays", defines=lightmap.defines("MATERIAL_BITS", "TILE"))
         self._rays: tuple[Texture, Framebuffer] | None = None
 
@@ -60,7 +68,8 @@ class Inspectable:
             "Bounces": f"{bounces}",
             "Expected error": f"{progress.remaining:.2%}".replace("%", " %"),
         }
-        whole = Inspection(figures=figures, counts={"Rays traced": hits.traced + self._direct.traced})
+        traced = hits.traced + sum(direct.traced for direct in self._directs)
+        whole = Inspection(figures=figures, counts={"Rays traced": traced})
         if texel is None or any(at >= size for at, size in zip(texel, self._lightmap.size, strict=True)):
             return whole
         return replace(
@@ -79,8 +88,10 @@ class Inspectable:
         return {"direct": direct, "indirect": self._lightmap.light_at(texel)[0] - direct}
 
     def rays(self, texel: tuple[int, int], outgoing: Texture) -> Rays | None:
-        """The kept rays of a texel, and what they find of ``outgoing``; None where there are none. Waits for the GPU."""
-        hits, lightmap = self._hits, self._lightmap
+        """The kept rays of the point of a texel, and what they find of ``outgoing``; None where there are none. Waits for the
+        GPU."""
+        hits, points = self._hits, self._points
+        texel = self._point_of(texel)
         count = min(hits.count, MOST_RAYS)
         if count == 0:
             return None
@@ -92,14 +103,13 @@ class Inspectable:
             self._look.draw(
                 target,
                 textures=self._origins.textures
-                | lightmap.textures("t_pages", "t_position_area")
+                | points.textures("t_position_area")
                 | {"t_hits": kept, "t_outgoing": outgoing},
                 uniforms={
                     "u_texel": texel,
                     "u_first": first,
-                    "u_rows": lightmap.charts.size[1],
-                    "u_pages_of_bank": (*lightmap.size, hits.edge),
-                    "u_pages": (float(lightmap.columns), lightmap.pool.pages_per_texel),
+                    "u_rows": points.size[1],
+                    "u_bank": (*points.size, hits.edge),
                 },
                 viewport=(first, 0, min(rays, count - first), 1),
             )
@@ -108,7 +118,16 @@ class Inspectable:
             np.frombuffer(texture.read(), np.float32).reshape(-1, 4)[:, :3].copy() for texture in textures
         )
         self._gpu.release_all(target, *textures)
-        return Rays(start, end, light * np.float32(lightmap.unit))
+        return Rays(start, end, light * np.float32(self._lightmap.unit))
+
+    def _point_of(self, texel: tuple[int, int]) -> tuple[int, int]:
+        """The texel of level 0 that a texel (column, row) of the lightmap lies in."""
+        if self._points is self._lightmap:
+            return texel
+        tile = self._points.pool.tile
+        u, v, *_ = self._lightmap.pool.atlas_rect(texel, 1)
+        column, row = self._points.pool.corner(self._points.pool.slot_at((u, v)))
+        return column + int(u) % tile, row + int(v) % tile
 
     def release(self) -> None:
         if self._rays is not None:

@@ -15,11 +15,12 @@ from app.lightmap.textures import upload
 from app.lightmap.tile_pool import Array, Moves, TilePool, octahedral
 
 WHOLE = 1e-3  # of a texel's square that may be missing where it counts as filled: rounding
+NO_CHART = 0xFFFFFFFF  # where nothing is
 FLAT = 1e-3  # edges of a texel, between the middle of its largest piece and the line on which that of all of it lies
 
 
 class Origins:
-    """Of one lightmap: ``textures`` as origin.glsl reads them. Whoever makes it releases it."""
+    """Of the texels of one lightmap: ``textures`` as origin.glsl reads them. Whoever makes it releases it."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
         self._gpu, self._lightmap = gpu, lightmap
@@ -31,6 +32,11 @@ class Origins:
     def textures(self) -> dict[str, Texture]:
         """And those of the lightmap that go with them."""
         return self._textures | self._lightmap.textures("t_normal_ids", "t_facets", "t_leaves")
+
+    @property
+    def normals(self) -> Texture:
+        """Normals, and charts."""
+        return self._textures["t_origin_normal"]
 
     def write(self, slots: NDArray[np.int64]) -> None:
         """Other leaves are in these slots."""
@@ -56,7 +62,7 @@ class Origins:
 
 def origin_tiles(pool: TilePool, slots: NDArray[np.int64]) -> dict[str, Array]:
     """t_origin (n, t, t, 4) f32: point in the solver space, and 0 where nothing is, 1 for that point alone, 2 for its texel's
-    square; t_origin_normal (n, t, t, 2) u32: octahedral normal of the face it lies on, and its chart."""
+    square; t_origin_normal (n, t, t, 2) u32: octahedral normal of the face it lies on, and its chart, or NO_CHART."""
     charts, surfaces = pool.charts, pool.surfaces
     face = surfaces.face[slots]
     covered = face >= 0
@@ -73,7 +79,7 @@ def origin_tiles(pool: TilePool, slots: NDArray[np.int64]) -> dict[str, Array]:
     point = np.where((flat & filled)[..., None], middle, leading)
     kind = np.where(filled, 2.0, 1.0) * covered
     where = np.where(covered[..., None], point, 0.0)
-    chart = np.where(covered, charts.face_chart[face], 0).astype(np.uint32)
+    chart = np.where(covered, charts.face_chart[face], NO_CHART).astype(np.uint32)
     return {
         "t_origin": np.concatenate([where, kind[..., None]], -1).astype(np.float32),
         "t_origin_normal": np.stack([octahedral(normals[face]), chart], -1).astype(np.uint32),

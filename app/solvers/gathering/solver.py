@@ -19,13 +19,13 @@ import numpy as np
 from app.gpu import Framebuffer, Gpu, ReadBack, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
-from app.lightmap.tile_pool import Moves
+from app.lightmap.tile_pool import Moves, TilePool
 from app.scene.model import Material
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.gathering.balance import Balance
 from app.solvers.gathering.bounces import Bounces, steps_to
-from app.solvers.gathering.compose import Compose
-from app.solvers.gathering.direct import DirectLight
+from app.solvers.gathering.compose import Compose, noise_of
+from app.solvers.gathering.direct import PASS, DirectLight
 from app.solvers.gathering.hits import GROUP, Hits
 from app.solvers.gathering.inspectable import Inspectable
 from app.solvers.gathering.lamps import by_rays
@@ -33,13 +33,16 @@ from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.origins import Origins
 from app.visibility.rays import RayScene
 
-BATCH = 16  # rays
-SYSTEM = 64  # rays of each texel along which bounces are solved; all of them then gather once more
+BATCH, FIRST = 16, 8  # rays of each texel at once, and at first
+SYSTEM = 32  # rays of each texel along which bounces are solved; all of them then gather once more
 CHANGES_PER_RAY = 16  # leaves that split or merge at once: bounded work for a frame
 LOOK_AGAIN = 2  # times as many rays, when leaves did not change at the last look
-SHADOW_RAYS = 4  # from each texel to each set of lamps, for GROUP rays
+SHADOW_RAYS = 4  # from each texel to each set of lamps, for FIRST rays
 FIRST_STEPS = 2  # of the bounces, before an edit is first shown
+SHADOW_COST = 0.5  # of a shadow ray, beside a ray: it ends at the first hit
+MOST_SHADOW_RAYS = 4  # to each set, for a ray
 SOLVED = 1e-3  # of the bounces, that may be missing
+ALIKE = 3e-2  # of what solutions along other rays differ by, that may be missing
 
 
 class Gathering:
@@ -51,19 +54,25 @@ class Gathering:
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: GatheringOptions) -> None:
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
         self.rays = RayScene(gpu, lightmap.pool)
+        # the points between which light bounces are the texels of level 0, whatever leaves are finer
+        adaptive = lightmap.refinement is not None
+        self.points = Lightmap(gpu, TilePool(lightmap.scene, lightmap.charts)) if adaptive else lightmap
         self.origins = Origins(gpu, lightmap)
-        self.hits = Hits(gpu, lightmap, self.rays, self.origins)
+        self._at = Origins(gpu, self.points) if adaptive else self.origins
+        self.hits = Hits(gpu, self.points, self.rays, self._at)
         self.direct = DirectLight(gpu, lightmap, self.rays, self.origins)
-        self.bounces, self._compose = Bounces(gpu, lightmap), Compose(gpu, lightmap, self.origins)
-        self._balance = Balance(gpu, lightmap)
-        self._inspectable = Inspectable(gpu, lightmap, self.origins, self.hits, self.direct, self._compose)
+        self.at_points = DirectLight(gpu, self.points, self.rays, self._at) if adaptive else self.direct
+        self.bounces = Bounces(gpu, self.points)
+        self._compose = Compose(gpu, lightmap, self.origins, self.points, self._at)
+        self._balance = Balance(gpu, self.points)
+        self._inspectable = Inspectable(gpu, lightmap, self.points, self._at, self.hits, self._directs, self._compose)
         self._under_way: Generator[None, None, int] | None = None
         self._judged: list[tuple[int, ReadBack]] = []
         self._progress = Progress(0, 1.0, np.zeros(3))
         self._edited, self._shown = False, 0
+        self._noise = 1.0, 0.0
         self._fresh: set[int] = set()  # slots whose leaves have no rays yet
         self._look_at = 0  # rays at which leaves are looked at again
-        self._size = lightmap.size
         if lightmap.refinement is not None:
             lightmap.refinement.follower = self
         self.issued = 0
@@ -74,7 +83,7 @@ class Gathering:
     def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
         """About ``amount`` rays more of each texel, whole groups of them, in parts. Returns how many."""
         self._finish()
-        count = -(-min(amount, BATCH) // GROUP) * GROUP
+        count = -(-min(amount, BATCH if self.issued else FIRST) // GROUP) * GROUP
         if self._edited:
             self._under_way = self._follow_edit()
         elif self._leaves_wait:
@@ -88,15 +97,16 @@ class Gathering:
         first = self.issued
         kept = min(count, max(self.hits.room(self.options.ray_memory) - self.hits.count, 0))
         yield from self.hits.trace(kept, bands)
-        yield from self.direct.shoot(SHADOW_RAYS * count // GROUP)
-        self.direct.sum(self.lightmap.scene)
+        for direct in self._directs:
+            yield from direct.shoot(self._shadow_rays(count))
+            direct.sum(self.lightmap.scene)
         self.issued = first + count
         if first < SYSTEM or (first & (first - 1)) == 0:
             yield from self._solve(first == 0)
         else:
             yield from self.bounces.gather(self.hits, first, count, anew=False)
         self._show(self.issued)
-        self._judged.append((self.issued, self._compose.judge()))
+        self._judged.append((self.issued, self._compose.judge(self.direct.light)))
         return count
 
     @property
@@ -111,53 +121,76 @@ class Gathering:
         return refinement is not None and (bool(self._fresh) or not refinement.stable)
 
     def _follow_leaves(self, bands: int) -> Generator[None, None, int]:
-        """Trace for fresh leaves what the others have traced, and look at all leaves once more."""
+        """Send for fresh leaves the shadow rays that the others have sent, and look at all leaves once more."""
         refinement = self.lightmap.refinement
         assert refinement is not None
         if self._fresh:
             slots = np.array(sorted(self._fresh), np.int64)
             self._fresh.clear()
             self.origins.write(slots)
-            yield from self.hits.trace_tiles(slots)
             yield from self.direct.shoot_tiles(slots)
             self.direct.sum(self.lightmap.scene)
-            yield from self._solve(from_nothing=False)
-            self._show(self.issued)
-            self._judged.append((self.issued, self._compose.judge()))
+            self._compose.draw(self.direct.light)
+            self._judged.append((self.issued, self._compose.judge(self.direct.light)))
         yield from refinement.look(CHANGES_PER_RAY * BATCH, bands, self.issued)
         if refinement.stable:
             self._look_at = LOOK_AGAIN * self.issued
         return 0
 
     def _solve(self, from_nothing: bool) -> Iterator[None]:
-        """The bounces along some of the rays, then what all of them find."""
-        system = min(SYSTEM, self.issued)
-        steps = steps_to(SOLVED if from_nothing else SOLVED**0.5, self.bounces.reflected)
-        yield from self.bounces.solve(self.hits, self.direct.light, system, steps)
+        """The bounces along a few of the rays, then along some, then what all of them find."""
+        few, some = min(BATCH, self.issued), min(SYSTEM, self.issued)
+        if from_nothing:
+            yield from self.bounces.solve(
+                self.hits, self.at_points.light, few, steps_to(SOLVED, self.bounces.reflected)
+            )
+        if some > few or not from_nothing:
+            yield from self.bounces.solve(
+                self.hits, self.at_points.light, some, steps_to(ALIKE, self.bounces.reflected)
+            )
         yield from self.bounces.gather(self.hits, 0, self.issued, anew=True)
+
+    def _shadow_rays(self, count: int) -> int:
+        """How many shadow rays go with so many rays more: as many as make the whole the least noisy for its cost. Of variances
+        D / d and I / n and a cost c of each shadow ray, those of all sets, beside a ray, that is d / n = √(D / (I c))."""
+        both, direct = self._noise
+        indirect = max(both**2 - direct**2, 0.0)
+        if not self.direct.count or not indirect > 0:
+            return SHADOW_RAYS * count // FIRST
+        D, I = direct**2 * self.direct.count, indirect * self.issued  # noqa: E741
+        ratio = np.sqrt(D / (I * SHADOW_COST * len(self.direct.sets)))
+        wanted = ratio * (self.issued + count) - self.direct.count
+        return int(np.clip(wanted, PASS, MOST_SHADOW_RAYS * count))
 
     def _follow_edit(self) -> Generator[None, None, int]:
         """The light of other materials, along the rays that are there: soon, along some of them, and once no more edits come
         along all. No ray is traced, but to lamps that were off."""
         while self._edited:
             self._edited = False
-            yield from self.direct.catch_up()
-            self.direct.sum(self.lightmap.scene)
+            for direct in self._directs:
+                yield from direct.catch_up()
+                direct.sum(self.lightmap.scene)
             few = min(BATCH, self.issued)
-            yield from self.bounces.solve(self.hits, self.direct.light, few, FIRST_STEPS)
+            yield from self.bounces.solve(self.hits, self.at_points.light, few, FIRST_STEPS)
             yield from self.bounces.gather(self.hits, 0, few, anew=True)
             self._show(few)
             yield
             if not self._edited:
                 yield from self._solve(from_nothing=True)
                 self._show(self.issued)
-        self._judged.append((self.issued, self._compose.judge()))
+        self._judged.append((self.issued, self._compose.judge(self.direct.light)))
         return 0
 
     def _show(self, rays: int) -> None:
         """What so many rays of each texel have gathered."""
-        self._compose.draw(self.direct.light, self.bounces.gathered, rays, smooth=self.options.smooth)
+        self._compose.smooth(self.bounces.gathered, rays, smooth=self.options.smooth)
+        self._compose.draw(self.direct.light)
         self._shown = rays
+
+    @property
+    def _directs(self) -> tuple[DirectLight, ...]:
+        """On the points, and on texels where they are others."""
+        return (self.direct,) if self.at_points is self.direct else (self.at_points, self.direct)
 
     def _finish(self) -> None:
         """End the work that is under way, if any; of its own parts this asks nothing."""
@@ -174,8 +207,8 @@ class Gathering:
             self._finish()
         while len(self._judged) > (0 if wait else 1):
             done, judged = self._judged.pop(0)
-            noise = self._compose.noise(judged)
-            self._progress = Progress(done, noise, self._progress.escaped)
+            self._noise = noise_of(judged)
+            self._progress = Progress(done, self._noise[0], self._progress.escaped)
         refining, refinement = self._refining, self.lightmap.refinement
         converged = self._progress.remaining <= self.options.noise and not self._edited and not refining
         note = None if refinement is None else refinement.note
@@ -188,7 +221,7 @@ class Gathering:
     def energy(self) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
         self._finish()
-        return self._balance.measure(self.hits)
+        return self._balance.measure(self.hits, self.at_points.light, self._compose.indirect)
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
 
@@ -208,12 +241,12 @@ class Gathering:
         self._look_at = 0
         self.lightmap.clear()
         self.hits.forget()
-        self.direct.forget()
         self.bounces.clear()
+        for direct in self._directs:
+            direct.forget()
+        self._set_materials()
         scene = self.lightmap.scene
-        self.bounces.set_materials(by_rays(scene))
-        self.direct.follow(scene)
-        self.issued, self._edited = 0, False
+        self.issued, self._edited, self._noise = 0, False, (1.0, 0.0)
         self._progress = Progress(0, 1.0 if scene.emits else 0.0, np.zeros(3))
 
     def set_options(self, options: GatheringOptions) -> None:
@@ -229,9 +262,18 @@ class Gathering:
         if not self.issued:
             self.reset()
             return
-        self.bounces.set_materials(by_rays(self.lightmap.scene))
-        self.direct.follow(self.lightmap.scene)
+        self._set_materials()
         self._edited = True
+
+    def _set_materials(self) -> None:
+        """Let points and lamps follow the lightmap's materials."""
+        scene = self.lightmap.scene
+        if self.points is not self.lightmap:
+            self.points.set_materials(scene.materials)
+            self.points.unit = self.lightmap.unit
+        self.bounces.set_materials(by_rays(scene))
+        for direct in self._directs:
+            direct.follow(scene)
 
     # -- leaves that come and go, see app/lightmap/refinement.py -------------------------------------------------------
 
@@ -253,12 +295,8 @@ class Gathering:
         now = dict(zip(moves.old.tolist(), moves.new.tolist(), strict=True))
         self._fresh = {now.get(slot, slot) for slot in self._fresh}
         self.origins.resized(moves)
-        self.hits.resized(self._size, moves)
-        self._size = self.lightmap.size
         self.direct.resized(moves)
-        self.bounces.resized(moves)
         self._compose.resized()
-        self._balance.resized()
 
     # -- what there is to see ------------------------------------------------------------------------------------------
 
@@ -279,15 +317,15 @@ class Gathering:
     @property
     def traced(self) -> int:
         """Rays of all texels so far, to lamps as well."""
-        return self.hits.traced + self.direct.traced
+        return self.hits.traced + sum(direct.traced for direct in self._directs)
 
     def passes(self, amount: int) -> dict[str, Callable[[], None]]:
         """Each part of a piece of work by itself, to be timed."""
         count = -(-min(amount, BATCH) // GROUP) * GROUP
         return {
             "trace": lambda: _whole(self.hits.trace(count, 1)),
-            "shadow rays": lambda: _whole(self.direct.shoot(SHADOW_RAYS * count // GROUP)),
-            "bounce": lambda: _whole(self.bounces.solve(self.hits, self.direct.light, count, 1)),
+            "shadow rays": lambda: _whole(self.at_points.shoot(SHADOW_RAYS)),
+            "bounce": lambda: _whole(self.bounces.solve(self.hits, self.at_points.light, count, 1)),
             "show": lambda: self._show(max(self.issued, GROUP)),
         }
 
@@ -306,17 +344,21 @@ class Gathering:
         refinement = self.lightmap.refinement
         if refinement is not None and refinement.follower is self:
             refinement.follower = None
-        for part in (
+        parts: tuple[Any, ...] = (
             self._inspectable,
             self._balance,
             self._compose,
             self.bounces,
-            self.direct,
+            *self._directs,
             self.hits,
             self.origins,
             self.rays,
-        ):
+        )
+        for part in parts:
             part.release()
+        if self.points is not self.lightmap:
+            self._at.release()
+            self.points.release()
 
 
 def _whole(parts: Iterator[None]) -> None:

@@ -8,7 +8,8 @@
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
 uniform sampler2D t_materials;
-uniform sampler2D t_irradiance;
+uniform sampler2D t_direct;
+uniform sampler2D t_indirect;
 uniform sampler2D t_lost;
 uniform float u_unit;  // W/m² per stored unit
 uniform float u_rays;
@@ -26,7 +27,8 @@ void main() {
         float A = texelFetch(t_position_area, px, 0).w;
         if (A <= 0.0) continue;
         uint material = material_from_ids(texelFetch(t_normal_ids, px, 0).y);
-        vec3 H = texelFetch(t_irradiance, px, 0).rgb, rho = albedo_of(t_materials, material, px);
+        vec3 H = texelFetch(t_direct, px, 0).rgb + texelFetch(t_indirect, px, 0).rgb;
+        vec3 rho = albedo_of(t_materials, material, px);
         vec3 B = exitance_of(t_materials, material, px) / u_unit + rho * H;
         vec2 lost = texelFetch(t_lost, px, 0).rg / u_rays;
         out_absorbed += A * vec4((1.0 - rho) * H, 1.0);

@@ -1,72 +1,42 @@
-// The light that is shown: H = direct + indirect, the indirect smoothed by as much as it is noisy.
-//
-// The mean over a window of texels of the same chart that face the same way, the largest whose interval of confidence still meets
-// those of all smaller ones [Goldenshluger97; Katkovnik99]: where light bends by more than its noise, the window ends.
-#define SMOOTH 1
+// The light that is shown: H = direct + indirect. Texels that are finer than points interpolate among those of their chart.
+#define FINER 0
 #include "common/atlas.glsl"
 #include "common/texel_at.glsl"
 
 uniform sampler2D t_direct;    // a: variance of the mean of RGB
-uniform sampler2D t_gathered;  // see gather.frag.glsl
-uniform sampler2D t_origin;
-uniform usampler2D t_origin_normal;  // and the chart
-uniform float u_rays;
+uniform sampler2D t_indirect;  // of points; a: variance of the mean of RGB
+#if FINER
+uniform sampler2D t_own_leaves;
+uniform usampler2D t_own_normal;  // and the chart
+uniform usampler2D t_origin_normal;
+#endif
 
 layout(location = 0) out vec4 out_irradiance;  // a: direct light, the mean of RGB
 layout(location = 1) out float out_variance;   // of the mean of RGB
 
-const float GROUP = 8.0;       // rays, see gather.frag.glsl
-const float CONFIDENCE = 1.0;  // standard deviations
-const float COS_ALIKE = 0.94;  // 20°
-const int WINDOWS = 4;
-const int RADII[WINDOWS] = int[](0, 1, 2, 4);
-
-// Mean of RGB and its variance.
-float variance_of(vec4 g) {
-    float groups = u_rays / GROUP, mean = dot(g.rgb, vec3(1.0 / 3.0)) / u_rays;
-    return max(g.a / (GROUP * GROUP * groups) - mean * mean, 0.0) / max(groups - 1.0, 1.0);
+#if FINER
+vec4 indirect_at(ivec2 px) {
+    vec3 leaf = texelFetch(t_own_leaves, px / TILE, 0).xyz;
+    vec2 uv = (leaf.xy * float(TILE) + vec2(px % TILE) + 0.5) * leaf.z, low = floor(uv - 0.5), share = uv - 0.5 - low;
+    uint chart = texelFetch(t_own_normal, px, 0).y;
+    vec4 sum = vec4(0.0);
+    float weights = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        vec2 corner = vec2(i & 1, i >> 1), weight = mix(1.0 - share, share, corner);
+        ivec2 point_px = texel_px_at(low + corner + 0.5);
+        if (point_px.y < 0 || texelFetch(t_origin_normal, point_px, 0).y != chart) continue;
+        sum += weight.x * weight.y * texelFetch(t_indirect, point_px, 0);
+        weights += weight.x * weight.y;
+    }
+    return sum / max(weights, 1e-6);
 }
+#else
+vec4 indirect_at(ivec2 px) { return texelFetch(t_indirect, px, 0); }
+#endif
 
 void main() {
     ivec2 px = ivec2(gl_FragCoord.xy);
-    vec4 direct = texelFetch(t_direct, px, 0), own = texelFetch(t_gathered, px, 0);
-    vec3 indirect = own.rgb / u_rays;
-    float variance = variance_of(own);
-#if SMOOTH
-    if (texelFetch(t_origin, px, 0).w > 0.0) {
-        uvec2 mine = texelFetch(t_origin_normal, px, 0).xy;
-        vec3 normal = normal_from_octahedral(mine.x), leaf = texelFetch(t_leaves, px / TILE, 0).xyz;
-        ivec2 inside = px % TILE;
-        vec2 uv = (leaf.xy * float(TILE) + vec2(inside) + 0.5) * leaf.z;
-        vec4 sum = vec4(0.0);  // Σ RGB, Σ variance
-        float count = 0.0, low = -1e30, high = 1e30;
-        int done = -1;
-        for (int w = 0; w < WINDOWS; ++w) {
-            int radius = RADII[w];
-            for (int j = -radius; j <= radius; ++j)
-                for (int i = -radius; i <= radius; ++i) {
-                    if (max(abs(i), abs(j)) <= done) continue;
-                    ivec2 at = inside + ivec2(i, j), there = px + ivec2(i, j);
-                    if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, ivec2(TILE))))
-                        there = texel_px_at(uv + vec2(i, j) * leaf.z);
-                    if (there.y < 0 || texelFetch(t_origin, there, 0).w <= 0.0) continue;
-                    uvec2 other = texelFetch(t_origin_normal, there, 0).xy;
-                    if (other.y != mine.y || dot(normal_from_octahedral(other.x), normal) < COS_ALIKE) continue;
-                    vec4 g = texelFetch(t_gathered, there, 0);
-                    sum += vec4(g.rgb / u_rays, variance_of(g));
-                    count += 1.0;
-                }
-            done = radius;
-            // the variance of all texels in the window is alike: its mean is far less noisy than that of each
-            float mean = dot(sum.rgb, vec3(1.0 / 3.0)) / count, deviation = sqrt(sum.a) / count;
-            low = max(low, mean - CONFIDENCE * deviation);
-            high = min(high, mean + CONFIDENCE * deviation);
-            if (low > high) break;
-            indirect = sum.rgb / count;
-            variance = sum.a / (count * count);
-        }
-    }
-#endif
-    out_irradiance = vec4(direct.rgb + indirect, dot(direct.rgb, vec3(1.0 / 3.0)));
-    out_variance = direct.a + variance;
+    vec4 direct = texelFetch(t_direct, px, 0), indirect = indirect_at(px);
+    out_irradiance = vec4(direct.rgb + indirect.rgb, dot(direct.rgb, vec3(1.0 / 3.0)));
+    out_variance = direct.a + indirect.a;
 }

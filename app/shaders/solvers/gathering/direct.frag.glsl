@@ -1,5 +1,5 @@
 // Shadow rays to the lamps of a set, and what they bring [Veach97, 8.2]: a lamp is chosen by what it may give to this tile, a point
-// on it evenly. With w = F_dA / p, what the lamp's point would give unoccluded, over its probability density:
+// on it evenly as seen from here. With w = F_dA / p, what the lamp's point would give unoccluded, over its probability density:
 //
 //   CLOSED_FORM:  (Σ w V, Σ w, Σ over passes (Σ w V / Σ w)²): Σ F V is then the closed form Σ F times Σ w V / Σ w
 //   else:         (Σ w V E, Σ over passes (mean of w V E over RGB)²), E relative to that of the set
@@ -10,7 +10,7 @@
 #include "solvers/gathering/origin.glsl"
 #include "visibility/rays.glsl"
 
-uniform sampler2D t_chances;  // of each lamp in each tile, summed up
+uniform sampler2D t_chances;  // of each lamp in each tile, or the same in all, summed up
 uniform ivec2 u_rays;         // the first, and how many
 uniform int u_stream;         // of random numbers
 
@@ -35,25 +35,24 @@ void main() {
     out_direct = vec4(0.0);
     if (!o.there) return;
     ivec2 slot = px / TILE;
-    int tile = slot.y * textureSize(t_leaves, 0).x + slot.x;
+    int tile = min(slot.y * textureSize(t_leaves, 0).x + slot.x, textureSize(t_chances, 0).y - 1);
     float all = 0.0;
     vec3 seen = vec3(0.0);
     for (int k = u_rays.x; k < u_rays.x + u_rays.y; ++k) {
         vec4 share = numbers(o.place, uint(u_stream), k);
         float probability, rest;
         Lamp lamp = load_lamp(chosen_lamp(tile, share.x, probability, rest));
-        float root = sqrt(rest);
         vec3 normal = cross(lamp.u, lamp.v) / (2.0 * lamp.area);
         vec3 from = start_of(o, share.zw);
-        vec3 to = lamp.corner + (1.0 - root) * lamp.u + share.y * root * lamp.v;
-        vec3 way = to - from;
+        float area;
+        vec3 way = point_on(lamp, normal, from, vec2(rest, share.y), area) - from;
         float side = dot(way, normal) < 0.0 ? 1.0 : -1.0;
         if (side < 0.0 && !lamp.two_sided) continue;
         way += 2.0 * COPLANAR * side * normal;  // off the lamp's own surface
         float r2 = dot(way, way), r = sqrt(r2);
         float cosines = dot(way, o.normal) * abs(dot(way, normal));
         if (cosines <= 0.0 || probability <= 0.0) continue;
-        float w = cosines * lamp.area / (PI * r2 * r2 * probability);
+        float w = cosines * area / (PI * r2 * r2 * probability);
         all += w;
         if (!any_hit(from, way / r, 0.0, r)) seen += w * lamp.exitance;
     }

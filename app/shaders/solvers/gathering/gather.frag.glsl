@@ -5,13 +5,13 @@
 #include "solvers/gathering/ray.glsl"
 #else
 uniform usampler2D t_hits;
-uniform ivec3 u_pages;  // size of a page [texels], pages side by side
+uniform ivec3 u_bank;  // size of a page [texels], pages side by side
 #endif
 
 uniform sampler2D t_outgoing;
 uniform ivec2 u_rays;  // the first, and how many
 
-const int GROUP = 8;  // rays
+const int GROUP = 4;  // rays
 
 layout(location = 0) out vec4 out_light;  // a: Σ over groups (Σ mean of RGB)²
 
@@ -28,7 +28,7 @@ void main() {
 #if TRACED
             uint hit = trace(o, k);
 #else
-            uint hit = texelFetch(t_hits, px + u_pages.xy * ivec2(k % u_pages.z, k / u_pages.z), 0).x;
+            uint hit = texelFetch(t_hits, px + u_bank.xy * ivec2(k % u_bank.z, k / u_bank.z), 0).x;
 #endif
             sum += texelFetch(t_outgoing, ivec2(hit & 0xFFFFu, hit >> 16), 0).rgb;
         }

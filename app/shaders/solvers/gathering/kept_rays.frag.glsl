@@ -2,12 +2,11 @@
 // traced: what it hit is known by its texel, in whose plane it ends. One that has hit no texel ends far outside.
 #include "solvers/gathering/hit.glsl"
 #include "solvers/gathering/origin.glsl"
-#include "common/texel_at.glsl"
 
 uniform usampler2D t_hits;
 uniform sampler2D t_outgoing;
 uniform sampler2D t_position_area;
-uniform ivec3 u_pages_of_bank;  // size of a page [texels], pages side by side
+uniform ivec3 u_bank;  // size of a page [texels], pages side by side
 uniform ivec2 u_texel;
 uniform int u_first;  // ray of the bank's first page
 
@@ -30,11 +29,10 @@ void main() {
     Origin o = load_origin(u_texel);
     vec3 start, direction;
     kth_ray(o, k, start, direction);
-    ivec2 page_px = u_pages_of_bank.xy * ivec2(page % u_pages_of_bank.z, page / u_pages_of_bank.z);
+    ivec2 page_px = u_bank.xy * ivec2(page % u_bank.z, page / u_bank.z);
     uint hit = texelFetch(t_hits, u_texel + page_px, 0).x;
-    ivec2 atlas_px = atlas_px_of(hit), px = ivec2(-1);
-    if (atlas_px.y < u_rows) px = texel_px_at(vec2(atlas_px) + 0.5);
+    ivec2 px = texel_px_of(hit);
     out_start = vec4(start, 1.0);
-    out_end = vec4(start + direction * (px.y < 0 ? FAR : distance_to(px, start, direction)), 1.0);
-    out_light = vec4(texelFetch(t_outgoing, atlas_px, 0).rgb, 1.0);
+    out_end = vec4(start + direction * (px.y >= u_rows ? FAR : distance_to(px, start, direction)), 1.0);
+    out_light = vec4(texelFetch(t_outgoing, px, 0).rgb, 1.0);
 }

@@ -16,3 +16,32 @@ Lamp load_lamp(int nth) {
 }
 
 int lamp_count() { return textureSize(t_lamps, 0).y; }
+
+// What is seen under a smaller solid angle [sr] is alike all over: a point is chosen evenly on its area. Rounding of angles,
+// 1e-6, is less than a ten-thousandth of any larger one.
+const float SMALL = 0.02;
+
+// A point on a lamp, and ``area``: one over the density of such points there. Evenly within the solid angle under which the lamp
+// is seen [Arvo95], or it is missed where it is near.
+vec3 point_on(Lamp lamp, vec3 normal, vec3 from, vec2 share, out float area) {
+    float root = sqrt(share.x);
+    vec3 to = lamp.corner + (1.0 - root) * lamp.u + share.y * root * lamp.v;
+    area = lamp.area;
+    vec3 a = normalize(lamp.corner - from), b = normalize(lamp.corner + lamp.u - from), c = normalize(lamp.corner + lamp.v - from);
+    float solid = 2.0 * atan(abs(dot(a, cross(b, c))), 1.0 + dot(a, b) + dot(b, c) + dot(c, a));  // [Oosterom83]
+    if (solid < SMALL) return to;
+    vec3 ab = normalize(cross(a, b)), ca = normalize(cross(c, a));
+    float cos_a = clamp(-dot(ab, ca), -1.0, 1.0), sin_a = sqrt(1.0 - cos_a * cos_a), part = share.x * solid;
+    // the smaller triangle a, b, c' of that part of the solid angle
+    float phi = part - acos(cos_a), s = sin(phi), t = cos(phi);
+    float u = t - cos_a, v = s + sin_a * dot(a, b);
+    float q = clamp(((v * t - u * s) * cos_a - v) / max((v * s + u * t) * sin_a, 1e-30), -1.0, 1.0);
+    vec3 along = q * a + sqrt(1.0 - q * q) * normalize(c - dot(c, a) * a);
+    float z = 1.0 - share.y * (1.0 - dot(along, b));
+    vec3 direction = z * b + sqrt(max(1.0 - z * z, 0.0)) * normalize(along - dot(along, b) * b);
+    float cosine = dot(direction, normal), height = dot(lamp.corner - from, normal);
+    if (abs(cosine) < 1e-6) return to;
+    float r = height / cosine;
+    area = solid * r * r / abs(cosine);
+    return from + r * direction;
+}
