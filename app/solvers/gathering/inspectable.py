@@ -63,7 +63,7 @@ class Inspectable:
         indirect light, and with ``outgoing``, see bounces.py, its rays. Waits for the GPU where a texel is given."""
         hits = self._hits
         figures = {
-            "Rays per texel": f"{progress.done:,}, {hits.count:,} kept",
+            "Rays per texel": f"{progress.done:,}, {'all' if hits.count >= progress.done else f'{hits.count:,}'} kept",
             "Kept hits": f"{hits.memory / 2**20:.1f} MiB",
             "Bounces": f"{bounces}",
             "Expected error": f"{progress.remaining:.2%}".replace("%", " %"),
