@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -62,7 +63,8 @@ class EnergyWatch:
 class Effort:
     """Work that the solution took from nothing until converged, and since the materials were last edited: [Chen90] in numbers.
 
-    fresh_work: None until converged from nothing with the options as they are; edited_at: work done when edited, or None.
+    fresh_work: None until converged from nothing with the options as they are; edited_at: work done when edited, or None;
+    counted: what the solver had counted by then.
     """
 
     def __init__(self) -> None:
@@ -71,6 +73,7 @@ class Effort:
     def begin(self) -> None:
         self.fresh_work: int | None = None
         self.edited_at: int | None = None
+        self.counted: Mapping[str, int] = {}
         self._from_nothing = True
 
     def options_changed(self) -> None:
@@ -78,10 +81,10 @@ class Effort:
         self.begin()
         self._from_nothing = False
 
-    def edited(self, done: int, *, converged: bool) -> None:
+    def edited(self, done: int, counts: Mapping[str, int], *, converged: bool) -> None:
         """converged: whether the light had; edits of light that still moves count as one."""
         if converged or self.edited_at is None:
-            self.edited_at, self._from_nothing = done, False
+            self.edited_at, self._from_nothing, self.counted = done, False, dict(counts)
 
     def converged(self, done: int) -> None:
         if self._from_nothing:
@@ -90,3 +93,7 @@ class Effort:
     def edit_work(self, done: int) -> int | None:
         """Work since the edit, of so much; None if there was none."""
         return None if self.edited_at is None else done - self.edited_at
+
+    def edit_counts(self, counts: Mapping[str, int]) -> Mapping[str, int]:
+        """What was counted since the edit, of so much; nothing if there was none."""
+        return {name: counts[name] - before for name, before in self.counted.items() if name in counts}

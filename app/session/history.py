@@ -19,11 +19,11 @@ class History(Rows):
 
     @property
     def work_per_second(self) -> float:
-        """Over the last second of solving, or all of it."""
+        """Over the last second of solving and what began before it, or all of it."""
         rows = self._rows[: self._count]
         if len(rows) < 2:
             return 0.0
-        recent = rows[rows[:, 1] >= rows[-1, 1] - 1.0]
-        first = recent[0] if len(recent) > 1 else rows[-2]
+        older = rows[rows[:, 1] <= rows[-1, 1] - 1.0]
+        first = older[-1] if len(older) else rows[0]
         span = rows[-1, 1] - first[1]
         return float((rows[-1, 0] - first[0]) / span) if span > 0 else 0.0

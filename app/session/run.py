@@ -100,13 +100,13 @@ class Run:
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light that is there stays where the solver can solve for the difference."""
-        converged = self.converged
+        converged, counts = self.converged, self.solver.inspect().counts
         self.solver.set_materials(materials)
         self.progress = self.solver.poll()
         if self.solver.issued == 0:
             self._begin_again()
         else:
-            self.effort.edited(self.solver.issued, converged=converged)
+            self.effort.edited(self.solver.issued, counts, converged=converged)
         self.history.add(self.solver.issued, self.seconds, self.progress.remaining, self.escaped_share)
         self._energy.edited()
         self.settled = False

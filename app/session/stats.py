@@ -14,7 +14,7 @@ from app.session.run import Run
 class Stats:
     """done: work in the solver's ``unit``, of which ``remains`` says what is left. remaining: see Progress. Energies are summed
     over RGB [W]. per_second: work of late, and of the whole solve once it has converged. resolved: what options that were left
-    unset have come to."""
+    unset have come to. figures, counts: see Inspection."""
 
     unit: str
     remains: str
@@ -37,13 +37,16 @@ class Stats:
     uniform_texels: int  # if all leaves of a quadtree were of its finest level
     triangles: int
     charts: int
+    figures: Mapping[str, str]
+    counts: Mapping[str, int]
+    counts_in_edit: Mapping[str, int]  # since the materials were last edited
     memory_mib: float
     resolved: Mapping[str, Any]
 
 
 def stats_of(run: Run, lightmap: Lightmap) -> Stats:
     """Where the solution of an open scene stands."""
-    balance, progress, done = run.energy, run.progress, run.converged
+    balance, progress, done, inspection = run.energy, run.progress, run.converged, run.solver.inspect()
     return Stats(
         unit=run.family.unit,
         remains=run.family.remains,
@@ -66,6 +69,9 @@ def stats_of(run: Run, lightmap: Lightmap) -> Stats:
         uniform_texels=lightmap.pool.uniform_texels(lightmap.options.depth),
         triangles=len(lightmap.scene.triangles),
         charts=lightmap.charts.chart_count,
+        figures=inspection.figures,
+        counts=inspection.counts,
+        counts_in_edit=run.effort.edit_counts(inspection.counts),
         memory_mib=sum(lightmap.memory.values()) / 2**20,
         resolved=run.solver.resolved,
     )

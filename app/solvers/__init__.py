@@ -29,6 +29,7 @@ class Family:
     whether it can begin with light that another solver has left in the lightmap; else it begins anew. threshold: the option that
     says how little may remain when it has converged. pictures: captions of the images of its Inspection, and what they show.
     shows: options that change the light that is shown without any work. layers: names of what its solvers know of every texel.
+    distributes: whether what remains is light that is still to be distributed, in the energy balance; else it is an error.
     """
 
     title: str
@@ -43,6 +44,7 @@ class Family:
     pictures: Mapping[str, str] = field(default_factory=dict)
     shows: tuple[str, ...] = ()
     layers: tuple[str, ...] = ()
+    distributes: bool = True
 
 
 SOLVERS: dict[str, Family] = {
@@ -71,6 +73,7 @@ SOLVERS: dict[str, Family] = {
         shows=("smooth",),
         layers=("direct", "variance", "rays"),
         pictures={HEMISPHERE: SEEN},
+        distributes=False,
     ),
 }
 DEFAULT_SOLVER = "shooting"

@@ -94,7 +94,8 @@ class Inspection:
 
     images: pictures by caption, the solver's own: valid until it works again. rectangles: places of the virtual atlas to mark, by
     name. facts: what there is to say, name and value. texel_facts: the same of the texel that was asked for. texel_light: parts
-    of its H by name, RGB [W/m²]. rays: of that texel, where light comes along rays; with images only.
+    of its H by name, RGB [W/m²]. rays: of that texel, where light comes along rays; with images only. figures: of the solution so
+    far, name and value. counts: of what took place so far on all texels, which only grow, by name.
     """
 
     images: Mapping[str, Texture] = field(default_factory=dict)
@@ -103,6 +104,8 @@ class Inspection:
     texel_facts: Mapping[str, str] = field(default_factory=dict)
     texel_light: Mapping[str, F64] = field(default_factory=dict)
     rays: Rays | None = None
+    figures: Mapping[str, str] = field(default_factory=dict)
+    counts: Mapping[str, int] = field(default_factory=dict)
 
 
 OptionsT = TypeVar("OptionsT", bound=Options)

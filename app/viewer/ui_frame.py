@@ -148,11 +148,19 @@ def _legend(kind: str, scale: Scale) -> Legend:
     return Legend(kind.capitalize(), scale.unit, max(scale.low, 0.0), scale.high, scale.low > 0, colours)
 
 
-def ui_image(view: View, size: tuple[int, int], *, measured: bool = True, panels: bool = True) -> NDArray[np.uint8]:
+def ui_image(
+    view: View,
+    size: tuple[int, int],
+    *,
+    measured: bool = True,
+    panels: bool = True,
+    click: tuple[float, float] | None = None,
+) -> NDArray[np.uint8]:
     """The viewer's window as it would look, (height, width, 3) u8, top row first, for a ``size`` (width, height) [px].
 
     The session is not stepped. ``measured=False`` leaves out what depends on the machine's speed, so that pictures
-    can be compared; ``panels=False`` all but the picture and the legend of its false colour.
+    can be compared; ``panels=False`` all but the picture and the legend of its false colour. click: a place in the window [px]
+    that is clicked once it is there.
     """
     gpu = view.session.gpu
     limit = gpu.limits.max_texture
@@ -166,6 +174,13 @@ def ui_image(view: View, size: tuple[int, int], *, measured: bool = True, panels
     try:
         for _ in range(WARM_UP):
             frame.draw(view, target, size=size)
+        if click is not None:
+            ui.io.add_mouse_pos_event(*click)
+            frame.draw(view, target, size=size)
+            for down in (True, False):
+                ui.io.add_mouse_button_event(0, down)
+            for _ in range(WARM_UP):
+                frame.draw(view, target, size=size)
         return pixels(target, size)
     finally:
         frame.release()

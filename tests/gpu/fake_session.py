@@ -152,6 +152,9 @@ class FakeSession:
             "refining": False,
             "note": None,
             "uniform_texels": 40000,
+            "figures": {},
+            "counts": {},
+            "counts_in_edit": {},
             "resolved": {"level": 2, "resolution": 256},
         }
         rates = {"remaining": 0.0318, "seconds": 0.3, "per_second": 212.0, "converged": False}

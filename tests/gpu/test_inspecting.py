@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 
 import numpy as np
@@ -19,7 +20,9 @@ from app.session.view import View
 from app.solvers import HEMISPHERE, SOLVERS
 from app.solvers.base import LAYERS
 from app.solvers.gathering.options import GatheringOptions
+from app.ui import widgets
 from app.viewer.picture import picture
+from app.viewer.ui_frame import ui_image
 
 RAYS = 32
 SIZE = (96, 96)
@@ -205,3 +208,55 @@ def test_the_hemisphere_shows_what_the_texel_sees(view: View) -> None:
     expected = encode_srgb(np.clip(rays.light.astype(np.float64) / np.pi * 2.0**0.5, 0, 1)) * 255
     assert np.abs(shown[at[0], at[1], :3] - expected).max() <= 1.01
     assert view.inspect(None).images == {}
+
+
+# -- counting ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "edit", [{"emission": (9.0, 12.0, 15.0)}, {"albedo": (0.2, 0.5, 0.3)}], ids=lambda edit: next(iter(edit))
+)
+def test_an_edit_traces_no_ray(view: View, edit: dict[str, tuple[float, float, float]]) -> None:
+    """All light changes, and the counter that the panel shows stands still; until more rays are asked for."""
+    session = view.session
+    texels, before = session.lightmap.texel_count, session.lightmap.irradiance()
+    assert session.stats.counts["Rays traced"] >= RAYS * texels and session.stats.counts_in_edit == {}
+    index = next(i for i, m in enumerate(session.scene.materials) if m.emits == ("emission" in edit))
+    session.set_material(index, dataclasses.replace(session.scene.materials[index], **edit))
+    while session.work(8) == 0:
+        pass
+    session.run.settle()
+    counted = session.stats.counts_in_edit["Rays traced"]
+    assert not np.allclose(session.lightmap.irradiance(), before, rtol=0.05)
+    assert 8 * texels <= counted < 16 * texels, "of the work that came after the edit"
+
+
+def test_an_edit_is_shown_to_trace_nothing(view: View) -> None:
+    session = view.session
+    session.set_material(0, dataclasses.replace(session.scene.materials[0], albedo=(0.5, 0.5, 0.5)))
+    assert session.work(8) == 0, "it follows the edit first"
+    session.run.settle()
+    assert session.stats.counts_in_edit == {"Rays traced": 0}
+
+
+def test_figures_are_those_of_the_solution(view: View) -> None:
+    stats = view.session.stats
+    assert stats.figures["Rays per texel"] == f"{RAYS}, all kept"
+    assert int(stats.figures["Bounces"]) == view.session.solver.bounces.steps > 1  # type: ignore[attr-defined]
+    assert float(stats.figures["Expected error"].split()[0]) == pytest.approx(100 * stats.remaining, abs=0.006)
+    assert float(stats.figures["Kept hits"].split()[0]) > 0
+
+
+def test_the_panel_counts(view: View, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: dict[str, dict[str, str]] = {}
+    monkeypatch.setattr(widgets, "facts", lambda name, rows: told.update({name: dict(rows)}))
+    session = view.session
+    session.set_material(0, dataclasses.replace(session.scene.materials[0], albedo=(0.5, 0.5, 0.5)))
+    session.work(8)
+    session.run.settle()
+    ui_image(view, (900, 700))
+    assert told["figures"]["Rays traced"].startswith(f"{session.stats.counts['Rays traced']:,}, ")
+    assert told["figures"]["Rays traced"].endswith("/s\n0 since the edit")
+    session.set_solver("shooting")
+    ui_image(view, (900, 700))
+    assert told["figures"] == {}

@@ -18,11 +18,12 @@ from PIL import Image
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
 from app.lightmap.options import LightmapOptions
+from app.options import Options
 from app.render.options import DisplayOptions
 from app.session.run import Stop
 from app.session.session import Session
 from app.session.view import View
-from app.solvers import ShootingOptions
+from app.solvers import SOLVERS, ShootingOptions
 from app.viewer.picture import picture
 
 ROOT = Path(__file__).parent.parent.parent
@@ -36,10 +37,11 @@ MAGNIFIED = 8
 
 @dataclass(frozen=True)
 class Picture:
-    """One golden. shots: taken when so many have been made; None: at the end. exposure [EV]; None: automatic."""
+    """One golden. work: taken when so much has been done, in the solver's unit; None: at the end. exposure [EV]; None:
+    automatic."""
 
     name: str
-    shots: int | None = None
+    work: int | None = None
     camera: int = 0
     exposure: float | None = None
     display: dict[str, Any] = field(default_factory=dict)
@@ -51,12 +53,14 @@ class Reel:
 
     scene: str
     texels: int
-    shooting: ShootingOptions
+    options: Options
     pictures: tuple[Picture, ...]
     size: tuple[int, int] = WIDE
     adaptive: bool = False
+    solver: str = "shooting"
 
 
+GATHERING = SOLVERS["gathering"].options()
 CORNELL_EV = 1.8  # automatic when solved; one for the whole series, so that it shows the light coming in
 REELS = (
     Reel(
@@ -104,14 +108,29 @@ REELS = (
     ),
     Reel("museum", 80_000, ShootingOptions(level=3), (Picture("museum", 700), Picture("museum-aisle", 700, camera=1))),
     Reel("grotto", 60_000, ShootingOptions(level=3), (Picture("grotto", 400, exposure=1.2),)),
+    Reel(
+        "cornell-box",
+        30_000,
+        GATHERING,
+        (
+            Picture("layer-direct", 128, exposure=CORNELL_EV, display={"layer": "direct"}),
+            Picture("layer-indirect", 128, exposure=CORNELL_EV, display={"layer": "indirect"}),
+            Picture("layer-expected-error", 128, display={"layer": "expected-error"}),
+        ),
+        SQUARE,
+        solver="gathering",
+    ),
+    Reel("museum", 40_000, GATHERING, (Picture("museum-gathering", 512),), solver="gathering"),
+    Reel("textured-room", 60_000, GATHERING, (Picture("textured-room-gathering", 128),), solver="gathering"),
 )
 
 
-@pytest.mark.parametrize("reel", REELS, ids=lambda reel: f"{reel.scene}-{reel.texels}" + "-quadtree" * reel.adaptive)
+@pytest.mark.parametrize("reel", REELS, ids=lambda r: f"{r.solver}-{r.scene}-{r.texels}" + "-quadtree" * r.adaptive)
 def test_the_gallery_looks_as_it_did(gpu: Gpu, reel: Reel, request: pytest.FixtureRequest) -> None:
     regenerate = request.config.getoption("--regenerate-screenshots")
     light = LightmapOptions(adaptive=reel.adaptive)
-    session = Session(gpu, options=reel.shooting, atlas=AtlasOptions(texels=reel.texels), light=light)
+    atlas = AtlasOptions(texels=reel.texels)
+    session = Session(gpu, solver=reel.solver, options=reel.options, atlas=atlas, light=light)
     view = View(session)
     try:
         session.open_now(reel.scene)
@@ -135,7 +154,7 @@ def test_the_gallery_looks_as_it_did(gpu: Gpu, reel: Reel, request: pytest.Fixtu
 
 
 def _taken(view: View, taken: Picture, size: tuple[int, int]) -> np.ndarray[Any, Any]:
-    view.session.solve(Stop(work=taken.shots))
+    view.session.solve(Stop(work=taken.work))
     view.look_through(view.session.scene.cameras[taken.camera])
     view.display = DisplayOptions(**taken.display)
     if taken.exposure is None:

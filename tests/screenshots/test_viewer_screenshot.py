@@ -7,6 +7,7 @@ and difference in tests/screenshots/failed. ``pytest --regenerate-screenshots`` 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from app.viewer.ui_frame import ui_image
 ROOT = Path(__file__).parent.parent.parent
 FAILED = Path(__file__).parent / "failed"
 SIZE = (1280, 720)
-SHOTS = 1000
+SHOTS, RAYS = 1000, 128
 STEP = 8  # of 255: what the last bit of a float does to a pixel after exposure and tone curve
 SHARE = (
     0.005  # of the pixels may differ by more: a digit of a number that stands on the edge of rounding, a line of a plot
@@ -31,22 +32,34 @@ SHARE = (
 MAGNIFIED = 8
 
 
+CLICK = (560, 480)  # on the floor
+
+
+class Golden(NamedTuple):
+    light: LightmapOptions = LightmapOptions()
+    display: DisplayOptions = DisplayOptions()
+    solver: str = "shooting"
+    work: int = SHOTS
+    click: tuple[float, float] | None = None
+
+
 GOLDENS = {
-    "viewer": (LightmapOptions(), DisplayOptions()),
-    "viewer-quadtree": (LightmapOptions(adaptive=True), DisplayOptions(grid=True)),
+    "viewer": Golden(),
+    "viewer-quadtree": Golden(LightmapOptions(adaptive=True), DisplayOptions(grid=True)),
+    "viewer-rays": Golden(solver="gathering", work=RAYS, click=CLICK),
 }
 
 
 @pytest.mark.parametrize("name", GOLDENS)
 def test_the_viewer_looks_as_it_did(request: pytest.FixtureRequest, name: str) -> None:
     golden = ROOT / "screenshots" / f"{name}.png"
-    light, display = GOLDENS[name]
+    kind = GOLDENS[name]
     with gpu_context() as gpu:
-        session = Session(gpu, light=light, expose_on_open=True)
-        view = View(session, display)
+        session = Session(gpu, solver=kind.solver, light=kind.light, expose_on_open=True)
+        view = View(session, kind.display)
         session.open_now("cornell-box")
-        session.solve(Stop(work=SHOTS))
-        image = ui_image(view, SIZE, measured=False)
+        session.solve(Stop(work=kind.work))
+        image = ui_image(view, SIZE, measured=False, click=kind.click)
         view.release()
         session.release()
         software = gpu.software

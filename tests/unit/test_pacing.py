@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from app.session import pacing
+from app.session.history import History
 from app.session.pacing import INTERACTIVE_BUDGET, INTERACTIVE_FRAME, LONG_FRAME, MOST_BANDS, Pacer
 
 PART = 3.0  # ms of a part of a shot
@@ -78,3 +79,13 @@ def test_a_hand_gets_all_but_a_little_of_a_frame(clockwork: Clockwork) -> None:
     assert PART * len(idle) >= 20.0 > PART * (len(idle) - 1)
     assert PART * len(held) >= INTERACTIVE_BUDGET > PART * (len(held) - 1)
     assert frame(pace, clockwork, 2 * LONG_FRAME, interactive=True, shots=8)[0][0] == "part"
+
+
+@pytest.mark.parametrize("seconds", [0.02, 0.4, 3.0])
+def test_work_per_second_is_that_of_late(seconds: float) -> None:
+    """Whether a piece of work takes longer than the second or not, and with a last row that adds nothing."""
+    history = History()
+    for nth in range(10):
+        history.add(16 * nth, seconds * nth, 0.5, 0.0)
+    history.add(16 * 9, seconds * 9 + 1e-4, 0.4, 0.0)
+    assert history.work_per_second == pytest.approx(16 / seconds, rel=0.05)

@@ -12,8 +12,8 @@ layout(location = 0) out vec4 out_colour;
 
 #include <curve>
 
-const vec2 ALPHA = vec2(0.25, 0.85);  // of black and of white
-const float SEAM = 0.25;
+const vec2 ALPHA = vec2(0.18, 0.9);  // of black and of white
+const float SEAM = 0.2;
 
 void main() {
     vec3 colour = encode_srgb(develop(v_light * u_gain));

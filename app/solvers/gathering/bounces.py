@@ -36,7 +36,8 @@ def steps_to(tolerance: float, reflected: float) -> int:
 class Bounces:
     """Among the texels of one lightmap, the points: ``solution`` is H on each [stored units]. Whoever makes it releases it.
 
-    reflected: λ, the mean albedo of the colour that is reflected most, textures of albedo taken as white.
+    reflected: λ, the mean albedo of the colour that is reflected most, textures of albedo taken as white. steps: of the last
+    ``solve``.
     """
 
     def __init__(self, gpu: Gpu, points: Lightmap) -> None:
@@ -53,7 +54,7 @@ class Bounces:
         scene = points.scene
         area = np.bincount(scene.material_ids, scene.normals_areas[1], len(scene.materials))
         self._share = area / area.sum()  # of each material
-        self.reflected = 0.0
+        self.reflected, self.steps = 0.0, 0
         self._sources: Texture | None = None
         size = points.size
         self._solutions = [gpu.texture(size, 4, "f4") for _ in range(2)]
@@ -64,6 +65,7 @@ class Bounces:
 
     def clear(self) -> None:
         """No light."""
+        self.steps = 0
         for target in (*self._targets, self._gathered_target):
             target.clear()
 
@@ -85,7 +87,7 @@ class Bounces:
 
     def solve(self, hits: Hits, direct: Texture, rays: int, steps: int) -> Iterator[None]:
         """So many steps from the solution as it is, along so many rays of each texel, in parts."""
-        omega = 1.0
+        omega, self.steps = 1.0, steps
         for step in range(steps):
             yield from self.gather(hits, 0, rays, anew=True)
             if self.reflected >= MOST_REFLECTED and step > 0 and step in (1, steps // 2, steps - 1):

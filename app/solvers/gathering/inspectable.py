@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
-from app.solvers.base import Inspection, Rays
+from app.solvers.base import Inspection, Progress, Rays
 from app.solvers.gathering.compose import Compose
 from app.solvers.gathering.direct import DirectLight
 from app.solvers.gathering.hits import Hits
@@ -55,15 +56,24 @@ class Inspectable:
         target.clear(float(rays))
         return counts
 
-    def inspect(self, texel: tuple[int, int] | None, outgoing: Texture | None) -> Inspection:
-        """How much is traced and kept; of a texel (column, row), its direct and indirect light, and with ``outgoing``, see
-        bounces.py, its rays. Waits for the GPU where a texel is given."""
-        traced, memory = self._hits.traced + sum(direct.traced for direct in self._directs), self._hits.memory
-        facts = {"Rays traced": f"{traced:,}", "Kept hits": f"{memory / 2**20:.0f} MiB"}
+    def inspect(
+        self, texel: tuple[int, int] | None, progress: Progress, bounces: int, outgoing: Texture | None
+    ) -> Inspection:
+        """How much is traced and kept, and in how many bounces light was found last; of a texel (column, row), its direct and
+        indirect light, and with ``outgoing``, see bounces.py, its rays. Waits for the GPU where a texel is given."""
+        hits = self._hits
+        figures = {
+            "Rays per texel": f"{progress.done:,}, {'all' if hits.count >= progress.done else f'{hits.count:,}'} kept",
+            "Kept hits": f"{hits.memory / 2**20:.1f} MiB",
+            "Bounces": f"{bounces}",
+            "Expected error": f"{progress.remaining:.2%}".replace("%", " %"),
+        }
+        traced = hits.traced + sum(direct.traced for direct in self._directs)
+        whole = Inspection(figures=figures, counts={"Rays traced": traced})
         if texel is None or any(at >= size for at, size in zip(texel, self._lightmap.size, strict=True)):
-            return Inspection(facts=facts)
-        return Inspection(
-            facts=facts,
+            return whole
+        return replace(
+            whole,
             texel_facts={"Kept rays": f"{self._hits.count:,}"},
             texel_light=self._parts(texel),
             rays=None if outgoing is None else self.rays(texel, outgoing),

@@ -314,7 +314,8 @@ class Gathering:
 
     def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
         """How much is traced and kept; of a texel, its rays, and what they bring."""
-        return self._inspectable.inspect(texel, self.bounces.outgoing if images else None)
+        bounces = self.bounces
+        return self._inspectable.inspect(texel, self._progress, bounces.steps, bounces.outgoing if images else None)
 
     @property
     def traced(self) -> int:

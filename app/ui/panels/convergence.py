@@ -72,9 +72,12 @@ def _plots(view: View, size: imgui.ImVec2, column: str, label: str | None) -> No
     chosen = _thinned(rows)
     x = history.column(column)[chosen]
     curves = {n: history.column(n)[chosen] for n in ("remaining", "absorbed", "escaped")}
-    _shares(size, view, column, x, curves["remaining"], label)
-    imgui.same_line()
-    _energy(size, x, curves, label)
+    balanced = view.session.family.distributes
+    alone = imgui.ImVec2(2 * size.x + imgui.get_style().item_spacing.x, size.y)
+    _shares(size if balanced else alone, view, column, x, curves["remaining"], label)
+    if balanced:
+        imgui.same_line()
+        _energy(size, x, curves, label)
 
 
 def _thinned(rows: np.ndarray) -> np.ndarray:
@@ -94,12 +97,14 @@ def _begin(name: str, size: imgui.ImVec2, label: str | None) -> bool:
 def _shares(
     size: imgui.ImVec2, view: View, column: str, x: np.ndarray, residual: np.ndarray, label: str | None
 ) -> None:
-    """The residual, and beside it the error where there is a reference, in logarithms [fraction]."""
+    """What remains, and beside it the error where there is a reference, in logarithms [fraction]."""
     if not _begin("residual", size, label):
         return
-    curves: dict[str, Curve] = {"residual / emitted": (x, residual, theme.AMBER)}
+    family = view.session.family
+    name, of = ("residual", "emitted") if family.distributes else (family.remains, "mean")
+    curves: dict[str, Curve] = {f"{name} / {of}": (x, residual, theme.AMBER)}
     if view.session.compared.comparison is not None:
-        curves = {"residual": (x, residual, theme.AMBER)}  # all three names fit above the plot
+        curves = {name: (x, residual, theme.AMBER)}  # all three names fit above the plot
         rows = view.session.compared.comparison.errors
         chosen = _thinned(np.flatnonzero(np.isfinite(rows.column("rms"))))
         for name, error, colour in (("RMS error", "rms", theme.RMS), ("median error", "median", theme.MEDIAN)):

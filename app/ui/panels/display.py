@@ -23,6 +23,8 @@ def draw(view: View, state: State) -> None:
     """The whole panel: DisplayOptions, one widget each; the false-colour scale only while it is used."""
     kind = measured(view.shown)
     skip = SCALED if kind == "off" else DEVELOPED if kind in FALSE_COLOURS else (*SCALED, *DEVELOPED)
+    if not view.session.family.distributes:
+        skip = (*skip, "last_shooter")
     unit = {"false_colour_max": UNITS[kind]} if kind in UNITS else {}
     display = view.display if view.display.layer in view.layers else view.shown
     edited = widgets.edit_options(display, skip=(*skip, *COMPARED), units=unit, choices={"layer": view.layers})

@@ -1,4 +1,4 @@
-"""Inspect: the texel under the last click, what the last shooter saw, and the atlas."""
+"""Inspect: the texel under the last click with its hemisphere, what the solver shows of its work, and the atlas."""
 
 from __future__ import annotations
 
@@ -17,15 +17,17 @@ if TYPE_CHECKING:
     from app.session.view import View
 
 REFRESH_SECONDS = 0.25  # between two pictures of it
-DISC_SHARE = 0.8  # of the panel's width
+DISC_SHARE = 0.58  # of the panel's width
 SYMBOL_EM = 1.0, 1.4  # width of the column of symbols, without and with indices
 
 
 def draw(view: View, state: State) -> None:
     """The whole panel."""
+    state.inspected_age += imgui.get_io().delta_time
     if state.picked is None:
         widgets.wrapped("Click a surface to read its texel.", theme.DIM)
     else:
+        _hemisphere(view, state)
         if widgets.fold("Surface"):
             _surface(view, state.picked)
         if widgets.fold("Light [W/m²]"):
@@ -35,32 +37,40 @@ def draw(view: View, state: State) -> None:
         atlas.draw(view, state)
 
 
+def _hemisphere(view: View, state: State) -> None:
+    """What the rays of the picked texel bring, where the solver has any; beside it, whether they are drawn in the room."""
+    meaning = view.session.family.pictures.get(HEMISPHERE)
+    if meaning is None or _texel(state) is None or not widgets.fold(HEMISPHERE):
+        return
+    _picture(view, state, HEMISPHERE, meaning, widgets.steady_width() * DISC_SHARE)
+    imgui.same_line()
+    imgui.begin_group()
+    state.draw_rays = imgui.checkbox("Rays in\nthe room", state.draw_rays)[1]
+    widgets.tooltip(f"Draw the first {LINES} rays of the picked texel, each in the light that it brings")
+    imgui.end_group()
+
+
 def _solver(view: View, state: State) -> None:
-    """What the solver shows of its last work and of the picked texel: a fold for each of its pictures, with what there is to say
-    below the first."""
-    state.inspected_age += imgui.get_io().delta_time
-    for nth, (caption, meaning) in enumerate(view.session.family.pictures.items()):
-        of_texel = caption == HEMISPHERE
-        if (of_texel and _texel(state) is None) or not widgets.fold(caption):
-            continue
-        inspection = _inspection(view, state)
-        if of_texel:
-            widgets.labelled("Rays in the room")
-            state.draw_rays = imgui.checkbox("##rays", state.draw_rays)[1]
-            widgets.tooltip(f"Draw the first {LINES} rays of the picked texel, each in the light that it brings")
-        image = inspection.images.get(caption)
-        if image is None or state.texture_id is None:
-            continue
-        width = widgets.steady_width() * (DISC_SHARE if of_texel else 1.0)
-        imgui.image(
-            imgui.ImTextureRef(state.texture_id(image)),
-            imgui.ImVec2(width, width * image.size[1] / image.size[0]),
-            imgui.ImVec2(0, 1),
-            imgui.ImVec2(1, 0),
-        )
-        widgets.tooltip(meaning)
-        if nth == 0:
-            widgets.facts("solver", list(inspection.facts.items()))
+    """What the solver shows of its last work: a fold for each of its pictures, with what there is to say below the first."""
+    captions = [caption for caption in view.session.family.pictures if caption != HEMISPHERE]
+    for caption in captions:
+        if widgets.fold(caption) and _picture(
+            view, state, caption, view.session.family.pictures[caption], widgets.steady_width()
+        ):
+            if caption == captions[0]:
+                widgets.facts("solver", list(_inspection(view, state).facts.items()))
+
+
+def _picture(view: View, state: State, caption: str, meaning: str, width: float) -> bool:
+    """One of the solver's, if there is one now."""
+    image = _inspection(view, state).images.get(caption)
+    if image is None or state.texture_id is None:
+        return False
+    height = width * image.size[1] / image.size[0]
+    texture = imgui.ImTextureRef(state.texture_id(image))
+    imgui.image(texture, imgui.ImVec2(width, height), imgui.ImVec2(0, 1), imgui.ImVec2(1, 0))
+    widgets.tooltip(meaning)
+    return True
 
 
 def _inspection(view: View, state: State) -> Any:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 
 from app.lightmap.options import QUADTREE
+from app.session.run import Stop
 from app.solvers import SOLVERS
 from app.ui import theme, widgets
 from app.ui.state import State
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 ICONS = theme.ICONS
 BAR_EM = 0.5  # height of the bars
+NEVER = Stop()
 
 
 def draw(view: View, state: State) -> None:
@@ -24,7 +26,8 @@ def draw(view: View, state: State) -> None:
     assert stats is not None
     _choice(view, state)
     _buttons(view, state, done=stats.converged)
-    _progress(state)
+    _progress(view, state)
+    _figures(state)
     light = session.light
     if light.adaptive:
         widgets.section("Quadtree")
@@ -33,7 +36,7 @@ def draw(view: View, state: State) -> None:
     widgets.section("Pace")
     state.pace = widgets.edit_options(state.pace)
     widgets.section("Energy [W]")
-    _energy(state)
+    _energy(state, unshot=session.family.distributes)
     widgets.section(session.family.title)
     options = widgets.edit_options(session.options, starts=stats.resolved)
     light = widgets.edit_options(light, skip=("adaptive", *QUADTREE))
@@ -99,10 +102,11 @@ def toggle(view: View) -> None:
     view.session.run.running = not view.session.run.running
 
 
-def _progress(state: State) -> None:
-    stats = state.stats
+def _progress(view: View, state: State) -> None:
+    stats, run = state.stats, view.session.run
     assert stats is not None
-    share = min(max(0.0, 1.0 - stats.remaining), 1.0)  # 0 where it is no number
+    done = 1.0 - stats.remaining if run.family.distributes else run.share_done(NEVER)
+    share = min(max(0.0, done), 1.0)  # 0 where it is no number
     imgui.progress_bar(share, imgui.ImVec2(-1, imgui.get_font_size() * BAR_EM), "")
     left = f"{widgets.percent(stats.remaining)} {stats.remains}"
     widgets.tooltip(f"What is done; {left}")
@@ -116,14 +120,27 @@ def _progress(state: State) -> None:
         widgets.tooltip("Only the difference that an edit makes is solved for, negative where light goes")
 
 
-def _energy(state: State) -> None:
+def _figures(state: State) -> None:
+    """What the solver counts and says of its solution."""
+    stats = state.stats
+    assert stats is not None
+    rows = list(stats.figures.items())
+    for name, count in stats.counts.items():
+        fast = count / stats.done * stats.per_second if state.measured and stats.done else 0.0
+        rate = f", {widgets.number(fast, 3)}/s" if fast > 0 else ""
+        edit = f"\n{stats.counts_in_edit[name]:,} since the edit" if name in stats.counts_in_edit else ""
+        rows.append((name, f"{count:,}{rate}{edit}"))
+    widgets.facts("figures", rows)
+
+
+def _energy(state: State, *, unshot: bool) -> None:
     stats = state.stats
     assert stats is not None
     rows = [
         ("Emitted", stats.emitted, theme.TEXT),
         ("Absorbed", stats.absorbed, theme.ABSORBED),
         ("Escaped", stats.escaped, theme.ESCAPED),
-        ("Residual", stats.unshot, theme.UNSHOT),
+        *([("Residual", stats.unshot, theme.UNSHOT)] if unshot else []),
     ]
     _bar([(power, colour) for _, power, colour in rows[1:]], stats.emitted)
     if imgui.begin_table("energy", 3, imgui.TableFlags_.sizing_stretch_prop):
@@ -137,7 +154,8 @@ def _energy(state: State) -> None:
             right(widgets.percent(power / stats.emitted if stats.emitted > 0 else 0.0))
         imgui.end_table()
     widgets.dim(f"energy imbalance {widgets.percent(abs(stats.imbalance))}")
-    widgets.tooltip("Emitted must equal absorbed + escaped + residual; the difference, of the power emitted")
+    parts = "absorbed + escaped + residual" if unshot else "absorbed + escaped"
+    widgets.tooltip(f"Emitted must equal {parts}; the difference, of the power emitted")
 
 
 def right(text: str, colour: theme.RGBA = theme.TEXT) -> None:
