@@ -57,7 +57,12 @@ def solve(session: Session, flags: argparse.Namespace, console: Console) -> NotF
     """Solve. What broke the light is returned: what there is can still be written."""
     stop = Stop(work=flags.work, seconds=flags.time)
 
+    said = set()
+
     def say(stats: Stats) -> None:
+        if stats.note is not None and stats.note not in said:
+            said.add(stats.note)
+            console.warn(stats.note)
         tell(f"{stats.done} {stats.unit}, {stats.remaining:.3%} {stats.remains}", session.run.share_done(stop))
 
     with console.progress(session.family.title.lower()) as tell:
@@ -66,5 +71,6 @@ def solve(session: Session, flags: argparse.Namespace, console: Console) -> NotF
         except NotFiniteError as error:
             return error
     for note in notes(session):
-        console.warn(note)
+        if note not in said:
+            console.warn(note)
     return None

@@ -13,6 +13,8 @@ from app.solvers.base import EnergyBalance, Inspection, Progress, Rect, Solver
 from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.solver import BATCH as RAYS
 from app.solvers.gathering.solver import Gathering
+from app.solvers.pairs.options import PairsOptions
+from app.solvers.pairs.solver import Pairs
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.records import BATCH
 from app.solvers.shooting.solver import PICTURES, Shooting
@@ -41,6 +43,7 @@ class Family:
     keeps_light: bool = False
     pictures: Mapping[str, str] = field(default_factory=dict)
     shows: tuple[str, ...] = ()
+    quadratic: bool = False
 
 
 SOLVERS: dict[str, Family] = {
@@ -66,6 +69,17 @@ SOLVERS: dict[str, Family] = {
         batch=RAYS,
         threshold="noise",
         shows=("smooth",),
+    ),
+    "pairs": Family(
+        title="Texel pairs",
+        help="every texel gathers from every other, or from windows of them: slow, to compare (Kahl 2022)",
+        options=PairsOptions,
+        make=Pairs,
+        unit="bounces",
+        remains="changed",
+        batch=1,
+        threshold="change",
+        quadratic=True,
     ),
 }
 DEFAULT_SOLVER = "shooting"
