@@ -42,7 +42,10 @@ class Bounce:
         units]. show: called with each band of the target that is whole."""
         self.share = 0.0
         if self.kept is not None:
+            filled = self.kept.full
             yield from self.kept.fill(self._pace)
+            if not filled:
+                self._pace.forget()  # to look a bit up costs less than to find it
         yield from self._sent.draw(received, mean, self._options.merge)
         target.clear()
         width, height = self._lightmap.size

@@ -206,6 +206,16 @@ class Pairs:
     # -- what there is to see ------------------------------------------------------------------------------------------
 
     @property
+    def foreseen(self) -> float | None:
+        """Seconds that a bounce takes; None before enough of it was measured."""
+        return None if self._bounce is None else self._bounce.foreseen
+
+    @property
+    def pairs(self) -> int:
+        """That a bounce looks at; 0 before the first."""
+        return 0 if self._bounce is None else self._bounce.pairs
+
+    @property
     def resolved(self) -> Mapping[str, Any]:
         """Edge of the windows [texels]."""
         return {} if self._bounce is None else {"window": self._bounce.senders.window}
@@ -215,7 +225,7 @@ class Pairs:
         facts = {}
         if (bounce := self._bounce) is not None:
             facts = {"Pairs in a bounce": f"{bounce.pairs:,}", "Window": f"{bounce.senders.window} texels"}
-            if (seconds := bounce.foreseen) is not None:
+            if (seconds := self.foreseen) is not None:
                 facts["Seconds in a bounce"] = f"{seconds:.1f}"
             if self._rest is not None:
                 facts["This bounce"] = f"{bounce.share:.0%}"
