@@ -54,23 +54,23 @@ def measure_row(gpu: Gpu, seconds: float, size: int, options: PairsOptions) -> R
     """Seconds per bounce, and errors after BOUNCES of them. Raises UserError with what they would take where that is more than
     SOLVE times the seconds."""
     right = reference()
-    with opened(gpu, SCENE, AtlasOptions(texels=size**2), LightmapOptions(), options, "pairs") as (lightmap, solver):
-        assert isinstance(solver, Pairs)
-        while solver.issued == 0 and solver.foreseen is None:
-            run_to_end(solver.work(1))
-        if (foreseen := BOUNCES * (solver.foreseen or 0.0)) > SOLVE * seconds:
+    with opened(gpu, SCENE, AtlasOptions(texels=size**2), LightmapOptions(), options, "pairs") as (lightmap, made):
+        assert isinstance(made, Pairs)
+        while made.issued == 0 and made.foreseen is None:
+            run_to_end(made.work(1))
+        if (foreseen := BOUNCES * (made.foreseen or 0.0)) > SOLVE * seconds:
             raise UserError(f"{BOUNCES} bounces would take about {foreseen:,.0f} s, more than {SOLVE * seconds:,.0f}")
-        solver.reset()
-        solver.set_options(START)
-        for _ in bounces(solver, START_BOUNCES):
+        made.reset()
+        made.set_options(START)
+        for _ in bounces(made, START_BOUNCES):
             pass
-        solver.set_options(options)
-        times = list(bounces(solver, BOUNCES))
+        made.set_options(options)
+        times = list(bounces(made, BOUNCES))
         bounce = float(np.mean(times[1:]))
-        facts = solver.inspect().facts
+        facts = made.inspect().facts
         E = irradiance_of(lightmap, right.points)
-        row: Row = {"size": size, "texels": lightmap.texel_count, "pairs": solver.pairs}
-        window = dict(solver.resolved).get("window") if options.windowed else 1
+        row: Row = {"size": size, "texels": lightmap.texel_count, "pairs": made.pairs}
+        window = dict(made.resolved).get("window") if options.windowed else 1
     cells = cell_of(right)
     row |= {
         "mode": mode_name(options),
@@ -154,8 +154,8 @@ TABLE = Table(
         f"Seconds of a bounce, and errors of {BOUNCES} bounces that begin with the light along {START.directions} directions, at "
         "random points against the path-traced reference, or the dense one where Mitsuba is not installed. Modes are as in "
         "RTRad, without its constants: see app/solvers/pairs/solver.py.",
-        f"Cells: RMS of means over cells, {CELLS} along the room: noise averages out, artefacts and lost light stay. Once: seconds "
-        "to find what is kept of pairs. Left out: what would take longer than a solve may.",
+        f"Cells: RMS of means over cells, {CELLS} along the room: noise averages out, artefacts and lost light stay. Once: "
+        "seconds to find what is kept of pairs. Left out: what would take longer than a solve may.",
     ),
     (
         Column("size", "lightmap²"),

@@ -46,4 +46,4 @@ class Pace:
 
     def foreseen(self, pairs: int) -> float | None:
         """Seconds that so many pairs will take; None as long as too few were measured."""
-        return pairs * self._spent / self._pairs if self._spent >= KNOWN else None
+        return pairs * self._spent / self._pairs if self._pairs and self._spent >= KNOWN else None
