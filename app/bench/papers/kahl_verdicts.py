@@ -42,16 +42,17 @@ def balance(rows: list[Row]) -> str | None:
         return None
     enough, most = max(widest)[0], max(finest)
     if enough < BALANCED <= most:
-        right, why = False, f"no more than {enough:.0f}² windows are needed"
+        right, why = "does not hold here", f"no more than {enough:.0f}² windows are needed"
     elif enough < most:
-        right, why = False, f"{enough:.0f}² windows do as well as {most:.0f}²"
+        right, why = "does not hold here", f"{enough:.0f}² windows do as well as {most:.0f}²"
+    elif most < BALANCED:
+        right, why = "is not refuted here", f"no row has {BALANCED}² windows; of up to {most:.0f}², more are better"
     else:
-        right, why = True, f"up to the {most:.0f}² windows that were measured, more of them are better"
+        right, why = "holds here", f"up to {most:.0f}² windows, more of them are better"
     listed = "; ".join(text for _, text in widest)
-    return holds(
-        f"A window of 1/{BALANCED} of the lightmap is balanced",
-        right,
-        f"{why}; widest windows within {ALIKE - 1:.0%} of the RMS of the narrowest: {listed}",
+    claim = f"A window of 1/{BALANCED} of the lightmap is balanced"
+    return (
+        f"{claim}: {right}, because {why}; widest windows within {ALIKE - 1:.0%} of the RMS of the narrowest: {listed}"
     )
 
 

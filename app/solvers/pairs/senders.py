@@ -1,7 +1,7 @@
 """Senders are what texels gather from: texels, or what stands for a window of them [Kahl22].
 
-The covered texels of a lightmap are numbered tile by tile along the Morton curve, so that a window of any size is a range of
-numbers. What stands for a window has its area: Σ A of the texels in it, where RTRad has the square of its edge.
+The covered texels of a lightmap are numbered tile by tile, in each chart by chart, and there along the Morton curve, so that a
+window of any size is a range of numbers. No window holds texels of two charts: they may lie anywhere in the scene. What stands for a window has its area: Σ A of the texels in it, where RTRad has the square of its edge.
 
     all, quadtree, directional   each texel by itself
     monte-carlo                  the same, and the ranges that one is chosen from
@@ -30,7 +30,7 @@ I64 = NDArray[np.int64]
 class SenderTable:
     """Texels by number, and the senders made of them, as plain arrays.
 
-    texels (n, 4) f32: column and row in the tile pool, slot, place along the Morton curve in its tile. place (s, 4) f32: position
+    texels (n, 4) f32: column and row in the tile pool, part (a chart in a tile), place along the Morton curve in its tile. place (s, 4) f32: position
     and area, facing (s, 4) f32: normal and facet (from 1), of each sender, solver space. ranges (s, 2) f32: its first texel, and
     how many. windows (w, 2) f32: the same of each window; not of senders where one is chosen by chance. reciprocal: whether the
     first texels are the senders.
@@ -62,17 +62,18 @@ def window_of(options: PairsOptions, texels: int, tile: int) -> int:
 def sender_table(pool: TilePool, mode: str, window: int) -> SenderTable:
     """Of all texels that cover a surface. mode: one of SENDERS; window: its edge [texels], a power of two."""
     slot, row, column = np.nonzero((pool.surfaces.face >= 0) & (pool.surfaces.area > 0))
-    curve = morton(column, row)
-    order = np.lexsort((curve, slot))
-    slot, row, column, curve = slot[order], row[order], column[order], curve[order]
+    curve, chart = morton(column, row), pool.charts.face_chart[pool.surfaces.face[slot, row, column]]
+    order = np.lexsort((curve, chart, slot))
+    slot, row, column, curve, chart = (a[order] for a in (slot, row, column, curve, chart))
+    part = np.cumsum((np.diff(slot, prepend=-1) != 0) | (np.diff(chart, prepend=-1) != 0))  # of a chart in a tile
     arrays = pool.tile_arrays(np.arange(pool.tiles))
     place: F64 = arrays["t_position_area"][slot, row, column].astype(np.float64)
     facet = (arrays["t_normal_ids"][slot, row, column, 1] >> np.uint32(pool.material_bits)).astype(np.float64)
     facing = np.column_stack([pool.surfaces.normal[slot, row, column].astype(np.float64), facet])
-    texels = np.column_stack([pool.corners(slot) + np.stack([column, row], 1), slot, curve])
+    texels = np.column_stack([pool.corners(slot) + np.stack([column, row], 1), part, curve])
     ranges = np.column_stack([np.arange(len(slot)), np.ones(len(slot), np.int64)])
     levels = window.bit_length() - 1
-    first = np.flatnonzero(np.diff(slot << 10 | curve >> 2 * levels, prepend=-1))
+    first = np.flatnonzero(np.diff(part << 10 | curve >> 2 * levels, prepend=-1))
     windows = np.column_stack([first, np.diff(first, append=len(slot))])
     if mode == "mipmapped":
         place, facing = means(place, facing, first)

@@ -230,7 +230,7 @@ class Pairs:
             if self._rest is not None:
                 facts["This bounce"] = f"{bounce.share:.0%}"
             if bounce.kept is not None:
-                facts["Kept pairs"] = f"{bounce.kept.memory / 2**20:.0f} MiB"
+                facts["Kept pairs"] = f"{bounce.kept.memory / 2**20:.1f} MiB"
         if texel is None or not self.issued:
             return Inspection(facts=facts)
         sums = np.frombuffer(self._targets[0].read((*texel, 1, 1), 4, dtype="f4", alignment=1), np.float32)

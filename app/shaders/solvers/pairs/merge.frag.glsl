@@ -6,7 +6,7 @@
 #include "common/atlas.glsl"
 #include "solvers/pairs/rows.glsl"
 
-uniform sampler2D t_texels;  // column and row of each texel, slot, place along the Morton curve in its tile
+uniform sampler2D t_texels;  // column and row of each texel, part (a chart in a tile), place along the Morton curve in its tile
 uniform sampler2D t_place;
 uniform sampler2D t_facing;
 uniform sampler2D t_sent;
@@ -19,7 +19,7 @@ layout(location = 0) out vec4 out_sent;
 layout(location = 1) out vec4 out_place;
 layout(location = 2) out vec4 out_facing;
 
-// Slot, and number of the node in its tile.
+// Part, and number of the node in its tile.
 ivec2 node_of(int k, int level) {
     vec2 at = texelFetch(t_texels, row_px(k), 0).zw;
     return ivec2(int(at.x), int(at.y) >> 2 * level);
