@@ -56,7 +56,7 @@ def measure_row(gpu: Gpu, seconds: float, size: int, options: PairsOptions) -> R
     right = reference()
     with opened(gpu, SCENE, AtlasOptions(texels=size**2), LightmapOptions(), options, "pairs") as (lightmap, made):
         assert isinstance(made, Pairs)
-        while made.issued == 0 and made.foreseen is None:
+        while made.issued == 0 and (made.foreseen is None or options.keep_pairs):  # to look up is cheaper than to find
             run_to_end(made.work(1))
         if (foreseen := BOUNCES * (made.foreseen or 0.0)) > SOLVE * seconds:
             raise UserError(f"{BOUNCES} bounces would take about {foreseen:,.0f} s, more than {SOLVE * seconds:,.0f}")

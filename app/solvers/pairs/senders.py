@@ -1,7 +1,8 @@
 """Senders are what texels gather from: texels, or what stands for a window of them [Kahl22].
 
 The covered texels of a lightmap are numbered tile by tile, in each chart by chart, and there along the Morton curve, so that a
-window of any size is a range of numbers. No window holds texels of two charts: they may lie anywhere in the scene. What stands for a window has its area: Σ A of the texels in it, where RTRad has the square of its edge.
+window of any size is a range of numbers. No window holds texels of two charts: they may lie anywhere in the scene. What stands
+for a window has its area: Σ A of the texels in it, where RTRad has the square of its edge.
 
     all, quadtree, directional   each texel by itself
     monte-carlo                  the same, and the ranges that one is chosen from
@@ -30,10 +31,10 @@ I64 = NDArray[np.int64]
 class SenderTable:
     """Texels by number, and the senders made of them, as plain arrays.
 
-    texels (n, 4) f32: column and row in the tile pool, part (a chart in a tile), place along the Morton curve in its tile. place (s, 4) f32: position
-    and area, facing (s, 4) f32: normal and facet (from 1), of each sender, solver space. ranges (s, 2) f32: its first texel, and
-    how many. windows (w, 2) f32: the same of each window; not of senders where one is chosen by chance. reciprocal: whether the
-    first texels are the senders.
+    texels (n, 4) f32: column and row in the tile pool, part (a chart in a tile), place along the Morton curve in its tile. place
+    (s, 4) f32: position and area, facing (s, 4) f32: normal and facet (from 1), of each sender, solver space. ranges (s, 2) f32:
+    its first texel, and how many. windows (w, 2) f32: the same of each window; not of senders where one is chosen by chance.
+    reciprocal: whether the first texels are the senders.
     """
 
     texels: F32
@@ -62,9 +63,10 @@ def window_of(options: PairsOptions, texels: int, tile: int) -> int:
 def sender_table(pool: TilePool, mode: str, window: int) -> SenderTable:
     """Of all texels that cover a surface. mode: one of SENDERS; window: its edge [texels], a power of two."""
     slot, row, column = np.nonzero((pool.surfaces.face >= 0) & (pool.surfaces.area > 0))
-    curve, chart = morton(column, row), pool.charts.face_chart[pool.surfaces.face[slot, row, column]]
-    order = np.lexsort((curve, chart, slot))
-    slot, row, column, curve, chart = (a[order] for a in (slot, row, column, curve, chart))
+    chart = pool.charts.face_chart[pool.surfaces.face[slot, row, column]]
+    order = np.lexsort((morton(column, row), chart, slot))
+    slot, row, column, chart = slot[order], row[order], column[order], chart[order]
+    curve = morton(column, row)
     part = np.cumsum((np.diff(slot, prepend=-1) != 0) | (np.diff(chart, prepend=-1) != 0))  # of a chart in a tile
     arrays = pool.tile_arrays(np.arange(pool.tiles))
     place: F64 = arrays["t_position_area"][slot, row, column].astype(np.float64)
