@@ -61,7 +61,12 @@ def solve(session: Session, flags: argparse.Namespace, console: Console) -> NotF
     error, rms = (None if asked is None else asked / 100 for asked in (flags.error, flags.error_rms))
     stop = Stop(flags.work, flags.time, error, rms)
 
+    said = set()
+
     def say(stats: Stats) -> None:
+        if stats.note is not None and stats.note not in said:
+            said.add(stats.note)
+            console.warn(stats.note)
         tell(f"{stats.done} {stats.unit}, {stats.remaining:.3%} {stats.remains}", session.run.share_done(stop))
 
     with console.progress(session.family.title.lower()) as tell:
@@ -70,5 +75,6 @@ def solve(session: Session, flags: argparse.Namespace, console: Console) -> NotF
         except NotFiniteError as error:
             return error
     for note in notes(session):
-        console.warn(note)
+        if note not in said:
+            console.warn(note)
     return None

@@ -272,10 +272,11 @@ class Session:
         return self._options[self.solver_name]
 
     def set_options(self, options: Options) -> None:
-        """Other options of the solver, from its next piece of work on."""
-        self._options[self.solver_name] = options
+        """Other options of the solver, from its next piece of work on. Raises UserError, and keeps those that it has."""
         if self._opened:
             self.solver.set_options(options)
+        self._options[self.solver_name] = options
+        if self._opened:
             self.run.options_changed()
 
     def set_solver(self, name: str) -> None:

@@ -81,7 +81,7 @@ def methods_of(solver: str) -> tuple[Method, ...]:
 
 
 METHODS = (
-    *(method for solver in SOLVERS for method in methods_of(solver)),
+    *(method for solver, family in SOLVERS.items() if not family.quadratic for method in methods_of(solver)),
     *(Method(storage=storage) for storage in STORAGE if storage != FULL),
 )
 # where how a shooter sees, and how light is stored, plays no part
