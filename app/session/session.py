@@ -350,7 +350,7 @@ class Session:
         enough."""
         self.estimate.seconds = seconds
         while self._can_estimate and not self.estimate.knows(self._state):
-            self._estimate_part()
+            self._estimate_part(wait=True)
             tell(self.estimate.share)
 
     @property
@@ -358,10 +358,10 @@ class Session:
         """Whether there is light to judge."""
         return self._opened and self.solver.issued > 0 and self.scene.emits
 
-    def _estimate_part(self) -> None:
+    def _estimate_part(self, *, wait: bool = False) -> None:
         """Some of the points, or none where there is nothing to do."""
         if self._can_estimate and not self.estimate.knows(self._state):
-            self.estimate.part(self.lightmap, self.run.energy.returned, self._state)
+            self.estimate.part(self.lightmap, self._state, wait=wait)
 
     @property
     def _state(self) -> object:

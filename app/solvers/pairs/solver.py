@@ -220,6 +220,10 @@ class Pairs:
         """Edge of the windows [texels]."""
         return {} if self._bounce is None else {"window": self._bounce.senders.window}
 
+    @property
+    def layers(self) -> Mapping[str, Texture]:
+        return {}
+
     def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
         """What a bounce costs and how far it is; of a texel, how much of its view is known: Σ F V, 1 in a closed room."""
         facts = {}
