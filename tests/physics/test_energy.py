@@ -291,8 +291,9 @@ def audit_area(solution: Solution) -> float:
 @pytest.mark.parametrize("level", [2, 4])
 def test_small_charts_in_one_patch_are_not_taken_for_one_surface(gpu: Gpu, adaptive: bool, level: int) -> None:
     """Two closed rooms, side by side and alike, of 4×4 texels a wall: at level 4 a patch holds walls of both. The light of one
-    must stay in it, and reach those of its walls that share a tile with the lamp. Within 1 %: texels of a quarter of a metre. At
-    walls of so few texels shots are off by 3 % here and less than 1 % there; only the former are scaled, which leaves 0.2 %."""
+    must stay in it, and reach those of its walls that share a tile with the lamp. Within 1 %: texels of a quarter of a metre,
+    whose sums are off by 3 % for single shots. Scaled, none is lost but where earlier shots are made again into new leaves.
+    """
     dark = np.add(room(), (2.0, 0.37, 0.21))
     scene = quads_scene([*room(), *dark], [grey(0.3), grey(0.3, 1.0)], [0, 1] + [0] * 10)
     H = []
@@ -301,7 +302,7 @@ def test_small_charts_in_one_patch_are_not_taken_for_one_surface(gpu: Gpu, adapt
         lit = begin(gpu, only, density=4, level=level, adaptive=adaptive, residual=1e-4, audits=False)
         lit.settle()
         H.append(lit.means(lit.H)[:, 0])
-        assert abs(shares(lit)["imbalance"]) < 2.5e-3
+        assert abs(shares(lit)["imbalance"]) < (2e-3 if adaptive else 1e-4)
         lit.release()
     np.testing.assert_allclose(H[0][:6], H[1], rtol=0.01)
     assert H[0][6:].max() < 1e-5  # where sight grazes a floor's plane some samples pass

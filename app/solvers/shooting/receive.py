@@ -68,8 +68,8 @@ class Receive:
     def light(
         self, target: Framebuffer, meshes: Mapping[bool, Mesh], first: int, shots: int, band: int = 0, bands: int = 1
     ) -> None:
-        """The light of earlier shots on these receivers, unscaled, added to what a target of texels holds. Their patches need not be
-        there any more."""
+        """The light of earlier shots, unscaled, added to what a target of texels holds, of these receivers. Patches need not be
+        where they shot from any more."""
         self._draw(self.at_once, target, meshes, first, shots, (band, bands), in_place=False)
 
     def _draw(

@@ -6,7 +6,7 @@
 // Written into the last row of the shooters.
 #include "solvers/shooting/shooter_block.glsl"
 #define SCALED 1     // whether there are other gains than 1
-#define SOUND 0.01   // a shot that is off by no more is left as it is
+#define SOUND 0.01   // the map is off by no more, nor by more than it says is gone
 #define MOST 2.0     // gain at most
 
 uniform sampler2D t_first;  // Σ A F V of each row of tiles
@@ -33,7 +33,8 @@ void main() {
             s.received += (shot < 4 ? texelFetch(t_first, ivec2(0, y), 0) : texelFetch(t_last, ivec2(0, y), 0))[shot & 3];
         s.received /= s.area;
         float due = max(1.0 - s.open - s.black, 0.0);
-        if (SCALED == 1 && abs(s.received - due) > SOUND) s.gain = min(due / max(s.received, 1e-30), MOST);
+        bool sound = abs(s.received - due) <= min(SOUND, s.open + s.black);
+        if (SCALED == 1 && !sound) s.gain = min(due / max(s.received, 1e-30), MOST);
     }
     out_row = shooter_row(s, SHOOTER_ROWS - 1);
 }
