@@ -85,7 +85,8 @@ def measure_row(gpu: Gpu, seconds: float, size: int, options: PairsOptions) -> R
         "bias": bias(E, right.E),
         "even": relative_rms(means(E, cells), means(right.E, cells)),
     }
-    return row | {"series": f"{size}² {row['mode']}, {row['occlusion']}"}
+    other = "kept pairs" if options.keep_pairs else options.occlusion
+    return row | {"series": f"{size}² {options.senders if other == 'rays' else other}"}
 
 
 def bounces(solver: Pairs, count: int) -> Iterator[float]:
