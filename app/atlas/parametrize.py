@@ -87,7 +87,6 @@ def parametrize(
         raise UserError(
             f"--density {density:g} needs {need:,.0f} texels: the limit is {MAX_TEXELS:,} (density {best:.3g})"
         )
-    warnings = (*warnings, *_too_few(layout, texels))
     charts = _place(layout, lit, facet, density, tile)
     report("pack", 1.0)
     face_uv, face_chart, face_facet, rects, size = charts
@@ -205,17 +204,6 @@ def _borders(chart: I32, uv: F64, count: int) -> NDArray[np.float64]:
     index, _, uses = distinct_rows(owner, *key.T)
     outer = index[uses == 1]
     return totals(owner[outer], np.abs(q - p)[outer].sum(axis=1) / 2, count)
-
-
-def _too_few(layout: Layout, texels: int | None) -> list[str]:
-    """A warning where charts alone take all the texels that were asked for: then a whole floor is one texel, like the side of a
-    small box. With two for each chart, large ones have more."""
-    charts = int(layout.sides.sum())
-    if texels is None or texels > charts:
-        return []
-    wanted = _density_for(layout, 2 * charts)
-    need = f"--density {wanted:.3g} makes {_texel_count(layout, wanted):,.0f}"
-    return [f"--texels {texels}: each of {charts:,} charts takes one, large ones get no more; {need}"]
 
 
 def _sizes(layout: Layout, density: float) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ def test_parts_add_up_to_the_shot(gpu: Gpu, bands: int) -> None:
         whole.step(1)
         parts += 1
         parts += sum(1 for _ in cut.solver.work(1, bands))
-    assert parts == SHOTS * (3 * bands + 4)  # patches, audit, zero, see, receivers, weighing, delivery, the rest
+    assert parts == SHOTS * (2 * bands + 4)  # patches, audit, zero, see, receivers, the rest
     assert cut.solver.issued == whole.solver.issued == SHOTS
     # bands share no texel: each gets the same numbers, added in the same order
     np.testing.assert_array_equal(cut.H, whole.H)

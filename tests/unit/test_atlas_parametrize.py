@@ -42,17 +42,6 @@ def test_the_number_of_texels_is_met(name: str, texels: int | None) -> None:
     assert abs(_covered(SCENES[name], charts) / aim - 1) < 0.15
 
 
-def test_a_warning_names_the_density_where_charts_take_all_texels() -> None:
-    boxes = [shapes.box((0.1, 0.1, 0.1)).moved(k % 10 - 4.5, 0.3, k // 10 - 4.5) for k in range(100)]
-    scene = scene_of([*boxes, shapes.box((12.0, 0.1, 12.0)).moved(0, -1, 0)])
-    starved = parametrize(scene, texels=500)
-    assert len(starved.warnings) == 1
-    density = float(starved.warnings[0].split("--density ")[1].split()[0])
-    fed = parametrize(scene, density=density)
-    assert not fed.warnings and 0.8 < _covered(scene, fed) / (2 * 501) < 1.2
-    assert not parametrize(scene, texels=1002).warnings
-
-
 def test_few_texels_give_the_minimum() -> None:
     charts = parametrize(SCENES["room"], texels=1)
     assert _covered(SCENES["room"], charts) == charts.chart_count == 6

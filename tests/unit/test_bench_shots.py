@@ -40,12 +40,13 @@ def test_what_bounds_the_receiver_pass(receive_ms: float, stream_ms: float, copy
     assert row["shot_share"] == pytest.approx((3 + copy_ms) / (5.0 + receive_ms)), "of a second at a GB each"
 
 
-@pytest.mark.parametrize("storage", ["rgba32f", "rgba16f", "fixed8"])
-def test_bytes_of_a_texel_are_what_it_sees_however_light_is_stored(gpu: Gpu, storage: str) -> None:
+@pytest.mark.parametrize(("storage", "light"), [("rgba32f", 2 * 2 * 16), ("rgba16f", 2 * 2 * 8), ("fixed8", 2 * 2 * 4)])
+def test_bytes_of_a_texel_follow_from_its_formats(gpu: Gpu, storage: str, light: int) -> None:
     held = LightmapOptions(storage=storage)
     with opened(gpu, "textured-room", AtlasOptions(texels=600), held, ShootingOptions()) as (lightmap, _):
-        assert texel_bytes(lightmap, planar=True) == 2 * 2 * 16
-        assert texel_bytes(lightmap, planar=False) == 2 * 2 * 16 + 16 + 8
+        albedo = 4 * np.dtype(lightmap.pool.arrays["t_albedo"].dtype).itemsize
+        assert texel_bytes(lightmap, planar=True) == light + albedo
+        assert texel_bytes(lightmap, planar=False) == light + albedo + 16 + 8
 
 
 @pytest.mark.parametrize("visibility", ["item-id", "combined"])

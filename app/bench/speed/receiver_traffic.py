@@ -1,8 +1,8 @@
 """Memory traffic of a shot: what its passes must move at least, and the receiver pass without its arithmetic.
 
-A texel that gets light has what it sees of eight shots read and written once in a draw, and is read itself where it does not
-follow from its tile's corner and edges. Maps of visibility are written once and read once. Choosing reads area, material, H and r
-of every texel; delivering reads what it sees, and reads and writes H and r.
+A texel that gets light has H and r read and written once in a draw, and is read itself where it does not follow from its tile's
+corner and edges. Maps of visibility are written once and read once. Choosing reads area,
+material, H and r of every texel.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from app.solvers.shooting.inspectable import InspectableShooting
 from app.solvers.shooting.options import VISIBILITIES
 from app.solvers.shooting.records import BATCH, IN_BLOCKS, RECORDS
 
-SEEN = 4.0 * BATCH  # bytes of a texel that say what it sees of a batch
 GENERAL = ("t_position_area", "t_normal_ids")  # of tiles that are not planar
 CHOSEN = ("t_position_area", "t_normal_ids", "t_irradiance", "t_residual")
 
@@ -30,7 +29,7 @@ class ReceiverTraffic:
 
     def _pass(self, planar: bool, near: bool) -> Pass:
         defines: dict[str, object] = {"PLANAR": planar, "NEAR_FIELD": near, "VISIBILITY": self._visibility}
-        defines |= IN_BLOCKS | self._lightmap.defines("MATERIAL_BITS")
+        defines |= IN_BLOCKS | self._lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE")
         return Pass(self._gpu, "bench/stream", defines=defines, slots=RECORDS, vertex="solvers/shooting/receive")
 
     def run(self) -> None:
@@ -46,8 +45,9 @@ class ReceiverTraffic:
             query = self._gpu.ctx.query(samples=True)
             with query:
                 stream.draw(
-                    batch.delivery.target,
-                    textures=lightmap.textures(*(() if planar else GENERAL)) | batch.see.textures,
+                    lightmap.light_target,
+                    textures=lightmap.textures("t_materials", "t_albedo", *(() if planar else GENERAL))
+                    | batch.see.textures,
                     uniforms={"u_size": lightmap.size, "u_first": first, "u_shots": shots},
                     blocks=batch.shooters.blocks,
                     mesh=batch.receivers.meshes[planar],
@@ -61,18 +61,16 @@ class ReceiverTraffic:
         lightmap, see = self._lightmap, self._batch.see
         item = 4 * see.map_size[0] * see.map_size[1]
         sight = item * len(see.textures)
-        texels = lightmap.size[0] * lightmap.size[1]
         return {
             "choose": sum(lightmap.memory[name] for name in CHOSEN) / BATCH,
             "see": 2.0 * item,  # items and depth, whatever is looked up
             "receive": sum(self._moved) / len(self._moved) / BATCH + sight,
             "add escaped": float(item),
-            "weigh": texels * (SEEN + lightmap.memory["t_position_area"] / texels) / BATCH,
-            "deliver": texels * SEEN / BATCH + 2.0 * sum(lightmap.memory[name] for name in LIGHT) / BATCH,
         }
 
 
 def texel_bytes(lightmap: Lightmap, *, planar: bool) -> float:
-    """That the receiver pass moves for one texel: what it sees read and written, and what it reads of the texel itself."""
+    """That the receiver pass moves for one texel: H and r read and written, and what it reads of the texel itself."""
     width, height = lightmap.size
-    return 2.0 * SEEN + sum(lightmap.memory[name] for name in (() if planar else GENERAL)) / (width * height)
+    surface = lightmap.textures("t_albedo", *(() if planar else GENERAL))
+    return sum(lightmap.memory[name] for name in (*LIGHT, *LIGHT, *surface)) / (width * height)

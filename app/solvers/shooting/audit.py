@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.gpu import Gpu, Pass
 from app.lightmap.lightmap import Lightmap
-from app.solvers.shooting.deliver import Delivery
 from app.solvers.shooting.ledger import Ledger
 from app.solvers.shooting.receive import Receive
-from app.solvers.shooting.records import Shot, powers_of, shot_of, sizes_of
+from app.solvers.shooting.records import Shot, powers_of, sizes_of
 from app.solvers.shooting.see import See
 from app.solvers.shooting.shooters import ShooterBatch
 
@@ -40,13 +40,28 @@ class Audit:
         return self.received + self.open + self.black
 
 
+class AuditTargets:
+    """What a shot that is only tried writes: light on texels, and the power on each tile. Gone when the audit is."""
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
+        self._gpu = gpu
+        self.light = gpu.texture(lightmap.size, 4, "f4")
+        self.powers = gpu.texture((lightmap.columns, lightmap.rows), 1, "f4")
+        self.light_target, self.power_target = gpu.target(self.light), gpu.target(self.powers)
+
+    def __enter__(self) -> AuditTargets:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._gpu.release_all(self.light_target, self.power_target, self.light, self.powers)
+
+
 class Auditor:
     """Tries shots. wanted: whether batches are still strong enough to be audited; never, unless ``enabled``."""
 
-    def __init__(
-        self, lightmap: Lightmap, shooters: ShooterBatch, delivery: Delivery, ledger: Ledger, *, enabled: bool
-    ) -> None:
-        self._lightmap, self._shooters, self._delivery, self._ledger = lightmap, shooters, delivery, ledger
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch, ledger: Ledger, *, enabled: bool) -> None:
+        self._gpu, self._lightmap, self._shooters, self._ledger = gpu, lightmap, shooters, ledger
+        self._sum = Pass(gpu, "solvers/shooting/audit", defines=lightmap.defines("TILE"))
         self._enabled, self._sound = enabled, set[tuple[int, int, int]]()  # patches that passed: column, row, edge
         self.begin()
 
@@ -71,21 +86,30 @@ class Auditor:
         if not tried:
             return []
         failed = []
-        for shot in tried:
-            if abs(self.once(see, receive, shot).total - 1) > SOUND:
-                failed.append(shooters[shot])
-            else:
-                self._sound.add(patches[shot])
-            yield
+        with AuditTargets(self._gpu, self._lightmap) as targets:
+            for shot in tried:
+                if abs(sum(self.shares(targets, see, receive, shot, power[shot])) - 1) > SOUND:
+                    failed.append(shooters[shot])
+                else:
+                    self._sound.add(patches[shot])
+                yield
         return failed
 
-    def once(self, see: See, receive: Receive, shot: int) -> Audit:
-        """What would become of a shot of the batch. Changes no light. Waits for the GPU."""
-        self._delivery.clear()
+    def shares(
+        self, targets: AuditTargets, see: See, receive: Receive, shot: int, power: float
+    ) -> tuple[float, float, float]:
+        """What would become of a shot of the batch and its power: its shares received, open and black, see Audit. Changes no
+        light. Waits for the GPU."""
+        targets.light_target.clear()
         see.draw(shot, 1)
-        receive.draw(shot, 1)
+        receive.draw_into(targets.light_target, shot, 1)
         see.add_escaped(shot, 1)
-        self._delivery.weigh(see.maps, shot, 1)
-        shooter = self._shooters.read(shot + 1)[shot]
-        received, left, black = (float(shooter[name]) for name in ("received", "open", "black"))
-        return Audit(received, left, black, shot_of(self._lightmap, shooter))
+        area = self._lightmap.textures("t_position_area")
+        self._sum.draw(targets.power_target, textures=area | {"t_received": targets.light})
+        received = np.frombuffer(targets.powers.read(), np.float32).astype(np.float64).sum()
+        return float(received / power), *see.maps.escaped_shares(shot)
+
+    def once(self, see: See, receive: Receive, shot: int, power: float) -> tuple[float, float, float]:
+        """``shares`` with targets of its own."""
+        with AuditTargets(self._gpu, self._lightmap) as targets:
+            return self.shares(targets, see, receive, shot, power)

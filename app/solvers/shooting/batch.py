@@ -3,9 +3,7 @@
     i = patch with the largest power to shoot, R_i A_i: its residual and the overshoot      choose.py, ambient.py
     r_i -= R_i                                                                              ledger.py
     see the scene from i: item and depth in every direction                                 see.py
-    for every texel j:  F_ji V_ji                                                           receive.py
-    scale what would make or lose light:  s_i Σ_j A_j F_ji V_ji = what stays in the scene   deliver.py
-    for every texel j:  ΔH_j = s_i R_i F_ji V_ji;  H_j += ΔH_j;  r_j += ρ_j ΔH_j            deliver.py
+    for every texel j:  ΔH_j = R_i F_ji V_ji;  H_j += ΔH_j;  r_j += ρ_j ΔH_j                receive.py
     add what left the scene to the ledger                                                   ledger.py
 
 The shooters of a batch are chosen at once, and never leave the GPU. Beside that: large patches shoot first (coarse_to_fine.py),
@@ -30,7 +28,6 @@ from app.solvers.shooting.ambient import Ambient
 from app.solvers.shooting.audit import Audit, Auditor
 from app.solvers.shooting.choose import ROOT_LEVEL, Bins, Choice
 from app.solvers.shooting.coarse_to_fine import Phases
-from app.solvers.shooting.deliver import Delivery
 from app.solvers.shooting.emitter_groups import EmitterGroups
 from app.solvers.shooting.ledger import Ledger
 from app.solvers.shooting.material_edits import MaterialEdits
@@ -38,7 +35,7 @@ from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.patch_marks import PatchMarks
 from app.solvers.shooting.receive import Receive
 from app.solvers.shooting.receivers import Receivers
-from app.solvers.shooting.records import BATCH, Shot, shot_of
+from app.solvers.shooting.records import BATCH, Shot, powers_of, shot_of
 from app.solvers.shooting.replay import Replay
 from app.solvers.shooting.see import See, fitting_resolution
 from app.solvers.shooting.shooters import ShooterBatch
@@ -60,8 +57,7 @@ class Batch:
         self.ambient = Ambient(gpu, lightmap, self.shooters, self.ledger)
         self.marks = PatchMarks(gpu, lightmap)
         self.groups = EmitterGroups(lightmap, self.ledger, self.marks)
-        self.delivery = Delivery(gpu, lightmap, self.shooters)
-        self.auditor = Auditor(lightmap, self.shooters, self.delivery, self.ledger, enabled=audits)
+        self.auditor = Auditor(gpu, lightmap, self.shooters, self.ledger, enabled=audits)
         self.replay = None if lightmap.refinement is None else Replay(gpu, lightmap, self.shooters)
         self._make_passes()
 
@@ -70,8 +66,7 @@ class Batch:
         self.phases = Phases(self._gpu, lightmap, self.shooters, options)
         resolution = options.resolution or fitting_resolution(lightmap, ROOT_LEVEL if lightmap.pool.adaptive else 0)
         self.see = See(self._gpu, self.occluders, self.shooters, options, resolution)
-        self.receive = Receive(self._gpu, lightmap, self.receivers, self.delivery, self.shooters, self.see, options)
-        self.delivery.scaled = options.form_factor == "polygon"  # what discs lack is what they are to be compared for
+        self.receive = Receive(self._gpu, lightmap, self.receivers, self.shooters, self.see, options)
 
     # -- the batch -----------------------------------------------------------------------------------------------------
 
@@ -81,7 +76,6 @@ class Batch:
             shots = self.groups.whole_groups(shots)
         yield from self.choose(choice, shots, bands)
         self.ledger.take(self.ambient.overshoot, shots)
-        self.delivery.clear()
         yield
         for first, some in self.see.groups(shots):
             self.see.draw(first, some)
@@ -90,11 +84,6 @@ class Batch:
                 self.receive.draw(first, some, band, bands)
                 yield
             self.see.add_escaped(first, some)
-        self.delivery.weigh(self.see.maps, 0, shots)
-        for band in range(bands):
-            yield
-            self.delivery.draw(band, bands)
-        self.delivery.keep(shots)
         self.enter(shots)
         return shots
 
@@ -121,7 +110,7 @@ class Batch:
 
     def enter(self, shots: int) -> None:
         """Enter in the ledger what the batch shot, and see what that leaves to come."""
-        self.ledger.enter(shots)
+        self.ledger.enter(self.see.maps, shots)
         self.ambient.update(self.bins, shots, shown=self.options.ambient)
         if self.replay is not None:
             self.replay.log.add(shots)
@@ -211,7 +200,6 @@ class Batch:
         self.ledger.resize()
         self.phases.resize()
         self.receivers.follow()
-        self.delivery.resize()
         if self.replay is not None:
             self.replay.resized(moves)
 
@@ -223,7 +211,9 @@ class Batch:
         level = self.phases.patch_edge(corner, self.marks).bit_length() - 1
         self.bins.fill(corner, level)
         self._write_shooters(self.phases.choices[0] if self.phases.now.settles else self.phases.now, 1)
-        return self.auditor.once(self.see, self.receive, 0)
+        shooter = self.shooters.read(1)[0]
+        shares = self.auditor.once(self.see, self.receive, 0, float(powers_of(shooter)))
+        return Audit(*shares, shot_of(self._lightmap, shooter))
 
     def passes(self, amount: int) -> dict[str, Callable[[], None]]:
         """Each part of a batch by itself, to be timed. They leave the light wrong."""
@@ -239,9 +229,6 @@ class Batch:
             "see": lambda: for_maps(self.see.draw),
             "receive": lambda: for_maps(self.receive.draw),
             "add escaped": lambda: for_maps(self.see.add_escaped),
-            "weigh": lambda: self.delivery.weigh(self.see.maps, 0, shots),
-            "deliver": self.delivery.draw,
-            "keep": lambda: self.delivery.keep(shots),
             "ledger": lambda: self.enter(shots),
         }
         refinement, replay = self._lightmap.refinement, self.replay
@@ -251,6 +238,6 @@ class Batch:
         return passes
 
     def release(self) -> None:
-        parts = self.phases, self.see, self.marks, self.ambient, self.ledger, self.bins, self.delivery, self.occluders
-        for part in (*parts, self.receivers, self.shooters, *(() if self.replay is None else (self.replay,))):
+        parts = self.phases, self.see, self.marks, self.ambient, self.ledger, self.bins, self.receivers, self.occluders
+        for part in (*parts, self.shooters, *(() if self.replay is None else (self.replay,))):
             part.release()

@@ -15,6 +15,7 @@ from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
 from app.solvers.base import EnergyBalance
 from app.solvers.shooting.records import BATCH, LEDGER, RECORDS
+from app.solvers.shooting.see import Maps
 from app.solvers.shooting.shooters import ShooterBatch
 
 
@@ -70,11 +71,12 @@ class Ledger:
             strip=True,
         )
 
-    def enter(self, shots: int) -> None:
+    def enter(self, maps: Maps, shots: int) -> None:
         """Add to the ledger what the batch shot, and what of it left the scene."""
         self._enter.draw(
             self.target,
-            textures={"t_shooters": self._shooters.texture},
+            textures={"t_escaped": maps.escaped, "t_shooters": self._shooters.texture},
+            uniforms={"u_blocks": maps.escaped_size[1]},
             blend="add",
             viewport=(0, 0, shots, LEDGER.rows),
         )

@@ -24,8 +24,7 @@ OPEN = glsl_constant("common/item.glsl", "OPEN")  # item of the open background
 # origin: where it sees from; centre, edge_u, edge_v: its polygon, the parallelogram centre ± edge_u/2 ± edge_v/2, with that area,
 # all in the solver space. chart: texels of others do not belong to it. patch_x, patch_y: lower corner of the patch in the tile
 # pool [texels]. exitance: mean of what is shot [stored units]. signed_size: edge of the patch [texels]; negative where its texels
-# do not all shoot the mean; 0: no shot. gain: scales what receivers get, so that it gives away what it owns; received, open,
-# black: what became of it without, shares of its power, see gain.frag.glsl.
+# do not all shoot the mean; 0: no shot.
 SHOOTER = Struct(
     "Shooter",
     "vec3 origin, float area",
@@ -34,7 +33,6 @@ SHOOTER = Struct(
     "vec3 edge_u, int patch_x",
     "vec3 edge_v, int patch_y",
     "vec3 exitance, int signed_size",
-    "float gain, float received, float open, float black",
 )
 # Of one column of shots: power that left the scene, how many shots; power that black sides took; all that was shot [stored units
 # · area].

@@ -5,8 +5,7 @@ only, a batch per piece of work, and their sum takes the place of what was inher
 
     C = Σ_i r_i F_ji V_ji - H_j,   H_j += C,   r_j += ρ_j C
 
-so that the solution does not depend on when the tree grew. Nothing is scaled here: gains (deliver.py) make up for coarse texels,
-and these are finer. New shots meanwhile reach fresh leaves as any other.
+so that the solution does not depend on when the tree grew. New shots meanwhile reach fresh leaves as any other.
 
 Strong shots cast the shadows that leaves are split for. Once they are over, H as they left it, S, is kept: from then on only they
 are made again (with S for H above, and S_j += C), and interpolated light of the weak ones, which is smooth, stays. Where the user
@@ -181,12 +180,14 @@ class Replay:
         """The shot that was chosen last once more, into all leaves."""
         pending = Pending(self._gpu, self._lightmap, np.flatnonzero(self._lightmap.pool.used), 1)
         self._subtract_inherited(pending)
-        receive.light(self._correction_target, pending.receivers, 0, 1)
+        receive.draw_into(self._correction_target, 0, 1, meshes=pending.receivers)
         self._apply_correction(pending)
         pending.release()
 
     def _receive(self, pending: Pending, receive: Receive, first: int, shots: int, band: int, bands: int) -> None:
-        receive.light(self._correction_target, pending.receivers, first, shots, band, bands)
+        receive.draw_into(
+            self._correction_target, first, shots, meshes=pending.receivers, band=band, bands=bands, in_place=False
+        )
 
     def _subtract_inherited(self, pending: Pending) -> None:
         """C = minus what these leaves hold of the shots that follow."""

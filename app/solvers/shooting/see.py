@@ -46,6 +46,12 @@ class Maps:
         self.target = gpu.target(self.items, depth=self.depth)
         self.escaped_target = gpu.target(self.escaped)
 
+    def escaped_shares(self, shot: int) -> tuple[float, float]:
+        """Shares of what a shot of the batch sends out that leave the scene, and that end on black sides. Waits for the GPU."""
+        shares = np.frombuffer(self.escaped.read(), np.float32).reshape(BATCH, -1, 2)[shot].astype(np.float64)
+        left, black = shares.sum(0).tolist()
+        return left, black
+
     def release(self) -> None:
         self._gpu.release_all(self.target, self.escaped_target, self.items, self.depth, self.escaped)
 

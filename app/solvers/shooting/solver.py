@@ -301,7 +301,7 @@ class Shooting:
 
     def try_one(self) -> None:
         """Audit the first shot of the batch that was chosen last, to be timed."""
-        self.batch.auditor.once(self.batch.see, self.batch.receive, 0)
+        self.batch.auditor.once(self.batch.see, self.batch.receive, 0, 1.0)
 
     def passes(self, amount: int) -> dict[str, Callable[[], None]]:
         """Each part of a batch by itself, to be timed. They leave the light wrong: reset afterwards."""

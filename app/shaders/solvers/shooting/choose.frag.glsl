@@ -90,8 +90,6 @@ ivec2 leading_texel(ivec2 corner_px, int size, out Texel lead) {
 Shooter no_shooter() {
     Shooter s;
     s.signed_size = 0;
-    s.gain = 1.0;
-    s.received = s.open = s.black = 0.0;
     return s;
 }
 

@@ -1,11 +1,9 @@
-// What every texel sees of some shots, F_ji V_ji [Coombe03, eq. 1; F_ji from the texel to the shooter's polygon]: for each shot of
-// a batch by itself, blended, for deliver.frag.glsl; or the light of earlier shots at once:
+// The light of some shots is blended into H and r of every texel:
 //
-//   ΔH_j = Σ_i R_i F_ji V_ji
+//   ΔH_j = Σ_i R_i F_ji V_ji,   Δr_j = ρ_j ΔH_j      [Coombe03, eq. 1; F_ji from the texel to the shooter's polygon]
 #define PLANAR 1
-#define AT_ONCE 0
-#define SHADOWS 0  // whether leaves may ask how much of its light a texel sees
 #include "common/atlas.glsl"
+#include "common/albedo.glsl"
 #include "common/item.glsl"
 #include <projection>
 #include "solvers/shooting/shooter_block.glsl"
@@ -17,22 +15,18 @@ flat in uint v_shots;  // a bit for each shot that may light this receiver
 in vec3 v_position;
 flat in vec3 v_normal;
 flat in float v_facet;
+flat in vec3 v_albedo;
 #else
 #include "solvers/shooting/belongs.glsl"
 uniform int u_own;  // whether patches are still where they shot from
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
+uniform sampler2D t_materials;
 #endif
 
-#if AT_ONCE
+// a: Σ_i P_i F_ji V_ji and Σ_i P_i F_ji, with P the sum of |r| over RGB: how much of its light a texel sees
 layout(location = 0) out vec4 out_irradiance;
-#else
-layout(location = 0) out vec4 out_first;  // F V of the first four shots of the batch
-layout(location = 1) out vec4 out_last;   // of the others
-#if SHADOWS
-layout(location = 2) out float out_unoccluded;  // Σ_i P_i F_ji, with P the sum of |R| over RGB
-#endif
-#endif
+layout(location = 1) out vec4 out_residual;
 
 // F_ji, V_ji
 vec2 received(vec3 position, vec3 normal, float facet, Shooter s, int shot) {
@@ -46,20 +40,16 @@ void main() {
     ivec2 texel_px = ivec2(gl_FragCoord.xy);
 #if PLANAR
     vec3 position = v_position, normal = v_normal;
+    vec3 albedo = v_albedo * albedo_texture(texel_px);
     float facet = v_facet;
 #else
     Texel texel = load_texel(t_position_area, t_normal_ids, texel_px);
     vec3 position = texel.position, normal = texel.normal;
+    vec3 albedo = albedo_of(t_materials, texel.material, texel_px);
     float facet = float(texel.facet), chart = chart_of(texel.facet);
 #endif
-#if AT_ONCE
-    out_irradiance = vec4(0.0);
-#else
-    out_first = out_last = vec4(0.0);
-#if SHADOWS
-    out_unoccluded = 0.0;
-#endif
-#endif
+    vec3 light = vec3(0.0);
+    vec2 share = vec2(0.0);
     uint shots = v_shots;
     do {
         int shot = findLSB(shots);
@@ -72,15 +62,9 @@ void main() {
         bool within = u_own != 0 && all(lessThan(uvec2(texel_px - patch_px(s)), uvec2(size_px(s))));
         FV = within && chart == s.chart || texel.area <= 0.0 ? vec2(0.0) : FV;
 #endif
-#if AT_ONCE
-        out_irradiance.rgb += s.exitance * FV.x * FV.y;
-#else
-        ivec4 place = ivec4(0, 1, 2, 3) - (u_first + shot);
-        out_first += FV.x * FV.y * vec4(equal(place, ivec4(0)));
-        out_last += FV.x * FV.y * vec4(equal(place, ivec4(-4)));
-#if SHADOWS
-        out_unoccluded += dot(abs(s.exitance), vec3(1.0)) * FV.x;
-#endif
-#endif
+        light += s.exitance * FV.x * FV.y;
+        share += dot(abs(s.exitance), vec3(1.0)) * FV.x * vec2(FV.y, 1.0);
     } while (shots != 0u);
+    out_irradiance = vec4(light, share.x);
+    out_residual = vec4(albedo * light, share.y);
 }

@@ -10,6 +10,9 @@
 
 uniform vec2 u_size;  // of the tile pool [texels]
 uniform int u_shots;  // from u_first on
+#if PLANAR
+uniform sampler2D t_materials;
+#endif
 
 in vec4 in_rect;  // corner and size in the tile pool [texels]
 in vec4 in_a;     // PLANAR: position of the corner, facet     else: centre and radius of a bounding sphere
@@ -21,6 +24,7 @@ flat out uint v_shots;
 out vec3 v_position;
 flat out vec3 v_normal;
 flat out float v_facet;
+flat out vec3 v_albedo;
 #endif
 
 float support(Shooter s, vec3 axis) { return 0.5 * (abs(dot(s.edge_u, axis)) + abs(dot(s.edge_v, axis))); }
@@ -58,6 +62,7 @@ void main() {
     v_normal = normalize(cross(in_b.xyz, in_c.xyz));
     v_position = in_a.xyz + at.x * in_b.xyz + at.y * in_c.xyz;
     v_facet = in_a.w;
+    v_albedo = texelFetch(t_materials, ivec2(0, int(in_b.w)), 0).rgb;
 #endif
     v_shots = 0u;
     for (int shot = 0; shot < u_shots; ++shot) {
