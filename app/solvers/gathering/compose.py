@@ -121,9 +121,8 @@ class Compose:
 
 
 def noise_of(judged: ReadBack) -> tuple[float, float]:
-    """RMS noise over all surfaces, over the mean irradiance [-], and that of direct light alone, see noise.frag.glsl."""
+    """The mean standard deviation over all surfaces, over the mean irradiance [-], and which share of all variance is that of
+    direct light; see noise.frag.glsl. The mean, since the RMS is that of the few texels next to lamps."""
     tiles: F64 = np.frombuffer(judged.take(), np.float32).reshape(-1, 4).astype(np.float64)
-    both, light, area, direct = tiles.sum(0)
-    if light <= 0:
-        return 0.0, 0.0
-    return float(np.sqrt(max(both * area, 0.0)) / light), float(np.sqrt(max(direct * area, 0.0)) / light)
+    deviation, light, both, direct = tiles.sum(0)
+    return float(deviation / light) if light > 0 else 0.0, float(direct / both) if both > 0 else 0.0

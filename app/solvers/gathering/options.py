@@ -12,8 +12,8 @@ class GatheringOptions(Options):
     """``smooth`` acts on what is shown, the rest on the next rays: none restarts the solution."""
 
     noise: float = option(
-        2e-3,
-        "converged when the noise that is left, RMS over all surfaces, is so much of the mean irradiance",
+        5e-3,
+        "converged when the noise that is left, the mean over all surfaces, is so much of the mean irradiance",
         minimum=1e-5,
         maximum=1,
         logarithmic=True,

@@ -153,11 +153,10 @@ class Gathering:
     def _shadow_rays(self, count: int) -> int:
         """How many shadow rays go with so many rays more: as many as make the whole the least noisy for its cost. Of variances
         D / d and I / n and a cost c of each shadow ray, those of all sets, beside a ray, that is d / n = √(D / (I c))."""
-        both, direct = self._noise
-        indirect = max(both**2 - direct**2, 0.0)
-        if not self.direct.count or not indirect > 0:
+        share = self._noise[1]
+        if not self.direct.count or not 0 < share < 1:
             return SHADOW_RAYS * count // FIRST
-        D, I = direct**2 * self.direct.count, indirect * self.issued  # noqa: E741
+        D, I = share * self.direct.count, (1 - share) * self.issued  # noqa: E741
         ratio = np.sqrt(D / (I * SHADOW_COST * len(self.direct.sets)))
         wanted = ratio * (self.issued + count) - self.direct.count
         return int(np.clip(wanted, PASS, MOST_SHADOW_RAYS * count))
