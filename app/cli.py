@@ -34,6 +34,7 @@ from app.render.options import DisplayOptions
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
 
 ERROR_SCENES = ("furnace", "cornell-box")
+RAY_SCENES = ("cornell-box", "museum", "grotto")
 HARD_SIZES = ("small", "large")
 
 
@@ -95,6 +96,9 @@ def build_parser(solver: str = DEFAULT_SOLVER) -> Parser:
 def _bench_flags(parser: Parser, family: Family) -> None:
     benches = {
         "shots": Command("milliseconds per shot, by pass, at the papers' sizes", _shots_flags, _bench_shots),
+        "rays": Command(
+            "millions of rays a second, and what the tree they walk takes to build", _rays_flags, _bench_rays
+        ),
         "frames": Command("milliseconds per frame of the viewer, by part", _frames_flags, _bench_frames),
         "tables": Command("the papers' tables, ours beside theirs; minutes", _tables_flags, _bench_tables),
         "error": Command("error against time and shots, of each method; minutes", _error_flags, _bench_error),
@@ -166,13 +170,27 @@ def _frames_flags(frames: Parser, family: Family) -> None:
     solver_flags(frames, family)
 
 
+def _rays_flags(rays: Parser, family: Family) -> None:
+    rays.add_argument(
+        "scenes",
+        nargs="*",
+        default=RAY_SCENES,
+        metavar="scene",
+        help=f"files or names (default {' '.join(RAY_SCENES)})",
+    )
+    rays.add_argument(
+        "--seconds", type=positive(float), default=2.0, metavar="S", help="of each figure, about (default %(default)s)"
+    )
+    json_flag(rays)
+
+
 def _tables_flags(tables: Parser, family: Family) -> None:
     output_flag(tables, "DIR", "the folder to write")
     tables.add_argument(
         "--only",
         type=_table_names,
         metavar="A,B",
-        help="coombe1, equal, wallner1, scaling, convergence, wallner2 (default all)",
+        help="coombe1, equal, wallner1, scaling, convergence, wallner2, kahl (default all)",
     )
     tables.add_argument(
         "--seconds",
@@ -300,6 +318,12 @@ def _bench_shots(flags: argparse.Namespace) -> int:
     from app.bench.speed.shots import bench_shots
 
     return bench_shots(flags)
+
+
+def _bench_rays(flags: argparse.Namespace) -> int:
+    from app.bench.speed.rays import bench_rays
+
+    return bench_rays(flags)
 
 
 def _bench_frames(flags: argparse.Namespace) -> int:

@@ -19,7 +19,9 @@ from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import TilePool
 from app.options import specs
 from app.scene.model import F32, F64, Material, Scene
-from app.solvers import EnergyBalance, ShootingOptions
+from app.solvers import DEFAULT_SOLVER, SOLVERS, EnergyBalance, GatheringOptions, ShootingOptions
+from app.solvers.gathering.solver import BATCH as GATHERED
+from app.solvers.gathering.solver import Gathering
 from app.solvers.shooting.audit import Audit
 from app.solvers.shooting.choose import ROOT_LEVEL
 from app.solvers.shooting.coarse_to_fine import LEVEL
@@ -31,6 +33,7 @@ from app.util.parts import run_to_end
 from app.visibility.projections import PROJECTIONS
 
 UNIT_SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])  # faces +z
+NOISE = 0.02  # over the mean, at which gathering is done
 ENOUGH = 20_000  # shots: a solve that needs more does not converge
 
 
@@ -93,6 +96,7 @@ EVERY_WAY = pytest.mark.parametrize(
         for adaptive, projection in itertools.product((False, True), PROJECTIONS)
     ],
 )
+EVERY_SOLVER = pytest.mark.parametrize("solver", SOLVERS)
 EVERY_LIGHTMAP = pytest.mark.parametrize("adaptive", [False, True], ids=["uniform", "adaptive"])
 
 
@@ -103,6 +107,19 @@ class Solution:
 
     lightmap: Lightmap
     solver: InspectableShooting
+
+    @property
+    def rays(self) -> Gathering:
+        """The solver, where it gathers."""
+        assert isinstance(self.solver, Gathering)
+        return self.solver
+
+    @property
+    def variance(self) -> F64:
+        """(n,) of H, of the mean of RGB [(W/m²)²], as gathering says."""
+        texture, (width, height) = self.rays.layers["variance"], self.lightmap.size
+        image = np.frombuffer(texture.read(), np.float32).reshape(height, width, 1)
+        return self.lightmap.pool.tiles_from_image(image)[self._covered][..., 0] * self.lightmap.unit**2
 
     @property
     def _covered(self) -> NDArray[np.bool_]:
@@ -177,6 +194,12 @@ class Solution:
             raise AssertionError("did not settle")
         self.solver.poll(wait=True)
 
+    def gather(self, rays: int) -> None:
+        """Until so many rays of each texel have been traced, and leaves have followed."""
+        while self.rays.issued < rays or self.rays.poll(wait=True).refining:
+            self.step(max(min(GATHERED, rays - self.rays.issued), 1))
+        self.rays.settle()
+
     def light_up(self) -> None:
         """Give every texel the same residual, so that any patch can shoot."""
         width, height = self.lightmap.size
@@ -210,12 +233,14 @@ def begin(
     tile: int = DEFAULT_TILE,
     adaptive: bool = False,
     audits: bool = True,
+    solver: str = DEFAULT_SOLVER,
     **options: object,
 ) -> Solution:
-    """The scene before the first shot. options: of ShootingOptions and LightmapOptions. Where leaves come and go, texels and
-    density are those of the roots, which uniform texels are as fine as, and shooting levels count from there."""
+    """The scene before any work. options: of LightmapOptions, and of solvers, each of which takes its own. Where leaves come and
+    go, texels and density are those of the roots, which uniform texels are as fine as, and shooting levels count from there."""
     charts = parametrize(scene, texels=texels, density=density, tile=tile)
     held = {spec.name: options.pop(spec.name) for spec in specs(LightmapOptions) if spec.name in options}
+    gathers = {spec.name: options.pop(spec.name) for spec in specs(GatheringOptions) if spec.name in options}
     shooting = ShootingOptions().replace(**options)
     pool = quadtree_pool(scene, charts) if adaptive else TilePool(scene, charts)
     if adaptive:
@@ -223,6 +248,9 @@ def begin(
             level=min((LEVEL if shooting.level is None else shooting.level) + ROOT_LEVEL, MAX_LEVEL)
         )
     lightmap = Lightmap(gpu, pool, LightmapOptions(adaptive=adaptive, depth=1).replace(**held))
+    if solver == "gathering":
+        gathering = GatheringOptions(noise=NOISE).replace(**gathers)
+        return Solution(lightmap, Gathering(gpu, lightmap, gathering))  # type: ignore[arg-type]
     return Solution(lightmap, Shooting(gpu, lightmap, shooting, audits=audits))
 
 

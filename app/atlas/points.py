@@ -24,7 +24,8 @@ class Points:
     def __len__(self) -> int:
         return len(self.triangle)
 
-    def only(self, which: NDArray[np.bool_]) -> Points:
+    def only(self, which: NDArray[np.bool_] | NDArray[np.integer]) -> Points:
+        """Those that are marked, or of these numbers."""
         return Points(self.triangle[which], self.back[which], self.weights[which])
 
     def positions_normals(self, scene: Scene) -> tuple[F64, F64]:

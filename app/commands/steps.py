@@ -58,9 +58,15 @@ def open_scene(
 
 def solve(session: Session, flags: argparse.Namespace, console: Console) -> NotFiniteError | None:
     """Solve. What broke the light is returned: what there is can still be written."""
-    stop = Stop(work=flags.work, seconds=flags.time)
+    error, rms = (None if asked is None else asked / 100 for asked in (flags.error, flags.error_rms))
+    stop = Stop(flags.work, flags.time, error, rms)
+
+    said = set()
 
     def say(stats: Stats) -> None:
+        if stats.note is not None and stats.note not in said:
+            said.add(stats.note)
+            console.warn(stats.note)
         tell(f"{stats.done} {stats.unit}, {stats.remaining:.3%} {stats.remains}", session.run.share_done(stop))
 
     with console.progress(session.family.title.lower()) as tell:
@@ -69,5 +75,6 @@ def solve(session: Session, flags: argparse.Namespace, console: Console) -> NotF
         except NotFiniteError as error:
             return error
     for note in notes(session):
-        console.warn(note)
+        if note not in said:
+            console.warn(note)
     return None

@@ -19,6 +19,7 @@ from app.scene.validate import one_line
 LOADERS = {**MESH_LOADERS, ".toml": load_authored}
 LIGHT_SHARE = 0.25  # the ceiling light's edges, of the scene's extents
 LIGHT_GAP = 0.01  # below the top, of the scene's height
+SAME_PLANE = 1e-4  # of the scene's height, that surfaces of one plane may be apart
 MEAN_IRRADIANCE = 1.0  # W/m² that the ceiling light alone would give the whole ground plan
 NO_LIGHT = "nothing in the scene emits light: --light adds a ceiling light"
 
@@ -49,7 +50,8 @@ def with_ceiling_light(scene: Scene) -> Scene:
     Its edges are a quarter of the box's, it hangs 1 % of the height below the top, and its radiance L follows from
     πL·A_light = E·A_ground with E = 1 W/m²: what falls on a floor of the box's size is then about as much as in the
     Cornell box, whatever the unit. A scene flatter or narrower than a hundredth of its size is lit as if it were that
-    thick, and one without height from a quarter of its size above.
+    thick, and one without height from a quarter of its size above. Where the scene has a surface in the square's own plane, a
+    ceiling as thick as that, it hangs lower, a gap below that: of two surfaces in one place, either might be seen.
     """
     low, high = scene.bounds
     size = high - low
@@ -59,6 +61,11 @@ def with_ceiling_light(scene: Scene) -> Scene:
     y = high[1] + 0.25 * largest if flat else high[1] - LIGHT_GAP * size[1]
     u, v = LIGHT_SHARE * width / 2, LIGHT_SHARE * depth / 2
     x, z = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
+    near, far = scene.corners.min(1), scene.corners.max(1)
+    under = (near[:, 0] < x + u) & (far[:, 0] > x - u) & (near[:, 2] < z + v) & (far[:, 2] > z - v)
+    level = under & (far[:, 1] - near[:, 1] <= SAME_PLANE * size[1])
+    while (level & (np.abs(near[:, 1] - y) <= SAME_PLANE * size[1])).any() and y - low[1] > size[1] / 2:
+        y -= LIGHT_GAP * size[1]
     corners = np.array([(x - u, y, z - v), (x + u, y, z - v), (x + u, y, z + v), (x - u, y, z + v)])
     radiance = MEAN_IRRADIANCE / (math.pi * LIGHT_SHARE**2)
     light = Material("ceiling light", albedo=(0.0, 0.0, 0.0), emission=(radiance, radiance, radiance))

@@ -23,6 +23,8 @@ from app.solvers.run import solve_until
 from app.util.parts import run_to_end
 
 TELL_SECONDS = 0.2  # between two calls of progress
+ASK_AGAIN = 1.5  # times as long as until the error was last estimated, when it is again
+ASK_SHARE = 0.5  # of the time that was solved for, that one estimate may take
 NEARLY = 0.99  # done, by what remains: something else may still change
 NO_LIMIT = 1 << 30  # of work: a piece of it ends at its solver's own batch
 
@@ -33,10 +35,17 @@ class NotFiniteError(UserError):
 
 @dataclass(frozen=True)
 class Stop:
-    """When a solve ends, besides when it has converged; whichever comes first. work: in the solver's unit."""
+    """When a solve ends, besides when it has converged; whichever comes first. work: in the solver's unit. error, rms: once the
+    expected error, the median of local ones and the relative RMS, is as little as asked for [-]: both, where both are."""
 
     work: int | None = None
     seconds: float | None = None
+    error: float | None = None
+    rms: float | None = None
+
+    @property
+    def by_error(self) -> bool:
+        return self.error is not None or self.rms is not None
 
 
 class Run:
@@ -182,13 +191,17 @@ class Run:
 
     # -- without a window ----------------------------------------------------------------------------------------------
 
-    def solve(self, stop: Stop, tell: Callable[[], None] | None = None) -> None:
+    def solve(
+        self, stop: Stop, tell: Callable[[], None] | None = None, good: Callable[[float], bool] | None = None
+    ) -> None:
         """Work until ``stop``, or until converged; ``tell`` is called a few times a second. Ctrl-C ends it early and is noted as
-        ``interrupted``. Raises NotFiniteError; progress and energy are those of the last piece of work then, too."""
+        ``interrupted``. good: says whether settled light is as good as ``stop`` asks for, and may take about so many seconds; it
+        is asked again once the solve has taken half as long again. Raises NotFiniteError; progress and energy are those of the
+        last piece of work then, too."""
         start, failure = time.perf_counter(), None
         self.interrupted = False
         try:
-            self._solve(stop, start, tell)
+            self._solve(stop, start, tell, good)
         except KeyboardInterrupt:
             self.interrupted = True
         except NotFiniteError as error:
@@ -199,18 +212,28 @@ class Run:
         if failure is not None:
             raise failure
 
-    def _solve(self, stop: Stop, start: float, tell: Callable[[], None] | None) -> None:
-        told, self.settled = start, False
+    def _solve(
+        self, stop: Stop, start: float, tell: Callable[[], None] | None, good: Callable[[float], bool] | None
+    ) -> None:
+        told, ask_at, self.settled = start, 0.0, False
 
         def over(_: Progress) -> bool:
-            nonlocal told
+            nonlocal told, ask_at
             now = time.perf_counter()
             self.seconds = now - start
             self.poll(energy=False)
             if tell and now - told > TELL_SECONDS:
                 told = now
                 tell()
-            return self.converged or (stop.seconds is not None and self.seconds >= stop.seconds)
+            if self.converged or (stop.seconds is not None and self.seconds >= stop.seconds):
+                return True
+            if good is None or self.solver.issued == 0 or self.seconds < ask_at:
+                return False
+            self.settle()
+            enough = good(ASK_SHARE * self.seconds)
+            self.seconds = time.perf_counter() - start
+            ask_at, self.settled = ASK_AGAIN * self.seconds, False
+            return enough
 
         solve_until(self.solver, NO_LIMIT, over, most=stop.work)
 

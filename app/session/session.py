@@ -21,7 +21,7 @@ from app.lightmap.options import LightmapOptions
 from app.options import Options
 from app.scene.model import Material, Scene
 from app.session.compared import Compared
-from app.session.error_estimate import RunningEstimate
+from app.session.error_estimate import SECONDS, RunningEstimate
 from app.session.loading import Loading, load
 from app.session.opening import Opening, Prepare, Ready
 from app.session.run import Run, Stop
@@ -246,7 +246,13 @@ class Session:
     def solve(self, stop: Stop, tell: Callable[[Stats], None] | None = None) -> None:
         """Work until ``stop``, or until converged, see ``Run.solve``. Raises NotFiniteError."""
         self.estimate.changed()
-        self.run.solve(stop, None if tell is None else lambda: tell(self.stats))
+
+        def good(seconds: float) -> bool:
+            self.estimate_now(lambda share: None, seconds=seconds)
+            error = self.expected
+            return error is not None and error.within(median=stop.error, rms=stop.rms)
+
+        self.run.solve(stop, None if tell is None else lambda: tell(self.stats), good if stop.by_error else None)
 
     def restart(self) -> None:
         """Forget all light and begin again."""
@@ -266,10 +272,11 @@ class Session:
         return self._options[self.solver_name]
 
     def set_options(self, options: Options) -> None:
-        """Other options of the solver, from its next piece of work on."""
-        self._options[self.solver_name] = options
+        """Other options of the solver, from its next piece of work on. Raises UserError, and keeps those that it has."""
         if self._opened:
             self.solver.set_options(options)
+        self._options[self.solver_name] = options
+        if self._opened:
             self.run.options_changed()
 
     def set_solver(self, name: str) -> None:
@@ -338,10 +345,12 @@ class Session:
         """How far off the light is expected to be: None as long as it is not known, or nothing is lit."""
         return self.estimate.error if self._opened and self.estimate.knows(self._state) else None
 
-    def estimate_now(self, tell: Callable[[float], None]) -> None:
-        """Work out ``expected`` whole, of settled light; ``tell`` is given the share done."""
+    def estimate_now(self, tell: Callable[[float], None], *, seconds: float = SECONDS) -> None:
+        """Work out ``expected`` whole, of settled light; ``tell`` is given the share done. seconds: after which fewer points are
+        enough."""
+        self.estimate.seconds = seconds
         while self._can_estimate and not self.estimate.knows(self._state):
-            self._estimate_part()
+            self._estimate_part(wait=True)
             tell(self.estimate.share)
 
     @property
@@ -349,10 +358,10 @@ class Session:
         """Whether there is light to judge."""
         return self._opened and self.solver.issued > 0 and self.scene.emits
 
-    def _estimate_part(self) -> None:
+    def _estimate_part(self, *, wait: bool = False) -> None:
         """Some of the points, or none where there is nothing to do."""
         if self._can_estimate and not self.estimate.knows(self._state):
-            self.estimate.part(self.lightmap, self.run.energy.returned, self._state)
+            self.estimate.part(self.lightmap, self._state, wait=wait)
 
     @property
     def _state(self) -> object:

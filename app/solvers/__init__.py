@@ -14,6 +14,8 @@ from app.solvers.gathering.inspectable import SEEN
 from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.solver import BATCH as RAYS
 from app.solvers.gathering.solver import Gathering
+from app.solvers.pairs.options import PairsOptions
+from app.solvers.pairs.solver import Pairs
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.records import BATCH
 from app.solvers.shooting.solver import PICTURES, Shooting
@@ -45,6 +47,7 @@ class Family:
     shows: tuple[str, ...] = ()
     layers: tuple[str, ...] = ()
     distributes: bool = True
+    quadratic: bool = False
 
 
 SOLVERS: dict[str, Family] = {
@@ -74,6 +77,17 @@ SOLVERS: dict[str, Family] = {
         layers=("direct", "variance", "rays"),
         pictures={HEMISPHERE: SEEN},
         distributes=False,
+    ),
+    "pairs": Family(
+        title="Texel pairs",
+        help="every texel gathers from every other, or from windows of them: slow, to compare (Kahl 2022)",
+        options=PairsOptions,
+        make=Pairs,
+        unit="bounces",
+        remains="changed",
+        batch=1,
+        threshold="change",
+        quadratic=True,
     ),
 }
 DEFAULT_SOLVER = "shooting"

@@ -10,8 +10,6 @@ from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
-import numpy as np
-
 from app.gpu import Texture
 from app.options import Options
 from app.scene.model import F32, F64, Material
@@ -70,12 +68,6 @@ class EnergyBalance:
         """Imbalance over emitted power, summed over RGB [-]; 0 without any emitter."""
         total = float(self.emitted.sum())
         return float(self.imbalance.sum()) / total if total > 0 else 0.0
-
-    @property
-    def returned(self) -> F64:
-        """Share of the light leaving surfaces that they send out again, RGB [-]: ρ̄ H / (H + escaped), H what they receive."""
-        received = self.absorbed / np.maximum(1.0 - self.reflectance, 1e-3)
-        return np.asarray(self.reflectance * received / np.maximum(received + self.escaped, 1e-300))
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,8 @@ SIZES = ("small", "large")
 ENOUGH = 2_000_000  # units of work: a solve that needs more does not converge
 FULL, HEMICUBE = "rgba32f", "hemicube"
 LEAST = 1e-9  # residual that can be asked for
+NOISE = {"small": 0.02, "large": 5e-3}  # that may remain where light is gathered, RMS over all surfaces, over the mean
+FEW_RAYS = 64  # of each texel: the noise of fewer is itself not known
 IMBALANCE = "of single shots' sums, on average: a texel is sampled at its centroid, its shooter's sight at one point"
 EACH = "and each bounce may lose what grazes, (4/R)²"
 NO_NUMBER = "every texel holds a finite number"
@@ -61,7 +63,8 @@ class Method:
         wanted = {"projection": self.projection, "resolution": map_size, self.family.threshold: threshold}
         if self.adaptive:  # levels count from the root, whose texels are those of a uniform lightmap
             wanted["level"] = min(LEVEL + ROOT_LEVEL, MAX_LEVEL)
-        known = {spec.name for spec in specs(self.family.options)}
+        known = {spec.name: spec.minimum for spec in specs(self.family.options)}
+        wanted[self.family.threshold] = max(threshold, known[self.family.threshold] or 0.0)
         return self.family.options().replace(**{name: value for name, value in wanted.items() if name in known})
 
 
@@ -78,7 +81,7 @@ def methods_of(solver: str) -> tuple[Method, ...]:
 
 
 METHODS = (
-    *(method for solver in SOLVERS for method in methods_of(solver)),
+    *(method for solver, family in SOLVERS.items() if not family.quadratic for method in methods_of(solver)),
     *(Method(storage=storage) for storage in STORAGE if storage != FULL),
 )
 # where how a shooter sees, and how light is stored, plays no part
@@ -151,9 +154,14 @@ class Solution:
         return float(np.average(self.H[where], weights=self.area[where])) if where.any() else 0.0
 
     @property
+    def sample(self) -> float:
+        """Share of the sky of one sample of the map; rays have none."""
+        return 0.0 if self.method.projection is None else 1 / self.map**2
+
+    @property
     def grazing(self) -> float:
         """Cosine-weighted share of a receiver's sky lower than two samples of the map, 2/R wide each: sin² of that angle."""
-        return (4 / self.map) ** 2
+        return 16 * self.sample
 
     @property
     def bounces(self) -> float:
@@ -175,8 +183,8 @@ class HardCase:
     scene: of a size. control: a clean scene, solved alike, whose answer it must have. checks: of a solution and of its control's,
     or of the same one twice where there is none. density: texels/m by size, of quadtrees the roots', for a scene that is
     ``scale`` times as large as its control; map: pixels of visibility maps by size. Solved until no more than ``residual``
-    remains, or for so much ``work`` in the solver's unit. imbalance: of energy that there may be either way, and why; grazes:
-    whether each bounce may lose a little more.
+    remains, or NOISE, or for so much ``work`` in the solver's unit, or so many ``rays`` where light is gathered. imbalance: of
+    energy that there may be either way, and why; grazes: whether each bounce may lose a little more.
     """
 
     name: str
@@ -189,6 +197,7 @@ class HardCase:
     map: tuple[int, int] = (64, 256)
     residual: tuple[float, float] = (0.05, 2e-3)
     work: tuple[int, int] | None = None
+    rays: tuple[int, int] | None = None
     imbalance: float = 0.01
     imbalance_reason: str = IMBALANCE
     grazes: bool = True
@@ -214,7 +223,7 @@ class HardCase:
             "darkest texel / brightest",
             float(light.H.min()) / brightest,
             0.0,
-            2 / light.map**2,
+            2 * light.sample,
             1.0,
             NEGATIVE,
             exact=False,
@@ -229,14 +238,23 @@ class HardCase:
     def solve(self, gpu: Gpu, scene: Scene, method: Method, size: str, scale: float) -> Solution:
         """Until converged, or for so much work."""
         i = SIZES.index(size)
-        last, least = (self.work[i], 0.0) if self.work else (ENOUGH, self.residual[i])
+        gathers = method.family.remains == "noise"
+        work = self.rays if gathers else self.work
+        last, least = (
+            (work[i], -1.0 if gathers else 0.0) if work else (ENOUGH, NOISE[size] if gathers else self.residual[i])
+        )
         start = time.perf_counter()
         atlas = AtlasOptions(density=self.density[i] / scale)
         light = LightmapOptions(adaptive=method.adaptive, depth=1, storage=method.storage)
-        options = method.options(self.map[i], max(least, LEAST))
+        options = method.options(self.map[i], least)
         with opened(gpu, scene, atlas, light, options, method.solver) as (lightmap, solver):
             batch = method.family.batch
-            solve_until(solver, batch, lambda now: now.done >= last or (now.converged and now.remaining <= least))
+            few = FEW_RAYS if gathers else 0
+            solve_until(
+                solver,
+                batch,
+                lambda now: now.done >= last or (now.done >= few and now.converged and now.remaining <= least),
+            )
             done, energy = solver.poll(wait=True).done, solver.energy()
             surfaces = lightmap.pool.surfaces
             covered = surfaces.area > 0

@@ -103,6 +103,7 @@ CASES: tuple[HardCase, ...] = (
         density=(4, 16),
         map=(256, 256),
         residual=(1e-18, 1e-18),
+        rays=(512, 4096),
         methods=tuple(method for method in METHODS if not method.adaptive),
     ),
     HardCase(
@@ -113,6 +114,7 @@ CASES: tuple[HardCase, ...] = (
         density=(4, 16),
         map=(256, 256),
         residual=(LEAST, LEAST),
+        rays=(512, 4096),
         methods=tuple(method for method in METHODS if method.adaptive),
     ),
     HardCase(
@@ -203,6 +205,7 @@ CASES: tuple[HardCase, ...] = (
         through_slit,
         map=(128, 512),
         residual=(1e-6, 1e-6),
+        rays=(512, 4096),
     ),
     HardCase(
         "slit-shut",
@@ -220,6 +223,7 @@ CASES: tuple[HardCase, ...] = (
         glows(0.5, 0.02, FACETS),
         imbalance=0.03,
         imbalance_reason=FACETS,
+        rays=(256, 2048),
     ),
     HardCase(
         "many-shots",

@@ -7,9 +7,6 @@ costs
     A STEP + A_left n_left + A_right n_right
 
 What no place can part (coincident centres), or would make the tree too deep, is halved.
-
-[MacDonald90] J. D. MacDonald, K. S. Booth, Heuristics for ray tracing using space subdivision, The Visual Computer 6, 1990.
-[Wald07] I. Wald, On fast construction of SAH-based bounding volume hierarchies, IEEE Symposium on Interactive Ray Tracing 2007.
 """
 
 from __future__ import annotations

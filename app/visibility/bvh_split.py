@@ -21,7 +21,7 @@ FloatsT = TypeVar("FloatsT", F32, F64)
 
 BINS = 16  # along each axis
 WIDTHS = (2, 4, 8, 16)  # triangles of nodes that are parted exactly, up to each of these together
-CHUNK = 1 << 14  # small nodes at once, so that their tables stay in the caches
+CHUNK = 1 << 13  # nodes at once, so that their tables stay in the caches
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,14 +51,19 @@ def split_nodes(boxes: Boxes, counts: Ints) -> tuple[NDArray[np.float32], Mask]:
     where no place parts the centres, and whether a triangle (n,) goes to the right."""
     cost = np.full(len(counts), np.inf, np.float32)
     right = np.zeros(len(boxes.lower), bool)
-    sizes = np.searchsorted(WIDTHS, counts)
+    first, sizes = np.cumsum(counts) - counts, np.searchsorted(WIDTHS, counts)
     for size in np.unique(sizes[counts > 1]).tolist():
-        mine, split = (sizes == size) & (counts > 1), _split_small if size < len(WIDTHS) else _split_binned
-        if mine.all():
-            return split(boxes, counts)
-        rows = np.flatnonzero(np.repeat(mine, counts))
-        cost[mine], right[rows] = split(boxes.take(rows), counts[mine])
+        mine = np.flatnonzero((sizes == size) & (counts > 1))
+        for some in np.split(mine, np.arange(CHUNK, len(mine), CHUNK)):
+            rows = _rows(first[some], counts[some])
+            split = _split_exactly if size < len(WIDTHS) else _split_binned
+            cost[some], right[rows] = split(boxes.take(rows), counts[some])
     return cost, right
+
+
+def _rows(first: Ints, counts: Ints) -> Ints:
+    """Runs of so many indices each, from ``first`` on."""
+    return np.asarray(np.arange(counts.sum()) + np.repeat(first - (np.cumsum(counts) - counts), counts))
 
 
 def _split_binned(boxes: Boxes, counts: Ints) -> tuple[NDArray[np.float32], Mask]:
@@ -84,17 +89,6 @@ def _split_binned(boxes: Boxes, counts: Ints) -> tuple[NDArray[np.float32], Mask
     axis, after = best // (BINS - 1), best % (BINS - 1)
     cost = np.take_along_axis(costs.reshape(nodes, -1), best[:, None], 1)[:, 0]
     return cost, bins[np.arange(len(bins)), axis[node]] > after[node]
-
-
-def _split_small(boxes: Boxes, counts: Ints) -> tuple[NDArray[np.float32], Mask]:
-    cost, right = np.empty(len(counts), np.float32), np.empty(len(boxes.lower), bool)
-    end = np.cumsum(counts)
-    for start in range(0, len(counts), CHUNK):
-        some = slice(start, start + CHUNK)
-        rows = slice(end[start] - counts[start], end[some][-1])
-        part = Boxes(boxes.lower[rows], boxes.upper[rows])
-        cost[some], right[rows] = _split_exactly(part, counts[some])
-    return cost, right
 
 
 def _split_exactly(boxes: Boxes, counts: Ints) -> tuple[NDArray[np.float32], Mask]:

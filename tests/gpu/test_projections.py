@@ -180,7 +180,7 @@ def test_map_shows_what_a_ray_meets(probe: Gpu, name: str, scene: str) -> None:
         off.append(np.abs(2 * depth / (distance * scale) - 1)[right])
     assert len(wrong) > 5
     assert np.mean(wrong) < WRONG[name]
-    # DEPTH_SLACK of solvers/shooting/visible.glsl, but for a few samples that graze a surface
+    # DEPTH_SLACK of visibility/visible.glsl, but for a few samples that graze a surface
     assert np.quantile(np.concatenate(off), 0.999) < 1 / 16384
     solution.release()
 

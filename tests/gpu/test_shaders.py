@@ -20,6 +20,8 @@ from app.options import specs
 from app.render.layers import LAYER_SHADERS
 from app.render.options import TONE_MAPS
 from app.render.resolve import BORDER, PLACES_WIDTH
+from app.solvers.gathering.compose import RADIUS
+from app.solvers.pairs.gather import CHOICES
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 from app.solvers.shooting.records import BATCH, BLOCK_LEVEL, BLOCK_ROWS, CELL_LEVEL, EMITTER, GROUP, LEVELS, RECORDS
 from app.solvers.shooting.see import ESCAPED_BLOCK
@@ -65,12 +67,19 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "ANY": FLAG,
     "BOX_GRID": FLAG,
     "STACK": (DEEPEST,),
+    "CLOSED_FORM": FLAG,
+    "TRACED": FLAG,
+    "FINER": FLAG,
+    "RADIUS": (0, 1, RADIUS),
+    "DEVIATIONS": (1.5,),
+    "CHOICE": (0, *CHOICES.values()),
     "VISIBILITY": tuple(range(len(VISIBILITIES))),
 }
 SLOTS = {
     "projection": tuple(p.glsl for p in PROJECTIONS.values()),
     "vertex": tuple(p.drawing["vertex"] for p in PROJECTIONS.values()),
     "fragment": tuple(p.drawing["fragment"] for p in PROJECTIONS.values()),
+    "occlusion": tuple(f"solvers/pairs/by_{way}.glsl" for way in ("rays", "voxels", "bits")),
     "layer": tuple(f"render/layers/{layer.shader}.glsl" for layer in LAYER_SHADERS.values()),
     "curve": ("render/false_colour.glsl", *(f"render/tone_maps/{name}.glsl" for name in TONE_MAPS)),
 }

@@ -157,6 +157,22 @@ def furnace_glows_evenly(gpu: Gpu, rho: float, adaptive: bool, projection: str) 
 
 
 @EVERY_LIGHTMAP
+@pytest.mark.parametrize("rho", [0.3, 0.5, 0.9, 0.99, 0.999])
+def test_furnace_gathered(gpu: Gpu, rho: float, adaptive: bool) -> None:
+    """The same, along rays. What other texels send on is the same everywhere: only the direct light is noisy, and half of it, on
+    average 1 of 1 / (1 - ρ), comes in closed form from one wall with two triangles; the iteration of bounces leaves 1e-3."""
+    scene = quads_scene(room(), [grey(rho, 2.0)])
+    furnace = begin(gpu, scene, texels=384, solver="gathering", adaptive=adaptive)
+    furnace.gather(32)
+    B = furnace.B[:, 1] * (1 - rho) / 2.0
+    assert np.average(B, weights=furnace.area) == pytest.approx(1, abs=2e-3)
+    assert np.abs(B - 1).max() < 0.01
+    assert abs(shares(furnace)["imbalance"]) < 2e-3
+    assert shares(furnace)["escaped"] == 0
+    furnace.release()
+
+
+@EVERY_LIGHTMAP
 def test_furnace_from_coarse_to_fine(gpu: Gpu, adaptive: bool) -> None:
     """The default. Patches of level 4 leave what is uneven to those of level 2, which end with 1 % of it: the mean is right, but
     close to an edge light may be off by several times that."""

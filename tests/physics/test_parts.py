@@ -31,6 +31,19 @@ def test_parts_add_up_to_the_shot(gpu: Gpu, bands: int) -> None:
     cut.release()
 
 
+@pytest.mark.parametrize("bands", [1, 3, 16])
+def test_rays_in_parts_are_the_same_rays(gpu: Gpu, bands: int) -> None:
+    whole, cut = (begin(gpu, table_room(), texels=3000, solver="gathering") for _ in range(2))
+    for _ in range(3):
+        whole.step(8)
+        parts = sum(1 for _ in cut.solver.work(8, bands))
+        assert parts >= 8 * min(bands, cut.lightmap.rows)
+    assert cut.rays.traced == whole.rays.traced
+    np.testing.assert_array_equal(cut.H, whole.H)
+    whole.release()
+    cut.release()
+
+
 def test_so_do_the_parts_of_a_growing_tree(gpu: Gpu) -> None:
     """Leaves split, shots are made again into them, and leaves are judged: all in parts."""
     options = {"density": 4.0, "level": 1, "resolution": 64, "residual": 0.05, "depth": 2, "gradient": 0.3}

@@ -218,13 +218,16 @@ def test_a_plot_has_a_line_for_each_curve(tmp_path: Path, monkeypatch: pytest.Mo
     assert by_time.get_xscale() == by_time.get_yscale() == by_shots.get_xscale() == "log"
 
 
-def test_looks_that_were_well_estimated_are_counted() -> None:
-    """Within a factor of two of what is left of the RMS without the reference's noise; what hardly shows above that is not."""
+@pytest.mark.parametrize(("kind", "said"), [("rms", "expected"), ("median", "expected_median")])
+def test_looks_that_were_well_estimated_are_counted(kind: str, said: str) -> None:
+    """Within a factor of two of what is left of it without the reference's noise; what hardly shows above that is not."""
     one: Any = error_report.SceneCurves("a", "a", quads_scene(room(), (grey(0.5, 1.0),)), "closed-form")
-    one.reference = SimpleNamespace(noise=0.03)
+    one.reference = SimpleNamespace(
+        noise=0.03 if kind == "rms" else 0.5, median_noise=0.03 if kind == "median" else 0.5
+    )
     looks = [(0.05, 0.021), (0.05, 0.079), (0.05, 0.019), (0.05, 0.081), (0.04, 0.04), (0.05, None)]
-    one.curves = {"uniform": [{"rms": rms, "expected": said} for rms, said in looks], "cycles": [{"rms": 0.1}]}
-    assert one.well_estimated == (2, 4)
+    one.curves = {"uniform": [{kind: true, said: value} for true, value in looks], "cycles": [{kind: 0.1}]}
+    assert one.well_estimated(kind) == (2, 4)
 
 
 def test_a_peer_with_texels_of_its_own_is_drawn_as_a_peer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

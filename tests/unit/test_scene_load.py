@@ -15,7 +15,7 @@ from app.scene.cameras import default_camera
 from app.scene.library import scene_names, scene_path
 from app.scene.load import NO_LIGHT, load_scene, with_ceiling_light
 from app.scene.model import Material, Scene
-from app.scene.shapes import Mesh, box, icosphere
+from app.scene.shapes import Mesh, box, icosphere, merged, quad
 from app.scene.validate import Part, validate
 
 GREY = Material("grey")
@@ -98,6 +98,14 @@ def test_ceiling_light_gives_its_ground_one_watt_per_square_metre(scale: float) 
 def test_ceiling_light_of_a_flat_scene_hangs_above_it() -> None:
     flat = scene_of(Mesh(np.array([[0, 0, 0], [4, 0, 0], [0, 0, -4]], float), np.array([[0, 1, 2]]), np.zeros((3, 2))))
     assert np.allclose(with_ceiling_light(flat).corners[-1][:, 1], 1.0)
+
+
+def test_ceiling_light_is_not_in_the_plane_of_a_ceiling() -> None:
+    """One as thick as the light hangs below the top: the light is then in front of it."""
+    roof, ceiling = quad((-2, 2, -4), (0, 0, 8), (4, 0, 0)), quad((-2, 1.98, -4), (4, 0, 0), (0, 0, 8))
+    floor = quad((-2, 0, -4), (0, 0, 8), (4, 0, 0))
+    lit = with_ceiling_light(scene_of(merged([roof, ceiling, floor])))
+    assert np.allclose(lit.corners[-1][:, 1], 1.96)
 
 
 def looks_at_all(scene: Scene) -> bool:

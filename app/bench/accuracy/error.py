@@ -37,7 +37,7 @@ from app.util.parts import run_to_end
 from app.util.tables import FLIP, Row, missing
 
 SECONDS = 5.0  # for the error estimate, unless fewer points would be too few
-MAPS = 16  # hemicubes of the error estimate at once
+NODES = 64  # of the error estimate at once
 ESTIMATED = 4  # looks from one with an error estimate to the next
 
 
@@ -150,11 +150,11 @@ def _curve(gpu: Gpu, one: SceneCurves, reference: ReferenceIrradiance, name: str
         return PEERS[name].curve(Task(one.scene, reference, one.picture, atlas, plan.seconds))
     setup = plan.setup(name)
     with opened(gpu, one.scene, setup.atlas, setup.light, setup.options, setup.solver) as (lightmap, solver):
-        estimator, looks = ErrorEstimator(gpu, lightmap, MAPS), itertools.count()
+        estimator, looks = ErrorEstimator(gpu, lightmap, NODES), itertools.count()
 
         def estimate() -> Row:
-            error = run_to_end(estimator.parts(solver.energy().returned, SECONDS))
-            return {} if error is None else {"expected": error.rms}
+            error = run_to_end(estimator.parts(SECONDS))
+            return {} if error is None else {"expected": error.rms, "expected_median": error.median}
 
         def look() -> Row:
             row = look_at(lightmap, solver, setup.family, reference)
@@ -186,6 +186,7 @@ def _values(one: SceneCurves, plan: Plan) -> dict[str, Any]:
         "truth": one.reference.as_dict(),
         "view": None if one.picture is None else one.picture.as_dict(),
         "curves": curves,
-        "foretold": one.well_estimated,
+        "foretold": one.well_estimated("rms"),
+        "foretold_median": one.well_estimated("median"),
         "summary": one.summary,
     }

@@ -27,14 +27,16 @@ TITLE = "Error against time"
 CLOCKS = {"seconds": "s", "cpu_seconds": "CPU s"}  # what is read when a curve comes down to a level
 NOTES = (
     "Error of the irradiance at random points of the surfaces. RMS: root mean square over all lit points and colours, over the "
-    "mean. Expected: the RMS that the solution says of itself, with no reference. Bias: of the mean. Median, 90 %: quantiles of "
-    "the error at each lit point, over the irradiance there. Leak: light at dark points, over the mean at lit ones. Imbalance: "
+    "mean. Expected: the RMS, and the median, that the solution says of itself, with no reference. Bias: of the mean. Median, 90 "
+    "%: quantiles of the error at each lit point, over the irradiance there. Leak: light at dark points, over the mean at lit "
+    "ones. Imbalance: "
     "emitted light that is neither absorbed, nor unshot, nor gone. s to: seconds of solving until the RMS was that small, read "
     "between two looks; looking stops the clock, and loading is not timed. CPU s: of all cores, "
     "which other programs on the machine do not change. FLIP: how different what the first camera sees "
     f"looks by this light and by the reference's, {SIZE[0]}×{SIZE[1]} pixels, 0 to 1; none where the reference has no picture.",
 )
 JUDGED = 1.5  # times the reference's noise, from where on an RMS says something
+EXPECTED = {"rms": "expected", "median": "expected_median"}  # what is said of each error
 TWICE = 2.0  # or half: so far off is still well expected
 
 
@@ -51,7 +53,7 @@ def remains() -> dict[str, str]:
 def sample_columns() -> list[Column]:
     """Of error.csv."""
     where = ("scene", "method", "seconds", "cpu_seconds", *units(), "paths", *remains(), "texels")
-    errors = ("rms", "expected", "bias", "median", "q90", "leak", "imbalance", "flip")
+    errors = ("rms", "expected", "bias", "median", "expected_median", "q90", "leak", "imbalance", "flip")
     return [Column(key, key) for key in (*where, *errors)]
 
 
@@ -69,6 +71,7 @@ def summary_columns() -> list[Column]:
         Column("expected", "expected", ".2%"),
         Column("bias", "bias", "+.2%"),
         Column("median", "median", ".2%"),
+        Column("expected_median", "expected", ".2%"),
         Column("q90", "90 %", ".2%"),
         Column("leak", "leak", ".3%"),
         Column("imbalance", "imbalance", "+.2%"),
@@ -110,16 +113,18 @@ class SceneCurves:
             for name, rows in self.curves.items()
         ]
 
-    @property
-    def well_estimated(self) -> tuple[int, int]:
-        """At how many looks the estimated RMS was within a factor of two, and of how many that the reference can judge. Its
-        noise is none of theirs."""
-        assert self.reference is not None
-        noise, good, stated = self.reference.noise or 0.0, 0, 0
+    def well_estimated(self, kind: str) -> tuple[int, int]:
+        """At how many looks the estimated error (``rms`` or ``median``) was within a factor of two, and of how many that the
+        reference can judge. Its noise is none of theirs."""
+        right = self.reference
+        assert right is not None
+        noise = (right.noise if kind == "rms" else right.median_noise) or 0.0
+        said = EXPECTED[kind]
+        good, stated = 0, 0
         for row in itertools.chain.from_iterable(self.curves.values()):
-            if row.get("expected") is not None and row.get("rms", 0.0) > JUDGED * noise:
-                true = (row["rms"] ** 2 - noise**2) ** 0.5
-                good += true / TWICE <= row["expected"] <= true * TWICE
+            if row.get(said) is not None and row.get(kind, 0.0) > JUDGED * noise:
+                true = (row[kind] ** 2 - noise**2) ** 0.5
+                good += true / TWICE <= row[said] <= true * TWICE
                 stated += 1
         return good, stated
 
@@ -142,9 +147,8 @@ def document(values: dict[str, Any], scenes: Iterable[SceneCurves]) -> str:
             f"## {one.name}",
             f"{len(one.scene.triangles):,} triangles. Compared with: {right.made}, at {len(right.points):,} points, of which "
             f"{lit:,} are lit{noise}.",
-            "Expected RMS within a factor of two of the measured one, less the noise of the reference: at {} of {} looks.".format(
-                *one.well_estimated
-            ),
+            "Expected within a factor of two of the measured, less the noise of the reference: RMS at {} of {} looks, "
+            "median at {} of {}.".format(*one.well_estimated("rms"), *one.well_estimated("median")),
             markdown_table(
                 [c for c in summary_columns() if any(row.get(c.key) is not None for row in one.summary)], one.summary
             ),

@@ -14,6 +14,8 @@ from app.lightmap.options import LightmapOptions
 from app.options import Options, from_flags
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
 
+RAY_TEXELS = 65_536  # few texels with many rays have less error, for the same time, than many with few
+
 
 @dataclass(frozen=True)
 class Setup:
@@ -40,12 +42,13 @@ class Setup:
 @dataclass(frozen=True)
 class Method:
     """axis: what is chosen. solver: of SOLVERS. options, light: those of the solver and of the lightmap that differ from what was
-    asked for."""
+    asked for. texels: uniform ones, where none were asked for; None for as many as suit the scene."""
 
     axis: str
     solver: str = DEFAULT_SOLVER
     options: Mapping[str, Any] = field(default_factory=dict)
     light: dict[str, Any] = field(default_factory=dict)
+    texels: int | None = None
 
     @property
     def adaptive(self) -> bool:
@@ -54,6 +57,7 @@ class Method:
     def setup(self, texels: int | None, flags: argparse.Namespace) -> Setup:
         """texels: uniform ones; quadtrees begin with a sixteenth, so that some of their leaves become as fine or finer. flags:
         all other options that were asked for. Raises UserError."""
+        texels = texels or self.texels
         if self.adaptive and texels is not None:
             texels = max(texels // ROOT_SHARE, 1)
         light = from_flags(LightmapOptions, flags).replace(**({"adaptive": False} | self.light))
@@ -64,7 +68,7 @@ class Method:
 METHODS = {
     "uniform": Method("lightmap"),
     "adaptive": Method("lightmap", light={"adaptive": True}),
-    "gathering": Method("solver", solver="gathering"),
+    "gathering": Method("solver", solver="gathering", texels=RAY_TEXELS),
     "gathering-adaptive": Method("solver", solver="gathering", light={"adaptive": True}),
     "disc": Method("form factor", options={"form_factor": "disc"}),
     "item-id": Method("visibility", options={"visibility": "item-id"}),

@@ -1,1 +1,1 @@
-"""The tables of [Coombe03] and [Wallner10], measured on this machine and beside the published numbers: a file for each table."""
+"""The tables of [Coombe03], [Wallner10] and [Kahl22], measured on this machine beside what is published: a file for each."""

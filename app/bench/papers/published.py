@@ -2,12 +2,14 @@
 
 [Coombe03] G. Coombe, M. Harris, A. Lastra: Radiosity on Graphics Hardware, 2003. Table 1.
 [Wallner10] G. Wallner: An Empirical Evaluation of a GPU Radiosity Solver, GRAPP 2010. Tables 1 and 2, figure 6.
+[Kahl22] B. Kahl: Hardware Acceleration of Progressive Refinement Radiosity using Nvidia RTX, 2022. Conclusions.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+KAHL = "Kahl 2022, conclusions: no numbers"
 COOMBE = "Coombe, Harris & Lastra 2003, table 1: NVIDIA GeForce FX"
 WALLNER = "Wallner 2010, {}: Intel Core2 2.13 GHz, 3.5 GB, GeForce 8800 GTS 640 MB"
 

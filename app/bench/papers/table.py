@@ -25,7 +25,8 @@ class Plot:
 
 @dataclass(frozen=True)
 class Table:
-    """jobs: (label, what measures one row within about so many seconds). finish: adds what follows from all rows."""
+    """jobs: (label, what measures one row within about so many seconds). finish: adds what follows from all rows.
+    verdicts: what the rows say of the paper's conclusions, a line each."""
 
     name: str
     title: str
@@ -35,3 +36,4 @@ class Table:
     jobs: tuple[tuple[str, Measure], ...]
     plot: Plot | None = None
     finish: Callable[[list[Row]], None] = lambda rows: None
+    verdicts: Callable[[list[Row]], list[str]] = lambda rows: []

@@ -10,6 +10,7 @@ from app.bench.papers.table import Plot
 from app.util.tables import Row
 
 SIZE = (10.0, 5.0)  # inches
+LEGEND = 18  # lines that fit beside the plot in letters of 10 points
 STYLES = ("-", "--", ":", "-.")
 
 
@@ -26,7 +27,8 @@ def draw(path: Path, title: str, plot: Plot, rows: list[Row], renderer: str) -> 
             axes.set_xscale("log")
     axes.set(title=f"{title}\n{renderer}", xlabel=plot.labels[0], ylabel=plot.labels[1])
     axes.grid(alpha=0.3)
-    figure.legend(loc="outside right upper")
+    count = len(axes.get_legend_handles_labels()[1])
+    figure.legend(loc="outside right upper", fontsize=10 * min(1.0, LEGEND / max(count, 1)))
     save(figure, path)
 
 

@@ -1,35 +1,83 @@
-// What a sample of the map adds to the irradiance: B = E + ρ(H + a) of the texel that it sees, times its delta form factor. [Cohen85]
-#include "common/atlas.glsl"
-#include "common/albedo.glsl"
-#include "common/ambient.glsl"
-#include "common/exitance.glsl"
-#include "common/item.glsl"
-#include "common/texel_at.glsl"
-#include "visibility/projections/hemicube.glsl"
+// What a ray of a node brings of its irradiance [W/m²]: B of what it meets, and light of a point on a lamp,
+//
+//     H'(x) = ∫ B(y) cos θ dω / π     two estimates of what comes from lamps, weighed by the balance heuristic [Veach95]
+//
+// Lamps are chosen by the power of their triangles, points on them evenly.
+#include "estimate/node.glsl"
+#include "estimate/surface.glsl"
 
-uniform usampler2D t_normal_ids;
-uniform sampler2D t_materials;
-uniform sampler2D t_irradiance;
-uniform float u_unit;  // W/m² per stored unit
+uniform sampler2D t_lamps;  // a triangle each: share of the power up to it, slot
+uniform int u_lamps;
+uniform float u_power;  // Σ strength · area of them [W/m² · solver space]
 
-in vec4 v_uv;
-flat in ivec2 v_view;
+layout(location = 0) out vec4 out_light;  // a: mean of its colours, of what comes from lamps without a bounce
 
-layout(location = 0) out vec4 out_irradiance;  // [W/m²]
+const int LAMP_BITS = 10;  // 2^LAMP_BITS of them lie in a row
 
-vec3 radiosity_at(vec2 uv) {
-    ivec2 px = texel_px_at(uv);
-    if (px.y < 0) return vec3(0.0);
-    uint ids = texelFetch(t_normal_ids, px, 0).y;
-    if (facet_from_ids(ids) == 0u) return vec3(0.0);
-    uint material = material_from_ids(ids);
-    vec3 H = texelFetch(t_irradiance, px, 0).rgb;
-    return exitance_of(t_materials, material, px) + albedo_of(t_materials, material, px) * (H + ambient_of(H)) * u_unit;
+vec2 lamp(int i) { return texelFetch(t_lamps, ivec2(i & ((1 << LAMP_BITS) - 1), i >> LAMP_BITS), 0).xy; }
+
+// The first lamp whose share of the power reaches u.
+int lamp_slot(float u) {
+    int low = 0, high = u_lamps - 1;
+    while (low < high) {
+        int middle = (low + high) / 2;
+        if (lamp(middle).x < u) low = middle + 1;
+        else high = middle;
+    }
+    return int(lamp(low).y);
+}
+
+struct Corners { vec3 a, b, c; };
+
+Corners corners_of(int slot) {
+    ivec2 px = entry_px(slot, 3);
+    return Corners(
+        texelFetch(t_bvh_triangles, px, 0).xyz,
+        texelFetch(t_bvh_triangles, px + ivec2(1, 0), 0).xyz,
+        texelFetch(t_bvh_triangles, px + ivec2(2, 0), 0).xyz
+    );
+}
+
+vec3 normal_of(Corners t) { return normalize(cross(t.b - t.a, t.c - t.a)); }
+
+// The density per solid angle with which a point on a lamp is chosen, from so far away.
+float lamp_density(float strength, float distance, float cosine) {
+    return strength / u_power * distance * distance / max(abs(cosine), 1e-9);
+}
+
+vec4 along_cosine(Node node, int ray) {
+    vec3 direction = direction_of(node, ray);
+    Hit hit = closest_hit(node.origin, direction, 0.0, REACH);
+    if (hit.slot < 0) return vec4(0.0);
+    Surface seen = surface_of(hit);
+    float here = dot(direction, node.normal) / PI;
+    float other = lamp_density(seen.strength, hit.distance, dot(normal_of(corners_of(hit.slot)), direction));
+    vec3 E = seen.exitance * (here / (here + other));
+    return vec4(E + seen.albedo * seen.irradiance, dot(E, vec3(1.0 / 3.0)));
+}
+
+vec4 from_lamp(Node node, int ray) {
+    vec3 u = fract(node.lamp_shift + float(ray) * R3);
+    int slot = lamp_slot(u.x);
+    Corners t = corners_of(slot);
+    vec3 normal = normal_of(t);
+    float r = sqrt(u.y);
+    vec2 weights = r * vec2(1.0 - u.z, u.z);
+    vec3 y = t.a + (t.b - t.a) * weights.x + (t.c - t.a) * weights.y;
+    bool front = dot(node.origin - y, normal) > 0.0;
+    y += (front ? 2.0 : -2.0) * COPLANAR * normal;
+    vec3 away = y - node.origin;
+    float distance = length(away), cosine = dot(away, node.normal) / distance;
+    if (!(cosine > 0.0)) return vec4(0.0);
+    Surface seen = surface_of(Hit(distance, slot, weights, front));
+    if (seen.exitance == vec3(0.0) || any_hit(node.origin, away, 0.0, 1.0)) return vec4(0.0);
+    float here = cosine / PI;
+    vec3 E = seen.exitance * (here / (here + lamp_density(seen.strength, distance, dot(normal, away) / distance)));
+    return vec4(E, dot(E, vec3(1.0 / 3.0)));
 }
 
 void main() {
-    vec2 uv = gl_FrontFacing ? v_uv.xy : v_uv.zw;  // negative where a side has no texels: it is black, or nothing lies before it
-    float share = delta_form_factor(v_view.x, gl_FragCoord.xy - vec2(0.0, float(v_view.y) * MAP_PX.y));
-    out_irradiance = vec4(uv.x < 0.0 ? vec3(0.0) : radiosity_at(uv) * share, 0.0);
-    gl_FragDepth = 1.0 / (gl_FragCoord.w * FAR);  // linear, as in the maps of shooters
+    Node node = node_of(int(gl_FragCoord.y));
+    int ray = int(gl_FragCoord.x);
+    out_light = along_cosine(node, ray) + from_lamp(node, ray);
 }

@@ -6,9 +6,6 @@
 // origin. Edges are decided there by the sign of a difference of two products, which rounding can turn to zero, never to its
 // opposite, and which is the same but for its sign for both triangles of an edge; zero is inside. Boxes: a hit that the triangle
 // test finds may be three roundings outside of its box [Ize13]; BOX_FAR allows for eight.
-//
-// [Woop13] S. Woop, C. Benthin, I. Wald, Watertight ray/triangle intersection, JCGT 2(1), 2013.
-// [Ize13] T. Ize, Robust BVH ray traversal, JCGT 2(2), 2013.
 #define STACK    // entries: levels of inner nodes in the tree
 #define BOX_GRID  // 1: boxes are of whole cells of a grid, in half the texels, 0: of floats
 
@@ -24,7 +21,7 @@ struct Hit {
 };
 
 const int ROW_BITS = 10;  // 2^ROW_BITS nodes, or slots, lie in a row of their texture
-const int COUNT_BITS = 3;  // of a leaf's count, on the stack
+const int COUNT_BITS = 3;  // of a leaf's count, in its name
 const float BOX_FAR = 1.0 + 1.0 / 2097152.0;  // 4 ulp
 const float LEAST = 1e-24;  // of a component of the direction: 0 times its inverse is 0, and a box's margin times it is beyond all
 
@@ -34,7 +31,7 @@ ivec2 entry_px(int entry, int texels) { return ivec2((entry & ((1 << ROW_BITS) -
 struct Shear {
     bool first, second;  // whether the first, the second axis is the third one here; the next ones then are the first and second
     vec2 slope;
-    float inverse;  // of the component; where it is negative, first and second axis change places, so that no side does
+    float inverse;  // of the component; where it is negative, left and right have changed places
 };
 
 vec3 turned(Shear shear, vec3 v) { return shear.first ? v.yzx : shear.second ? v.zxy : v; }
@@ -52,7 +49,7 @@ Shear shear_along(vec3 direction) {
 vec3 sheared(Shear shear, vec3 v) {
     v = turned(shear, v);
     precise vec3 s = vec3(v.xy - shear.slope * v.z, v.z * shear.inverse);
-    return shear.inverse < 0.0 ? s.yxz : s;
+    return s;
 }
 
 float edge(vec2 p, vec2 q) {
@@ -68,10 +65,12 @@ void meet(inout Hit hit, int slot, vec3 origin, Shear shear, float nearest) {
     vec3 c = sheared(shear, texelFetch(t_bvh_triangles, px + ivec2(2, 0), 0).xyz - origin);
     vec3 sides = vec3(edge(c.xy, b.xy), edge(a.xy, c.xy), edge(b.xy, a.xy));
     float sum = sides.x + sides.y + sides.z;  // 0: seen edge-on, or degenerate
-    bool inside = sum > 0.0 ? all(greaterThanEqual(sides, vec3(0.0))) : sum < 0.0 && all(lessThanEqual(sides, vec3(0.0)));
+    float least = min(sides.x, min(sides.y, sides.z)), most = max(sides.x, max(sides.y, sides.z));
+    bool inside = sum != 0.0 && (least >= 0.0 || most <= 0.0);
     sides /= sum;
     float distance = dot(sides, vec3(a.z, b.z, c.z));
-    if (inside && distance >= nearest && distance < hit.distance) hit = Hit(distance, slot, sides.yz, sum > 0.0);
+    if (inside && distance >= nearest && distance < hit.distance)
+        hit = Hit(distance, slot, sides.yz, (sum > 0.0) == (shear.inverse > 0.0));
 }
 
 // (first, last) distance within a box; it is met where first <= last.

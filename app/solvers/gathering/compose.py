@@ -14,6 +14,7 @@ from app.gpu import Framebuffer, Gpu, Pass, ReadBack, Texture
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
 from app.solvers.gathering.origins import Origins
+from app.visibility.rays import RayScene
 
 RADIUS = 4  # of the window that indirect light is smoothed over, in points
 
@@ -24,7 +25,9 @@ class Compose:
     indirect: of the points [stored units], a: variance of the mean of RGB. variance: of H of the lightmap, of the mean of RGB.
     """
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, origins: Origins, points: Lightmap, at: Origins) -> None:
+    def __init__(
+        self, gpu: Gpu, lightmap: Lightmap, origins: Origins, points: Lightmap, at: Origins, rays: RayScene
+    ) -> None:
         """origins: of the lightmap's texels; at: of the points."""
         self._gpu, self._lightmap, self._origins, self._points, self._at = gpu, lightmap, origins, points, at
         reads = lightmap.defines("MATERIAL_BITS", "TILE")
@@ -41,7 +44,24 @@ class Compose:
         self._indirect_target = gpu.target(self.indirect)
         self._target: Framebuffer | None = None
         self._of: Texture | None = None
+        self._walls = self._look_for_walls(rays)
         self._fit()
+
+    def _look_for_walls(self, rays: RayScene) -> Texture:
+        """What stands between points, see walls.frag.glsl."""
+        walls = self._gpu.texture(self._points.size, 2, "f1")
+        target = self._gpu.target(walls)
+        look = Pass(
+            self._gpu,
+            "solvers/gathering/walls",
+            defines=self._points.defines("MATERIAL_BITS", "TILE") | dict(rays.defines),
+        )
+        known = self._at.textures | self._points.textures("t_pages") | dict(rays.textures)
+        unread = "t_bvh_uv", "t_facets", "t_normal_ids"
+        textures = {name: texture for name, texture in known.items() if name not in unread}
+        look.draw(target, textures=textures, uniforms=self._places)
+        self._gpu.release_all(target)
+        return walls
 
     def _fit(self) -> None:
         self.variance = self._gpu.texture(self._lightmap.size, 1, "f4")
@@ -50,7 +70,7 @@ class Compose:
 
     def smooth(self, gathered: Texture, rays: int, *, smooth: bool) -> None:
         """Bring ``indirect`` up to date with what so many rays of each point have gathered."""
-        textures = {"t_gathered": gathered, "t_origin_normal": self._at.normals}
+        textures = {"t_gathered": gathered, "t_origin_normal": self._at.normals, "t_walls": self._walls}
         textures |= self._points.textures("t_pages", "t_leaves")
         uniforms = {"u_rays": float(max(rays, 1))} | self._places
         self._aim.draw(self._pilot_target, textures=textures, uniforms=uniforms)
@@ -67,7 +87,8 @@ class Compose:
         textures, uniforms = {"t_direct": direct, "t_indirect": self.indirect}, {}
         if self._finer:
             textures |= {"t_own_leaves": lightmap.texture("t_leaves"), "t_own_normal": self._origins.normals}
-            textures |= {"t_origin_normal": self._at.normals} | self._points.textures("t_pages", "t_leaves")
+            textures |= {"t_origin_normal": self._at.normals, "t_walls": self._walls}
+            textures |= self._points.textures("t_pages", "t_leaves")
             uniforms = self._places
         self._compose.draw(self._target, textures=textures, uniforms=uniforms)
 
@@ -96,7 +117,7 @@ class Compose:
     def release(self) -> None:
         self._forget_target()
         self._gpu.release_all(self._noise_target, self._noise, self.variance, self._indirect_target, self.indirect)
-        self._gpu.release_all(self._pilot_target, self._pilot)
+        self._gpu.release_all(self._pilot_target, self._pilot, self._walls)
 
 
 def noise_of(judged: ReadBack) -> tuple[float, float]:

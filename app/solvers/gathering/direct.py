@@ -184,9 +184,9 @@ class DirectLight:
         for lamps in sets:
             self.add(lamps)
 
-    def catch_up(self) -> Iterator[None]:
-        """The shadow rays to sets that came later, as many as the others have had, in parts."""
-        wanted = max((lit.count for lit in self.sets), default=0)
+    def catch_up(self, first: int) -> Iterator[None]:
+        """The shadow rays to sets that came later, as many as the others have had, or ``first``, in parts."""
+        wanted = self.count or first
         for lit in self.sets:
             while lit.count < wanted:
                 self._shoot_at(lit, PASS)

@@ -90,8 +90,10 @@ def lamp_set(pool: TilePool, scene: Scene, materials: tuple[int, ...]) -> LampSe
 def chances(pool: TilePool, lamps: LampSet) -> F32:
     """(slots, n) f32, summed up along lamps, the last 1: the probability with which the shadow rays of a tile choose each lamp.
 
-    In proportion to a bound of what it may give to any texel of the tile: its power, times the largest cosine at the lamp, over
-    the least squared distance, which is not taken as less than the lamp's own area. One row, by power, where there are too many.
+    Half of them in proportion to a bound of what it may give to any texel of the tile: its power, times the largest cosine at the
+    lamp, over the least squared distance, which is not taken as less than the lamp's own area. The other half by its mean squared
+    distance instead: many small lamps that are near to one texel each would leave few rays to a large one that all texels see.
+    One row, by power, where there are too many.
     """
     area = lamps.rows[:, 0, 3].astype(np.float64)
     weight = np.maximum(area * lamps.strength, 1e-300)
@@ -113,9 +115,11 @@ def chances(pool: TilePool, lamps: LampSet) -> F32:
         height = np.where(lamps.rows[:, 1, 3] > 0, np.abs(height), height) + reach
         near = np.maximum(distance - reach, 0.0)
         cosine = np.clip(height / np.maximum(distance, 1e-30), 0.0, 1.0)
-        bound = weight * cosine / np.maximum(near**2, area)
-        bound[~(bound.sum(1) > 0)] = weight  # behind all lamps: no light comes, whatever is chosen
-        out[part] = _summed_up(bound)
+        most = weight * cosine / np.maximum(near**2, area)
+        mean = weight * cosine / (distance**2 + radius[part, None] ** 2 + area)
+        behind = ~(most.sum(1) > 0)  # all lamps: no light comes, whatever is chosen
+        most[behind] = mean[behind] = weight
+        out[part] = (_summed_up(most) + _summed_up(mean)) / 2
     return out
 
 

@@ -63,7 +63,7 @@ class Gathering:
         self.direct = DirectLight(gpu, lightmap, self.rays, self.origins)
         self.at_points = DirectLight(gpu, self.points, self.rays, self._at) if adaptive else self.direct
         self.bounces = Bounces(gpu, self.points)
-        self._compose = Compose(gpu, lightmap, self.origins, self.points, self._at)
+        self._compose = Compose(gpu, lightmap, self.origins, self.points, self._at, self.rays)
         self._balance = Balance(gpu, self.points)
         self._inspectable = Inspectable(gpu, lightmap, self.points, self._at, self.hits, self._directs, self._compose)
         self._under_way: Generator[None, None, int] | None = None
@@ -101,7 +101,7 @@ class Gathering:
             yield from direct.shoot(self._shadow_rays(count))
             direct.sum(self.lightmap.scene)
         self.issued = first + count
-        if first < SYSTEM or (first & (first - 1)) == 0:
+        if first < SYSTEM or first.bit_length() < self.issued.bit_length():  # twice as many as at the last time
             yield from self._solve(first == 0)
         else:
             yield from self.bounces.gather(self.hits, first, count, anew=False)
@@ -168,7 +168,7 @@ class Gathering:
         while self._edited:
             self._edited = False
             for direct in self._directs:
-                yield from direct.catch_up()
+                yield from direct.catch_up(SHADOW_RAYS * self.issued // FIRST)
                 direct.sum(self.lightmap.scene)
             few = min(BATCH, self.issued)
             yield from self.bounces.solve(self.hits, self.at_points.light, few, FIRST_STEPS)
@@ -258,7 +258,10 @@ class Gathering:
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the whole new solution, along the rays that are there."""
+        before = self.lightmap.emitted
         self.lightmap.set_materials(materials)
+        if (self.lightmap.emitted < before / 2).any():
+            self.bounces.clear()  # a thousandth of much light may be more than all of little
         if not self.issued:
             self.reset()
             return

@@ -9,7 +9,7 @@ from app.visibility.projections import PROJECTIONS
 
 MAX_LEVEL = 4  # of the patches that shoot: 16×16 texels
 FORM_FACTORS = ("polygon", "disc")
-VISIBILITIES = ("item-id", "depth", "combined")  # in the order of VISIBILITY in shooting/visible.glsl
+VISIBILITIES = ("item-id", "depth", "combined")  # in the order of VISIBILITY in visibility/visible.glsl
 
 
 def highest_level(tile: int) -> int:

@@ -22,8 +22,8 @@ MEANINGS = {
     "error": "How far the irradiance of each texel is from the reference, over the reference: X",
 }
 EXPECTED = (
-    "Of irradiance, with no reference: what random points of the surfaces receive of all that they see now, gathered by "
-    "hemicubes, against what the texels have there"
+    "Of irradiance, with no reference: what random points of the surfaces receive of all that they see now, gathered "
+    "along rays, against what the texels have there, and what comes back of the difference"
 )
 FINER = (
     "The scene as it is now is solved once more, with more texels and further, in a process of its own. That shows what texels, "

@@ -69,8 +69,6 @@ def _leaves(state: State) -> None:
     widgets.tooltip(f"Of the {stats.uniform_texels:,} texels that the finest level everywhere would take")
     if stats.refining:
         widgets.dim("leaves are changing")
-    elif stats.note is not None:
-        widgets.wrapped(stats.note, theme.AMBER)
 
 
 def _buttons(view: View, state: State, *, done: bool) -> None:
@@ -114,6 +112,8 @@ def _progress(view: View, state: State) -> None:
     rate = f", {widgets.number(stats.per_second, 3)}/s" if state.measured and not stats.converged else ""
     imgui.same_line()
     right(f"{stats.done:,} {stats.unit}{rate}", theme.DIM)
+    if stats.note is not None and not stats.refining:
+        widgets.wrapped(stats.note, theme.AMBER)
     if stats.edit_work is not None:
         fresh = "" if stats.fresh_work is None else f", from nothing {stats.fresh_work:,}"
         widgets.dim(f"the edit: {stats.edit_work:,} {stats.unit}{fresh}")

@@ -48,12 +48,13 @@ void main() {
         vec3 way = point_on(lamp, normal, from, vec2(rest, share.y), area) - from;
         float side = dot(way, normal) < 0.0 ? 1.0 : -1.0;
         if (side < 0.0 && !lamp.two_sided) continue;
-        way += 2.0 * COPLANAR * side * normal;  // off the lamp's own surface
-        float r2 = dot(way, way), r = sqrt(r2);
+        float r2 = dot(way, way);
         float cosines = dot(way, o.normal) * abs(dot(way, normal));
         if (cosines <= 0.0 || probability <= 0.0) continue;
         float w = cosines * area / (PI * r2 * r2 * probability);
         all += w;
+        way += 2.0 * COPLANAR * side * normal;  // off the lamp's own surface
+        float r = length(way);
         if (!any_hit(from, way / r, 0.0, r)) seen += w * lamp.exitance;
     }
 #if CLOSED_FORM

@@ -20,6 +20,7 @@ int lamp_count() { return textureSize(t_lamps, 0).y; }
 // What is seen under a smaller solid angle [sr] is alike all over: a point is chosen evenly on its area. Rounding of angles,
 // 1e-6, is less than a ten-thousandth of any larger one.
 const float SMALL = 0.02;
+const float INSIDE = 1e-6;  // of a lamp's edge, that a point on it keeps from its rim
 
 // A point on a lamp, and ``area``: one over the density of such points there. Evenly within the solid angle under which the lamp
 // is seen [Arvo95], or it is missed where it is near.
@@ -43,5 +44,10 @@ vec3 point_on(Lamp lamp, vec3 normal, vec3 from, vec2 share, out float area) {
     if (abs(cosine) < 1e-6) return to;
     float r = height / cosine;
     area = solid * r * r / abs(cosine);
-    return from + r * direction;
+    // seen at a grazing angle, rounding might put it beyond an edge, and there behind the next wall
+    vec3 at = from + r * direction - lamp.corner;
+    vec2 along_uv = vec2(dot(cross(at, lamp.v), normal), dot(cross(lamp.u, at), normal)) / (2.0 * lamp.area);
+    along_uv = max(along_uv, vec2(INSIDE));
+    along_uv *= min((1.0 - INSIDE) / (along_uv.x + along_uv.y), 1.0);
+    return lamp.corner + along_uv.x * lamp.u + along_uv.y * lamp.v;
 }

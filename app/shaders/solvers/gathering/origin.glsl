@@ -1,10 +1,11 @@
 // Where rays of a texel start: anywhere on its square where one flat surface fills it, so that the mean over its rays is that over
 // its area; else in the middle of the surface that it covers.
 #include "common/atlas.glsl"
+#include "common/hemisphere.glsl"
 #include "common/item.glsl"
 #include "common/leaves.glsl"
+#include "common/sequence.glsl"
 #include "common/tile.glsl"
-#include "solvers/gathering/sequence.glsl"
 
 uniform sampler2D t_origin;  // point, solver space; w: 0 nothing here, 1 that point, 2 all of the square around it
 uniform usampler2D t_origin_normal;
@@ -44,18 +45,6 @@ Origin load_origin(ivec2 texel_px) {
 }
 
 vec3 start_of(Origin o, vec2 share) { return o.position + (share.x - 0.5) * o.u + (share.y - 0.5) * o.v; }
-
-// Unit vectors square to a normal. [Duff17]
-mat3 frame_of(vec3 n) {
-    float s = n.z >= 0.0 ? 1.0 : -1.0, a = -1.0 / (s + n.z), b = n.x * n.y * a;
-    return mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n);
-}
-
-// Distributed as the cosine: what such rays see is to be averaged, and that is the irradiance over π.
-vec3 cosine_direction(vec3 normal, vec2 share) {
-    float r = sqrt(share.x), phi = 2.0 * PI * share.y;
-    return frame_of(normal) * vec3(r * cos(phi), r * sin(phi), sqrt(max(1.0 - share.x, 0.0)));
-}
 
 const uint GATHER = 0u;  // stream of random numbers
 

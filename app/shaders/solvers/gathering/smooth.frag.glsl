@@ -10,23 +10,24 @@ uniform float u_rays;
 
 layout(location = 0) out vec4 out_indirect;  // a: variance of the mean of RGB
 
+vec2 own;
+vec3 sum = vec3(0.0);
+float count = 0.0;
+
+void visit(ivec2 px) {
+    vec2 other = texelFetch(t_pilot, px, 0).xy;
+    float apart = other.x - own.x;
+    if (apart * apart > DEVIATIONS * DEVIATIONS * (own.y + other.y)) return;
+    sum += texelFetch(t_gathered, px, 0).rgb;
+    count += 1.0;
+}
+
 void main() {
     ivec2 own_px = ivec2(gl_FragCoord.xy);
     Window w = window_at(own_px);
     out_indirect = vec4(texelFetch(t_gathered, own_px, 0).rgb / u_rays, 0.0);
     if (w.chart == NO_CHART) return;
-    vec2 own = texelFetch(t_pilot, own_px, 0).xy;
-    vec3 sum = vec3(0.0);
-    float count = 0.0;
-    for (int j = -RADIUS; j <= RADIUS; ++j)
-        for (int i = -RADIUS; i <= RADIUS; ++i) {
-            ivec2 px = beside(w, ivec2(i, j));
-            if (px.y < 0) continue;
-            vec2 other = texelFetch(t_pilot, px, 0).xy;
-            float apart = other.x - own.x;
-            if (apart * apart > DEVIATIONS * DEVIATIONS * (own.y + other.y)) continue;
-            sum += texelFetch(t_gathered, px, 0).rgb;
-            count += 1.0;
-        }
+    own = texelFetch(t_pilot, own_px, 0).xy;
+    walk(w);
     out_indirect = vec4(sum / (count * u_rays), own.y * 9.0 / count);
 }

@@ -1,8 +1,9 @@
-// The points around a point, of the same chart and facing the same way.
+// The points around a point, of the same chart and facing the same way, to which no wall stands in the way.
 #include "common/atlas.glsl"
 #include "common/texel_at.glsl"
 
 uniform usampler2D t_origin_normal;  // and the chart
+uniform sampler2D t_walls;            // see walls.frag.glsl
 
 const uint NO_CHART = 0xFFFFFFFFu;
 const float COS_ALIKE = 0.94;  // 20°
@@ -30,4 +31,35 @@ ivec2 beside(Window w, ivec2 step) {
     if (there.y < 0) return ivec2(-1);
     uvec2 other = texelFetch(t_origin_normal, there, 0).xy;
     return other.y == w.chart && dot(normal_from_octahedral(other.x), w.normal) >= COS_ALIKE ? there : ivec2(-1);
+}
+
+// Whether a wall stands between a point and the one a step (along one axis) from it.
+bool walled(ivec2 px, ivec2 next_px, ivec2 step) {
+    vec2 walls = texelFetch(t_walls, step.x + step.y > 0 ? px : next_px, 0).rg;
+    return (step.x != 0 ? walls.r : walls.g) > 0.5;
+}
+
+void visit(ivec2 px);
+
+// Visit every point of the window, RADIUS wide either way, to which a way along v and then along u leads.
+void walk(Window w) {
+    for (int up = -1; up <= 1; up += 2) {
+        ivec2 row_px = w.px;
+        for (int j = up < 0 ? -1 : 0; abs(j) <= RADIUS; j += up) {
+            if (j != 0) {
+                ivec2 next = beside(w, ivec2(0, j));
+                if (next.y < 0 || walled(row_px, next, ivec2(0, up))) break;
+                row_px = next;
+            }
+            visit(row_px);
+            for (int along = -1; along <= 1; along += 2) {
+                ivec2 px = row_px;
+                for (int i = along; abs(i) <= RADIUS; i += along) {
+                    ivec2 next = beside(w, ivec2(i, j));
+                    if (next.y < 0 || walled(px, next, ivec2(along, 0))) break;
+                    visit(px = next);
+                }
+            }
+        }
+    }
 }

@@ -8,7 +8,7 @@
 #include <projection>
 #include "solvers/shooting/shooter_block.glsl"
 #include "solvers/shooting/form_factor.glsl"
-#include "solvers/shooting/visible.glsl"
+#include "visibility/visible.glsl"
 
 flat in uint v_shots;  // a bit for each shot that may light this receiver
 #if PLANAR

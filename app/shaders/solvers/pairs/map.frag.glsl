@@ -1,0 +1,3 @@
+// What some senders see.
+#include <fragment>
+#include "visibility/draw_map.glsl"
