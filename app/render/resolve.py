@@ -84,7 +84,7 @@ class DisplayTexels:
         scale: Scale | None,
         whole: bool,
         reference: Reference | None = None,
-        offered: Mapping[str, Texture],
+        offered: Mapping[str, Texture] | None = None,
         instead: bool = False,
     ) -> dict[str, Texture]:
         """Bring the display texels up to date; the textures that surfaces bind.
@@ -103,7 +103,7 @@ class DisplayTexels:
         }
         textures = self._tables | lightmap.textures(*LAYER_TABLES)
         textures |= {"t_light": lightmap.texture(layer.light)} if layer.light else {}
-        textures |= {"t_offered": offered[layer.offered]} if layer.offered else {}
+        textures |= {"t_offered": (offered or {})[layer.offered]} if layer.offered else {}
         if reference is not None:
             textures["t_reference"], uniforms["u_dark"] = reference
         if reference is not None and instead:

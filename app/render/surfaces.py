@@ -55,7 +55,7 @@ class Surfaces:
         whole: see ``DisplayTexels.resolve``; else one of many, in which new leaves shine.
         """
         self._live = not whole
-        wanted: dict[str, Any] = {"scale": scale, "reference": reference, "offered": offered or {}}
+        wanted: dict[str, Any] = {"scale": scale, "reference": reference, "offered": offered}
         shown: list[tuple[dict[str, Texture], Part]] = []
         left, right = _parts(layer_name, display, reference, target.size)
         if right is not None and reference is not None:
