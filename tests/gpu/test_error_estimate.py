@@ -430,3 +430,16 @@ def test_nothing_of_it_stays(gpu: Gpu, session: Session, forgotten: Callable[[],
         session.open_now("cornell-box")
     assert held(gpu) == before and not forgotten()
     session.release()
+
+
+def test_a_solve_ends_at_a_stated_error(gpu: Gpu) -> None:
+    """Once the error that it expects is as little as asked for, and well before it would converge."""
+    session = Session(gpu, solver="gathering", atlas=AtlasOptions(texels=2000))
+    session.open_now("cornell-box")
+    session.solve(Stop(error=0.05))
+    assert session.expected is not None and session.expected.median <= 0.05
+    assert not session.run.converged
+    done = session.solver.issued
+    session.solve(Stop(rms=1e-4, work=done + 16))
+    assert session.solver.issued == done + 16, "what is never reached does not end it"
+    session.release()

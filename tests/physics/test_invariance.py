@@ -8,12 +8,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from solver_scenes import EVERY_SOLVER, Solution, begin, quads_scene, solve, table_room
+from solver_scenes import EVERY_SOLVER, FAST, Solution, begin, quads_scene, solve, table_room
 
 from app.gpu import Gpu
 from app.scene.model import F64, Scene
 from app.scene.shapes import transform
-from app.solvers import SOLVERS
 
 DENSITY = 8.0  # texels/m: every edge of the room is whole patches
 # Patches of two texels: with four, as far from the lamp as they are wide, it is chance which of those that mirror each other
@@ -89,7 +88,7 @@ def solved(gpu: Gpu, scene: Scene, density: float, solver: str) -> Solution:
 @pytest.fixture(scope="module")
 def plain(_gpu: Gpu) -> Iterator[dict[str, Solution]]:
     """By solver."""
-    solutions = {solver: solved(_gpu, table_room(), DENSITY, solver) for solver in SOLVERS}
+    solutions = {solver: solved(_gpu, table_room(), DENSITY, solver) for solver in FAST}
     yield solutions
     for solution in solutions.values():
         solution.release()
