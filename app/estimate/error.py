@@ -29,7 +29,6 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.probe import Probe
 from app.reference.metrics import DARK
 from app.scene.model import F64
-from app.visibility.bvh import Bvh
 
 SURVEYED, POINTS, SEED = 8192, 768, 7  # points that are even in area, and those of them that are looked from in earnest
 FEW_RAYS = 64  # from each that is surveyed
@@ -61,16 +60,13 @@ class _Nodes(NamedTuple):
 
 
 class ErrorEstimator:
-    """Estimates the error of one lightmap, from so many nodes (``nodes``) at a time. tree: of the scene's triangles, where it was
-    built before. Whoever makes it releases it."""
+    """Estimates the error of one lightmap, from so many nodes (``nodes``) at a time. Whoever makes it releases
+    it."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, nodes: int, tree: Bvh | None = None) -> None:
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, nodes: int) -> None:
         self._gpu, self._lightmap, self._at_once = gpu, lightmap, nodes
         self._candidates = random_points(lightmap.scene, SURVEYED, SEED)
-        self._probe, self._gather = (
-            Probe(gpu, lightmap, self._candidates),
-            RayGather(gpu, lightmap, TURNS * nodes, tree),
-        )
+        self._probe, self._gather = Probe(gpu, lightmap, self._candidates), RayGather(gpu, lightmap, TURNS * nodes)
 
     def parts(self, seconds: float) -> Generator[float, None, ErrorEstimate | None]:
         """Look, some nodes in each part; yields the share done. After so many seconds FEWEST are enough. None where no point is

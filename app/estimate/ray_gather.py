@@ -18,7 +18,6 @@ from app.gpu import Gpu, Pass, ReadBack, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import upload, write_table
 from app.scene.model import F32, F64
-from app.visibility.bvh import Bvh
 from app.visibility.rays import ENTRIES_A_ROW, RayScene, corners_of
 
 RAYS = 512  # of a row, and as many to lamps
@@ -43,9 +42,9 @@ class Ends(NamedTuple):
 class RayGather:
     """Looks from up to ``rows`` rows at once, into one lightmap. Whoever makes it releases it."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, rows: int, tree: Bvh | None = None) -> None:
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, rows: int) -> None:
         self._gpu, self._lightmap, self.rows = gpu, lightmap, rows
-        self._rays = RayScene(gpu, lightmap.pool, tree)
+        self._rays = RayScene(gpu, lightmap.pool)
         self._slot = np.argsort(self._rays.bvh.order)  # of each triangle
         corners = corners_of(lightmap.pool)
         self._area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2

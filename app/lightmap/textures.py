@@ -146,29 +146,20 @@ class LightTextures:
 
     def moved(self, texture: Texture, moves: Moves) -> Texture:
         """With the texels of all leaves where they are now, and nothing in new slots, in place of the texture."""
+        pool, kind = self.pool, {"INTEGER": texture.dtype == "u4"}
         empty = bytes(self.size[0] * self.size[1] * texture.components * BYTES[texture.dtype])
         fresh = self.gpu.texture(self.size, texture.components, texture.dtype, empty)
         target = self.gpu.target(fresh)
-        self.move(texture, target, self.move_rects(moves))
-        self.gpu.release_all(target, texture)
-        return fresh
-
-    def move_rects(self, moves: Moves) -> F32:
-        """(n, 6) f32 instances of QUAD_FORMAT: where the texels of all leaves go, and where they come from."""
-        pool = self.pool
         whole, rest = (pool.tile * part for part in divmod(moves.staying, pool.columns))  # rows, and a part of one
         staying = [(0, 0, self.size[0], whole, 0, 0), (0, whole, rest, pool.tile, 0, whole)]
         moved = quads(pool.corners(moves.new), pool.tile, pool.corners(moves.old))
-        return np.concatenate([np.array(staying, np.float32), moved])
-
-    def move(self, texture: Texture, target: Framebuffer, rects: F32) -> None:
-        """Copy rectangles (n, 6) of a texture into a target of the same type."""
-        kind = {"INTEGER": texture.dtype == "u4"}
+        rects = np.concatenate([np.array(staying, np.float32), moved])
         mesh = Mesh(self.gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)
         Pass(self.gpu, "lightmap/move", defines=kind, vertex="common/rects").draw(
-            target, textures={"t_source": texture}, uniforms={"u_size": target.size}, mesh=mesh
+            target, textures={"t_source": texture}, uniforms={"u_size": self.size}, mesh=mesh
         )
-        self.gpu.release_all(mesh)
+        self.gpu.release_all(target, mesh, texture)
+        return fresh
 
     @property
     def columns(self) -> int:

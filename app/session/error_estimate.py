@@ -8,8 +8,8 @@ from app.estimate.error import ErrorEstimate, ErrorEstimator
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.util.background import BackgroundTask
-from app.visibility.bvh import Bvh, build_bvh
-from app.visibility.rays import corners_of
+from app.visibility.bvh import Bvh
+from app.visibility.rays import tree_of
 
 SECONDS = 10.0  # that are spent on it, unless fewer points would be too few
 NODES = 32  # per part: 20 ms of a Cornell box in software
@@ -41,15 +41,17 @@ class RunningEstimate:
         """Some points of the light in this state; of another state than the last one's from the first point on. The first of a
         scene need a tree of its triangles, which is built in the background; wait: for that."""
         if self._tree is None:
-            corners = corners_of(lightmap.pool)
-            self._tree = BackgroundTask("the error estimate", lambda tell: build_bvh(corners, lambda s: tell("", s)))
+            self._tree = BackgroundTask(
+                "the error estimate", lambda tell: tree_of(lightmap.pool, lambda share: tell("", share))
+            )
         if self._of != state:
             if not (wait or self._tree.ended):
                 return
             self.changed()
             if self._expectation is None:
                 nodes = NODES if len(lightmap.scene.triangles) < MANY else NODES // 4
-                self._expectation = ErrorEstimator(self._gpu, lightmap, nodes, self._tree.result)
+                _ = self._tree.result  # waited for, if need be
+                self._expectation = ErrorEstimator(self._gpu, lightmap, nodes)
             self._of, self._parts = state, self._expectation.parts(self.seconds)
         elif self._parts is not None:
             try:

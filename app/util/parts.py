@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Generator
 from typing import TypeVar
 
@@ -15,3 +16,8 @@ def run_to_end(parts: Generator[object, None, ResultT]) -> ResultT:
             next(parts)
         except StopIteration as end:
             return end.value  # type: ignore[no-any-return]  # StopIteration does not know it
+
+
+def is_running(parts: Generator[object, None, object]) -> bool:
+    """Whether a part is being done right now, and so asks: it cannot be ended then."""
+    return inspect.getgeneratorstate(parts) == inspect.GEN_RUNNING

@@ -10,7 +10,10 @@ All is in the solver space (radius 1), in tables of ENTRIES_A_ROW entries a row:
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -21,6 +24,8 @@ from app.scene.model import F32, F64
 from app.visibility.bvh import Bvh, build_bvh
 from app.visibility.bvh_table import Words, node_table
 
+_TREES: WeakKeyDictionary[TilePool, Bvh] = WeakKeyDictionary()
+_LOCK = threading.Lock()
 ENTRIES_A_ROW = 1 << int(glsl_constant("visibility/rays.glsl", "ROW_BITS"))
 
 
@@ -31,12 +36,11 @@ class RayScene:
     Raises UserError where there are more triangles than a float counts.
     """
 
-    def __init__(self, gpu: Gpu, pool: TilePool, bvh: Bvh | None = None) -> None:
-        """bvh: of ``corners_of(pool)``, where it was built before."""
+    def __init__(self, gpu: Gpu, pool: TilePool) -> None:
         corners = corners_of(pool)
         if len(corners) > MAX_FACETS:
             raise UserError(f"{len(corners)} triangles: rays can be traced among {MAX_FACETS}")
-        self.bvh = bvh or build_bvh(corners)
+        self.bvh = tree_of(pool)
         self._gpu = gpu
         triangles = np.zeros((len(corners), 3, 4), np.float32)
         triangles[..., :3] = corners[self.bvh.order]
@@ -57,6 +61,15 @@ class RayScene:
 
     def release(self) -> None:
         self._gpu.release_all(*self.textures.values())
+
+
+def tree_of(pool: TilePool, tell: Callable[[float], None] | None = None) -> Bvh:
+    """The tree of ``corners_of(pool)``, built once for each pool, by whoever asks first: any thread may. tell: see
+    ``build_bvh``."""
+    with _LOCK:
+        if pool not in _TREES:
+            _TREES[pool] = build_bvh(corners_of(pool), tell)
+        return _TREES[pool]
 
 
 def corners_of(pool: TilePool) -> F64:

@@ -243,7 +243,7 @@ def test_figures_are_those_of_the_solution(view: View) -> None:
     stats = view.session.stats
     assert stats.figures["Rays per texel"] == f"{RAYS}, all kept"
     assert int(stats.figures["Bounces"]) == view.session.solver.bounces.steps > 1  # type: ignore[attr-defined]
-    assert float(stats.figures["Expected error"].split()[0]) == pytest.approx(100 * stats.remaining, abs=0.006)
+    assert "Expected error" not in stats.figures, "noise is no error: see Compare"
     assert float(stats.figures["Kept hits"].split()[0]) > 0
 
 

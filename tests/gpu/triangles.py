@@ -18,6 +18,12 @@ from app.scene.model import F64
 from app.visibility.rays import RayScene
 
 
+class BarePool(SimpleNamespace):
+    """It is known by who it is, as a tile pool is."""
+
+    __hash__ = object.__hash__
+
+
 def bare_pool(positions: F64, triangles: NDArray[np.integer]) -> Any:
     """As much of a tile pool as rays ask for; no side has texels."""
     corners = positions[triangles].reshape(-1, 3)
@@ -26,9 +32,7 @@ def bare_pool(positions: F64, triangles: NDArray[np.integer]) -> Any:
     vertices["in_uv_front"] = vertices["in_uv_back"] = -1.0
     count = len(triangles)
     mesh = SimpleNamespace(vertices=vertices, corners=np.arange(3 * count).reshape(-1, 3), triangle=np.arange(count))
-    return SimpleNamespace(
-        space=space, scene=SimpleNamespace(positions=positions, triangles=triangles), visible_mesh=mesh
-    )
+    return BarePool(space=space, scene=SimpleNamespace(positions=positions, triangles=triangles), visible_mesh=mesh)
 
 
 @contextlib.contextmanager

@@ -202,8 +202,10 @@ def test_a_lamp_in_many_pieces_gives_the_light_of_one(gpu: Gpu) -> None:
 @pytest.mark.usefixtures("same_rays")
 def test_rays_that_are_not_kept_are_the_same_when_they_are_traced_again(gpu: Gpu) -> None:
     kept, again = gathered(gpu, table_room(), 48), gathered(gpu, table_room(), 48, ray_memory=0)
-    assert again.rays.hits.count == 0 and again.rays.traced > 3 * kept.rays.traced
+    assert again.rays.hits.count == again.rays.hits.bank < 48 and again.rays.traced > kept.rays.traced
     assert_same(again.H, kept.H, ROUNDING)
+    # its books know what leaves by the rays that are kept, a third of them: the noise of a share of nothing in a closed room
+    assert again.book.imbalance_share == pytest.approx(kept.book.imbalance_share, abs=1e-3)
     kept.release()
     again.release()
 

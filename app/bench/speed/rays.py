@@ -25,8 +25,7 @@ from app.scene.model import F32
 from app.session.loading import load
 from app.util.console import Console
 from app.util.tables import Column, markdown_table
-from app.visibility.bvh import build_bvh
-from app.visibility.rays import RayScene, corners_of
+from app.visibility.rays import RayScene, corners_of, tree_of
 
 TEXELS = 30_000  # as many places as rays start from, about
 RAYS = 1 << 18
@@ -73,13 +72,13 @@ def _measure(gpu: Gpu, name: str, seconds: float) -> dict[str, Any]:
     """seconds: of each figure."""
     pool = load(name, AtlasOptions(texels=TEXELS)).pool
     start = time.perf_counter()
-    bvh = build_bvh(corners_of(pool))
+    bvh = tree_of(pool)
     row: dict[str, Any] = {
         "scene": Path(name).stem,
         "triangles": len(pool.scene.triangles),
         "build_s": time.perf_counter() - start,
     }
-    rays = RayScene(gpu, pool, bvh)
+    rays = RayScene(gpu, pool)
     row |= {"megabytes": rays.memory * 1e-6, "cost": bvh.cost, "depth": bvh.depth}
     for kind, shared in KINDS.items():
         origins, directions = texel_rays(pool, RAYS, shared)

@@ -14,7 +14,7 @@ whole: one factor brings it to where Σ A H = Σ A (H_direct + 1/N Σ B), the co
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 
 import numpy as np
 
@@ -85,7 +85,7 @@ class Bounces:
         mean = self._share @ np.array([m.albedo for m in materials])
         self.reflected = min(float(mean.max()), MOST_REFLECTED)
 
-    def solve(self, hits: Hits, direct: Texture, rays: int, steps: int) -> Iterator[None]:
+    def solve(self, hits: Hits, direct: Texture, rays: int, steps: int) -> Generator[None, None, None]:
         """So many steps from the solution as it is, along so many rays of each texel, in parts."""
         omega, self.steps = 1.0, steps
         for step in range(steps):
@@ -137,12 +137,6 @@ class Bounces:
             textures=self._points.textures(*reads) | {"t_sources": self._sources, "t_solution": self.solution},
             viewport=(0, 0, *self._points.size),
         )
-
-    @property
-    def memory(self) -> int:
-        """Bytes on the GPU."""
-        (width, height), (columns, rows) = self._points.size, self.outgoing.size
-        return int(16 * (3 * width * height + columns * rows))
 
     def release(self) -> None:
         sources = [] if self._sources is None else [self._sources]

@@ -8,7 +8,7 @@ there is noise in half-shadows only. What is kept is Σ F V, so that another exi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -125,25 +125,25 @@ class DirectLight:
         optional = [] if lit.unoccluded is None else [lit.unoccluded]
         self._gpu.release_all(lit.target, lit.seen, lit.table, lit.chances, *optional)
 
-    def shoot(self, count: int) -> Iterator[None]:
+    def shoot(self, count: int) -> Generator[None, None, None]:
         """So many shadow rays more from each texel to each set, whole passes of them, in parts."""
         for lit in self.sets:
             for _ in range(max(count // PASS, 1)):
-                self._shoot_at(lit, PASS)
+                self._shoot_at(lit)
                 yield
 
-    def _shoot_at(self, lit: Lit, count: int) -> None:
+    def _shoot_at(self, lit: Lit) -> None:
         """One pass of shadow rays to a set."""
         if not lit.count:
             self._look_unoccluded(lit, self._everywhere)
-        self._trace(lit, self._everywhere, lit.count, count, "add")
-        lit.count += count
-        self.traced += count * self._lightmap.texel_count
+        self._trace(lit, self._everywhere, lit.count, "add")
+        lit.count += PASS
+        self.traced += PASS * self._lightmap.texel_count
 
-    def _trace(self, lit: Lit, rects: F32, first: int, count: int, blend: str | None) -> None:
+    def _trace(self, lit: Lit, rects: F32, first: int, blend: str | None) -> None:
         textures = {"t_lamps": lit.table, "t_chances": lit.chances}
         textures |= {name: texture for name, texture in self._rays.textures.items() if name != "t_bvh_uv"}
-        uniforms = {"u_rays": (first, count), "u_stream": lit.stream}
+        uniforms = {"u_rays": (first, PASS), "u_stream": lit.stream}
         self._draw(self._shoot[lit.lamps.closed_form], lit.target, rects, textures, uniforms, blend=blend)
 
     def shoot_tiles(self, slots: NDArray[np.int64]) -> Iterator[None]:
@@ -156,7 +156,7 @@ class DirectLight:
             self._gpu.release_all(lit.chances)
             lit.chances = upload(self._gpu, table[..., None])
             for first in range(0, lit.count, PASS):
-                self._trace(lit, rects, first, PASS, "add" if first else None)
+                self._trace(lit, rects, first, "add" if first else None)
                 yield
             self.traced += lit.count * int((pool.surfaces.face[slots] >= 0).sum())
 
@@ -189,7 +189,7 @@ class DirectLight:
         wanted = self.count or first
         for lit in self.sets:
             while lit.count < wanted:
-                self._shoot_at(lit, PASS)
+                self._shoot_at(lit)
                 yield
 
     def sum(self, scene: Scene) -> None:
@@ -216,12 +216,6 @@ class DirectLight:
             self.drop(lit)
         self.traced = self._streams = 0
         self._target.clear()
-
-    @property
-    def memory(self) -> int:
-        """Bytes on the GPU."""
-        width, height = self._lightmap.size
-        return width * height * (16 + sum(16 + 4 * lit.lamps.closed_form for lit in self.sets))
 
     def release(self) -> None:
         self.forget()

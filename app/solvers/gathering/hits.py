@@ -7,16 +7,12 @@ that they may take, rays are traced again whenever they are asked for.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
+from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
-from app.lightmap.textures import QUAD_FORMAT
-from app.scene.model import F32
 from app.solvers.gathering.origins import Origins
 from app.visibility.rays import RayScene
 
@@ -41,7 +37,7 @@ class Hits:
         self._gpu, self._points, self._rays, self._origins = gpu, points, rays, origins
         self._banks: list[Bank] = []
         self.count = self.traced = 0
-        self._trace = Pass(gpu, "solvers/gathering/trace", defines=self.defines, vertex="common/rects")
+        self._trace = Pass(gpu, "solvers/gathering/trace", defines=self.defines)
         self._again, self._gather = (
             Pass(gpu, "solvers/gathering/gather", defines={"TRACED": t} | self.defines) for t in (True, False)
         )
@@ -76,10 +72,10 @@ class Hits:
         return width * height * self.bank * BYTES
 
     def room(self, mebibytes: int) -> int:
-        """Rays of each texel for which there is memory: whole banks."""
-        return mebibytes * 2**20 // self._bank_bytes * self.bank
+        """Rays of each texel for which there is memory: whole banks, one at least, which says what light is lost."""
+        return max(mebibytes * 2**20 // self._bank_bytes, 1) * self.bank
 
-    def trace(self, count: int, bands: int) -> Iterator[None]:
+    def trace(self, count: int, bands: int) -> Generator[None, None, None]:
         """Trace and keep so many more rays of each texel, in parts: page by page, each in so many bands."""
         (width, height), tiles = self._points.size, self._points.pool.tile
         for _ in range(count):
@@ -92,23 +88,15 @@ class Hits:
             rows = [self._points.rows * nth // bands * tiles for nth in range(bands + 1)]
             for low, high in itertools.pairwise(rows):
                 if high > low:
-                    self._draw(bank, np.array([(x, y + low, width, high - low, 0, low)], np.float32))
+                    self._trace.draw(
+                        self._banks[bank].target,
+                        textures=self._textures,
+                        uniforms={"u_first": bank * self.bank, "u_bank": (width, height, self.edge)} | self._places,
+                        scissor=(x, y + low, width, high - low),
+                    )
                     yield
             self.count += 1
             self.traced += self._points.texel_count
-
-    def _draw(self, bank: int, rects: F32) -> None:
-        """Trace in these rectangles of a bank, see common/rects.vert.glsl."""
-        target = self._banks[bank].target
-        mesh = Mesh(self._gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)
-        self._trace.draw(
-            target,
-            textures=self._textures,
-            uniforms={"u_first": bank * self.bank, "u_bank": (*self._points.size, self.edge), "u_size": target.size}
-            | self._places,
-            mesh=mesh,
-        )
-        self._gpu.release_all(mesh)
 
     @property
     def _textures(self) -> dict[str, Texture]:

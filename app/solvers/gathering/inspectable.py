@@ -66,7 +66,6 @@ class Inspectable:
             "Rays per texel": f"{progress.done:,}, {'all' if hits.count >= progress.done else f'{hits.count:,}'} kept",
             "Kept hits": f"{hits.memory / 2**20:.1f} MiB",
             "Bounces": f"{bounces}",
-            "Expected error": f"{progress.remaining:.2%}".replace("%", " %"),
         }
         traced = hits.traced + sum(direct.traced for direct in self._directs)
         whole = Inspection(figures=figures, counts={"Rays traced": traced})

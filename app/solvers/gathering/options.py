@@ -20,7 +20,7 @@ class GatheringOptions(Options):
     )
     ray_memory: int = option(
         1024,
-        "memory for what rays hit; those beyond it are traced again in each bounce",
+        "memory for what rays hit, of 16 rays of each texel at least; those beyond it are traced again in each bounce",
         unit="MiB",
         minimum=0,
         maximum=65_536,

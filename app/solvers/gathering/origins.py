@@ -51,11 +51,6 @@ class Origins:
         for name, texture in self._textures.items():
             self._textures[name] = self._lightmap.moved(texture, moves)
 
-    @property
-    def memory(self) -> int:
-        """Bytes on the GPU."""
-        return sum(t.width * t.height * t.components * 4 for t in self._textures.values())
-
     def release(self) -> None:
         self._gpu.release_all(*self._textures.values())
 

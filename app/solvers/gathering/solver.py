@@ -9,7 +9,6 @@ again along what is kept.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -31,6 +30,7 @@ from app.solvers.gathering.inspectable import Inspectable
 from app.solvers.gathering.lamps import by_rays
 from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.origins import Origins
+from app.util.parts import is_running, run_to_end
 from app.visibility.rays import RayScene
 
 BATCH, FIRST = 16, 8  # rays of each texel at once, and at first
@@ -193,9 +193,8 @@ class Gathering:
 
     def _finish(self) -> None:
         """End the work that is under way, if any; of its own parts this asks nothing."""
-        if self._under_way is not None and inspect.getgeneratorstate(self._under_way) != inspect.GEN_RUNNING:
-            for _ in self._under_way:
-                pass
+        if self._under_way is not None and not is_running(self._under_way):
+            run_to_end(self._under_way)
             self._under_way = None
 
     # -- how far it is -------------------------------------------------------------------------------------------------
@@ -220,7 +219,9 @@ class Gathering:
     def energy(self) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
         self._finish()
-        return self._balance.measure(self.hits, self.at_points.light, self._compose.indirect)
+        balance = self._balance.measure(self.hits, self.at_points.light, self._compose.indirect)
+        self._progress = replace(self._progress, escaped=balance.escaped)
+        return balance
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
 
@@ -325,9 +326,9 @@ class Gathering:
         """Each part of a piece of work by itself, to be timed."""
         count = -(-min(amount, BATCH) // GROUP) * GROUP
         return {
-            "trace": lambda: _whole(self.hits.trace(count, 1)),
-            "shadow rays": lambda: _whole(self.at_points.shoot(SHADOW_RAYS)),
-            "bounce": lambda: _whole(self.bounces.solve(self.hits, self.at_points.light, count, 1)),
+            "trace": lambda: run_to_end(self.hits.trace(count, 1)),
+            "shadow rays": lambda: run_to_end(self.at_points.shoot(SHADOW_RAYS)),
+            "bounce": lambda: run_to_end(self.bounces.solve(self.hits, self.at_points.light, count, 1)),
             "show": lambda: self._show(max(self.issued, GROUP)),
         }
 
@@ -361,11 +362,6 @@ class Gathering:
         if self.points is not self.lightmap:
             self._at.release()
             self.points.release()
-
-
-def _whole(parts: Iterator[None]) -> None:
-    for _ in parts:
-        pass
 
 
 __all__ = ["BATCH", "Gathering"]

@@ -10,7 +10,6 @@ wherever they are.
 
 from __future__ import annotations
 
-import inspect
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping
 from typing import Any
@@ -28,7 +27,7 @@ from app.solvers.pairs.gather import Area
 from app.solvers.pairs.occlusion import Scenes
 from app.solvers.pairs.options import PairsOptions, check
 from app.solvers.pairs.pace import PART, Pace
-from app.util.parts import run_to_end
+from app.util.parts import is_running, run_to_end
 
 PIECE = 0.1  # seconds of a bounce that are one piece of work: a solve looks at its clock in between
 LONG = 2.0  # seconds of a bounce, from which on it is said beforehand
@@ -107,7 +106,7 @@ class Pairs:
 
     def _finish(self) -> None:
         """End the piece of work that is under way, if any; the bounce waits. Of its own parts this asks nothing."""
-        if self._piece is not None and inspect.getgeneratorstate(self._piece) != inspect.GEN_RUNNING:
+        if self._piece is not None and not is_running(self._piece):
             self._piece.close()
             self._piece = None
 

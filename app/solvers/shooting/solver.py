@@ -6,7 +6,6 @@ batches late how much is unshot.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -26,7 +25,7 @@ from app.solvers.shooting.material_edits import MaterialEdits, common_factor, ne
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.records import BATCH, Shot, powers_of, shot_of, sizes_of
 from app.solvers.shooting.reports import Reports
-from app.util.parts import run_to_end
+from app.util.parts import is_running, run_to_end
 from app.visibility.item_image import ItemImage
 
 LOOK_AFTER = 32  # shots, or a quarter of all, between two looks at leaves that did not change at the last
@@ -108,9 +107,8 @@ class Shooting:
 
     def _finish(self) -> None:
         """End the work that is under way, if any; of its own parts this asks nothing."""
-        if self._under_way is not None and inspect.getgeneratorstate(self._under_way) != inspect.GEN_RUNNING:
-            for _ in self._under_way:
-                pass
+        if self._under_way is not None and not is_running(self._under_way):
+            run_to_end(self._under_way)
             self._under_way = None
 
     # -- how far it is -------------------------------------------------------------------------------------------------
