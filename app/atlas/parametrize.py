@@ -27,6 +27,7 @@ Progress = Callable[[str, float], None]
 
 TEXELS_PER_FACE = 8
 DEFAULT_TEXELS = (32_000, 2_000_000)  # from a plain room to what two cores still shoot at interactive rates
+LEAST_BY_AREA = 0.5  # of the texels asked for, that surfaces have by their area, whatever small charts need beside them
 ROOT_SHARE = 16  # of the texels that uniform ones would have: two levels below the roots are as fine as these
 MAX_TEXELS = 1 << 24
 WHOLE_PATCHES_FROM = 6  # texels: shorter sides of rectangles are not rounded to whole patches
@@ -64,8 +65,9 @@ def parametrize(
 
     density [texels/m], or texels: how many to aim at; by default 8 for each lit side, within 32 000 and 2 million, and for
     ``roots`` of quadtrees a sixteenth of that.
-    Rectangles are made of whole patches, so that a small number of texels is met only roughly, and below one
-    texel per chart not at all. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage, share) is
+    Rectangles are made of whole patches, so that a small number of texels is met only roughly. Charts that are smaller than a
+    texel have one all the same: where there are so many that a large floor among them would be left with one, too, more
+    texels are made than were asked for. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage, share) is
     called from time to time and may raise to cancel.
     Raises UserError for a density or number out of range, or when more than 16 777 216 texels are needed.
     """
@@ -226,12 +228,14 @@ def _texel_count(layout: Layout, density: float) -> float:
 def _density_for(layout: Layout, texels: int) -> float:
     """The density [texels/m] at which the charts cover about so many texels, and no chart outgrows the atlas."""
     longest = (MAX_SIDE - ALIGN) / float(layout.extent.max())
-    high = min(math.sqrt(texels / float((layout.area * layout.sides).sum())), longest)
+    by_area = math.sqrt(texels / float((layout.area * layout.sides).sum()))
+    least = min(math.sqrt(LEAST_BY_AREA) * by_area, longest)
+    if _texel_count(layout, least) > texels:
+        return least
+    high = min(by_area, longest)
     while high < longest and _texel_count(layout, high) < texels:
         high = min(2 * high, longest)
-    low = high / 2
-    while _texel_count(layout, low) > texels and low * float(layout.extent.max()) > 0.5:
-        low /= 2
+    low = least
     # no finer: sizes jump at some densities, and rectangles alike but for rounding must jump together
     while high > low * (1 + 1e-3):
         middle = math.sqrt(low * high)
