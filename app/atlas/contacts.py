@@ -26,7 +26,8 @@ from app.scene.model import F64, I32, Scene
 
 GAP = 0.05  # of a texel: what is no farther from a surface lies on it
 LEAST = 1e-9  # of a face, that a piece is: less is rounding
-MOST_NEAR = 4096  # facets in one plane, beyond which what lies in it is not looked for: soups of loose triangles
+MOST_NEAR = 4096  # facets in one plane, beyond which those that a side's box meets are looked for first
+MOST_MEET = 1 << 22  # of such pairs, beyond which what lies there is not looked for: soups of loose triangles
 MOST_CORNERS = 256  # of a loop that a cap closes: its triangles all meet in one corner
 BLOCK = 1 << 14  # triangles whose neighbours are looked at at once
 
@@ -128,11 +129,16 @@ def hidden_points(scene: Scene, triangle: I32, back: NDArray[np.bool_], weights:
     hidden = np.zeros(len(triangle), bool)
     for piece, one in zip(found.uv, found.face.tolist(), strict=True):
         mine = np.flatnonzero(side.reshape(-1) == one)
-        from_corners = weights[mine, None, 1:] - piece
-        edge = np.roll(piece, -1, axis=0) - piece
-        turns = edge[:, 0] * from_corners[..., 1] - edge[:, 1] * from_corners[..., 0]
-        hidden[mine] |= (turns >= 0).all(1) | (turns <= 0).all(1)
+        hidden[mine] |= inside_triangles(piece[None], weights[None, mine, 1:])[0]
     return hidden
+
+
+def inside_triangles(triangles: F64, points: F64) -> NDArray[np.bool_]:
+    """(n, k) whether points (n, k, 2) lie in triangles (n, 3, 2), of any winding."""
+    edge = (np.roll(triangles, -1, axis=1) - triangles)[:, None]
+    from_corners = points[:, :, None] - triangles[:, None]
+    turns = edge[..., 0] * from_corners[..., 1] - edge[..., 1] * from_corners[..., 0]
+    return np.asarray((turns >= 0).all(-1) | (turns <= 0).all(-1))
 
 
 def _lids(all_: _Facets, own: I64, up: F64, within: float, flat: float) -> tuple[list[tuple[int, I64]], int]:
@@ -143,20 +149,50 @@ def _lids(all_: _Facets, own: I64, up: F64, within: float, flat: float) -> tuple
     down = np.concatenate([-all_.normal[ends], all_.normal[sheets], -all_.normal[sheets]])
     # planes as points (normal, height): angles in units of what is flat, distances in units of the gap
     units = np.array([FLAT_ANGLE, FLAT_ANGLE, FLAT_ANGLE, within])
-    tree = cKDTree(np.column_stack([down, (down * all_.point[lids]).sum(1)]) / units)
+    lid_planes = np.column_stack([down, (down * all_.point[lids]).sum(1)]) / units
     planes = np.column_stack([up, (up * all_.point[own]).sum(1)]) / units
-    few = np.flatnonzero(tree.query_ball_point(planes, 1.0, return_length=True) <= MOST_NEAR)
+    tree = cKDTree(lid_planes)
+    few = tree.query_ball_point(planes, 1.0, return_length=True) <= MOST_NEAR
+    near = dict(zip(np.flatnonzero(few).tolist(), tree.query_ball_point(planes[few], 1.0), strict=True))
+    crowded = np.flatnonzero(~few)
+    side, lid = _boxes_that_meet(all_, own[crowded], lids, np.abs(up[crowded]).argmax(1), within)
+    if len(side) <= MOST_MEET:
+        one_plane = ((planes[crowded[side]] - lid_planes[lid]) ** 2).sum(1) <= 1
+        side, lid = crowded[side[one_plane]], lid[one_plane]
+        ends_of = np.searchsorted(side, crowded, "right")
+        near |= zip(crowded.tolist(), np.split(lid, ends_of[:-1]), strict=True) if len(crowded) else ()
     found = []
-    for one, near in zip(few.tolist(), tree.query_ball_point(planes[few], 1.0), strict=True):
-        mine, lid = own[one], lids[near]
+    for one, those in sorted(near.items(), key=lambda item: item[0]):
+        mine, lid = own[one], lids[those]
         height = (all_.point[lid] - all_.point[mine]) @ up[one]
-        lies = ((height > flat) | body[near] & (height >= -flat)) & (lid != mine)
+        lies = ((height > flat) | body[those] & (height >= -flat)) & (lid != mine)
         lies &= (all_.least[lid] <= all_.most[mine] + within).all(1) & (
             all_.most[lid] >= all_.least[mine] - within
         ).all(1)
         if lies.any():
             found.append((one, np.unique(lid[lies])))
-    return found, len(planes) - len(few)
+    return found, len(planes) - len(near)
+
+
+def _boxes_that_meet(all_: _Facets, own: I64, lids: I64, axis: I64, within: float) -> tuple[I64, I64]:
+    """Pairs of sides and lids, the number of each, whose boxes meet as seen along the axis of the side, in the order of sides; no
+    more than MOST_MEET, and one block."""
+    sides, others = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    for k in np.unique(axis).tolist():
+        flat_on = [other for other in range(3) if other != k]
+        low, high = all_.least[:, flat_on] - within / 2, all_.most[:, flat_on] + within / 2
+        tree = shapely.STRtree(shapely.box(*low[lids].T, *high[lids].T))
+        mine = np.flatnonzero(axis == k)
+        for first in range(0, len(mine), 64):
+            block = mine[first : first + 64]
+            side, lid = tree.query(shapely.box(*low[own[block]].T, *high[own[block]].T))
+            sides.append(block[side])
+            others.append(lid)
+            if sum(map(len, others)) > MOST_MEET:
+                break
+    side, lid = np.concatenate(sides), np.concatenate(others)
+    order = np.argsort(side, kind="stable")
+    return side[order], lid[order]
 
 
 def _cut(faces: F64, cover: shapely.Geometry) -> tuple[F64, I64]:

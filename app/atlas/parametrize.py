@@ -67,8 +67,8 @@ def parametrize(
     ``roots`` of quadtrees a sixteenth of that.
     Rectangles are made of whole patches, so that a small number of texels is met only roughly. Charts that are smaller than a
     texel have one all the same: where there are so many that a large floor among them would be left with one, too, more
-    texels are made than were asked for. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage, share) is
-    called from time to time and may raise to cancel.
+    texels are made than were asked for. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage,
+    share) is called from time to time and may raise to cancel.
     Raises UserError for a density or number out of range, or when more than 16 777 216 texels are needed.
     """
     _check(density, texels)

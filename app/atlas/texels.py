@@ -18,12 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
+from app.atlas.contacts import inside_triangles
 from app.scene.model import F32, F64, I32, Scene
 
 BLOCK = 1 << 16  # candidate texels in work at a time
 # Fragments below this share of the texel, or of a smaller triangle, are rounding where an edge runs along a texel's.
 SLIVER = 1e-9
 LEAST_SEEN = 1e-3  # of a texel, that is not hidden: less is no place to look from
+PLACES = 8  # along the edge of a texel: where else to look from, when something lies on its middle
 
 I64 = NDArray[np.int64]
 
@@ -57,6 +59,7 @@ class TexelSurfaces:
     area (n, t, t) f64 [m²], 0 where nothing is covered; normal (n, t, t, 3) f32: unit area-weighted mean,
     towards the lit side; face (n, t, t) i32: the face with the largest share, -1 where nothing is covered;
     leading (n, t, t, 3) f64: centroid of that share alone [m]; cut (n, t, t): whether something lies on a part of it, or all.
+    Where something lies on the centroid, position and leading are the nearest place beside it.
     """
 
     position: F64
@@ -105,6 +108,7 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
     face = np.full(texels, -1, np.int32)
     cut = np.zeros(texels, bool)
     moment, normal, lead = np.zeros((3, texels)), np.zeros((3, texels)), np.zeros((3, texels))
+    middle = np.zeros((2, texels))
     origin = scene.corners[charts.face_triangle, 0]
     normals, areas = scene.normals_areas
     towards = normals[charts.face_triangle] * np.where(charts.face_back, -1.0, 1.0)[:, None]
@@ -133,6 +137,13 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
                 np.add.at(normal[k], slot, covered * towards[f, k])
                 lead[k, slot[leading]] = centre[leading]
             np.add.at(area, slot, covered)
+            for k, at in enumerate((u, v)):
+                np.add.at(middle[k], slot, covered * at)
+        slot, at = _beside(pieces, over, uv, face, middle / np.where(area > 0, area, 1.0), leaves, charts.tile)
+        f, (du, dv) = face[slot], (at - uv[face[slot], 0]).T * size
+        for k in range(3):
+            lead[k, slot] = origin[f, k] + du * tangents[0, f, k] + dv * tangents[1, f, k]
+        moment[:, slot] = area[slot] * lead[:, slot]
     with np.errstate(invalid="ignore", divide="ignore"):
         position = np.where(area > 0, moment / area, 0.0)
         length = np.linalg.norm(normal, axis=0)
@@ -201,6 +212,28 @@ def _hidden(charts: Charts, uv: F64, cell_of: Callable[[_Fragments], I64], windo
         np.bincount(which.reshape(-1), column, len(key)).astype(np.float64) for column in np.concatenate(sums).T
     )
     return _Hidden(key, cells, share, u, v)
+
+
+def _beside(pieces: F64, over: _Windows, uv: F64, face: I32, middle: F64, leaves: Leaves, tile: int) -> tuple[I64, F64]:
+    """Texels on whose middle (2, texels) something lies, (n,), and the nearest places on them beside it, (n, 2) in the atlas.
+    pieces (k, 3, 2): what is hidden; over: leaves that these meet; uv (f, 3, 2): the faces; face (texels,) of each."""
+    pairs = [np.empty((0, 2), np.int64)]
+    for part in _fragments(pieces, over):
+        pairs.append(np.column_stack([over.face[part.pair], over.slot(part)]))
+    piece, slot = np.concatenate(pairs).T
+    on_it = (face[slot] >= 0) & inside_triangles(pieces[piece], middle.T[slot][:, None])[:, 0]
+    slots = np.unique(slot[on_it])
+    leaf, place = np.divmod(slots, tile * tile)
+    corner = np.column_stack([leaves.x[leaf] * tile + place % tile, leaves.y[leaf] * tile + place // tile])
+    steps = (np.arange(PLACES) + 0.5) / PLACES
+    places = corner[:, None] + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    free = inside_triangles(uv[face[slots]], places)
+    mine = np.isin(slot, slots)
+    nth = np.searchsorted(slots, slot[mine])
+    np.logical_and.at(free, nth, ~inside_triangles(pieces[piece[mine]], places[nth]))
+    far = np.where(free, ((places - middle.T[slots][:, None]) ** 2).sum(-1), np.inf)
+    nearest, found = far.argmin(axis=1), free.any(axis=1)
+    return slots[found], places[np.arange(len(slots)), nearest][found]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,8 @@ from typing import Any
 from app import __version__
 from app.session.session import Session
 
+UNBALANCED = 0.02  # of the emitted power: more is worth a word
+
 __all__ = ["notes", "report", "summary"]
 
 
@@ -52,9 +54,16 @@ def _error(session: Session) -> dict[str, Any]:
 
 
 def notes(session: Session) -> list[str]:
-    """What the solver has to say of the solution."""
-    note = session.run.progress.note
-    return [] if note is None else [note]
+    """What the solver has to say of the solution, and what its energy balance says of it."""
+    note, share = session.run.progress.note, session.stats.imbalance
+    found = [] if note is None else [note]
+    if session.family.distributes and abs(share) > UNBALANCED:
+        what = "is lost" if share > 0 else "comes from nothing"
+        found.append(
+            f"{abs(share):.1%} of the light {what}: patches and texels are large beside what stands between them; "
+            "smaller ones (--density, --level) or --solver gathering would do"
+        )
+    return found
 
 
 def summary(session: Session, result: dict[str, Any]) -> str:

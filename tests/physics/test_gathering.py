@@ -13,11 +13,13 @@ from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
 from app.lightmap.options import STORAGE
 from app.scene.model import F64, Material, Scene
+from app.scene.shapes import box, merged
 from app.session.run import Stop
 from app.session.session import Session
 from app.solvers import ShootingOptions
 from app.solvers.gathering.lamps import ALONE
 from app.solvers.gathering.solver import FIRST, SHADOW_RAYS, SOLVED, Gathering
+from app.validation.scenes import across, scene_of
 
 RAYS = 32
 LAMP, RED = 2, 1
@@ -147,6 +149,20 @@ def lamps_at_the_ceiling(count: int, materials: int) -> Scene:
     paints = [replace(grey(0.0, 100.0 / count / 1e-4), name=f"lamp {i}") for i in range(materials)]
     ids = [0] * 6 + [1 + i % materials for i in range(count)]
     return quads_scene([*room((4.0, 3.0, 4.0)), *quads], [grey(0.5), *paints], ids)
+
+
+def test_boxes_of_a_texel_a_side_lose_no_light(gpu: Gpu) -> None:
+    """256 boxes of 0.6 m stand on a floor of 16 m, whose texels are a metre wide: what a box covers of each is no part of it, and
+    rays start beside it. Within 1 %: one place stands for each texel that a box cuts."""
+    boxes = merged([box((0.6,) * 3).moved(k % 16 + 0.5, 0.3, k // 16 + 0.5) for k in range(256)])
+    floor, lamp = across(1, 0.0, (0, 0), (16, 16)), across(1, 8.0, (4, 4), (12, 12), along=False)
+    grey_walls, light = grey(0.6), replace(grey(0.0, 10.0), name="lamp")
+    scene = scene_of("boxes", [("floor", floor, grey_walls), ("boxes", boxes, grey_walls), ("lamp", lamp, light)])
+    lit = gathered(gpu, scene, 96, density=1.0)
+    side = lit.lightmap.pool.surfaces.area
+    assert ((side > 0.3) & (side < 0.4)).sum() == 5 * 256, "a texel a side"
+    assert abs(lit.book.imbalance_share) < 0.01
+    lit.release()
 
 
 @pytest.mark.parametrize(("count", "materials"), [(100, 1), (1024, 1), (1024, 3 * ALONE)])

@@ -8,6 +8,7 @@ import shapely
 from numpy.typing import NDArray
 from solver_scenes import grey, quads_scene
 
+from app.atlas import contacts
 from app.atlas.parametrize import parametrize
 from app.atlas.points import random_points
 from app.atlas.texels import texel_count, texel_surfaces, uniform_leaves
@@ -38,6 +39,38 @@ def seen_area(scene: Scene, y: float = 0.0, *, up: bool = True) -> tuple[float, 
     there = (surfaces.area > 0) & (np.abs(surfaces.position[..., 1] - y) < 1e-6)
     there &= np.abs(surfaces.normal[..., 1] - (1 if up else -1)) < 1e-3
     return float(surfaces.area[there].sum()), surfaces.cut[there], surfaces.position[there]
+
+
+def test_a_texel_is_looked_from_beside_what_stands_in_its_middle() -> None:
+    """The centroid of what is left of it would lie within the box."""
+    scene = scene_of(FLOOR, *turned_box(0.0, 0.5))
+    charts = parametrize(scene, density=0.5)  # one texel
+    surfaces = texel_surfaces(scene, charts, uniform_leaves(charts))
+    floor = (surfaces.area > 0) & (np.abs(surfaces.position[..., 1]) < 1e-6) & (surfaces.normal[..., 1] > 0.9)
+    assert floor.sum() == 1 and surfaces.area[floor] == pytest.approx(4 - 0.25)
+    for place in surfaces.position[floor], surfaces.leading[floor]:
+        assert not under(place).any() and np.abs(place[:, [0, 2]] - 1).max() < 0.5
+
+
+@pytest.mark.parametrize("most_meet", [contacts.MOST_MEET, 10])
+def test_of_many_boxes_in_one_plane_those_are_looked_at_that_meet(
+    monkeypatch: pytest.MonkeyPatch, most_meet: int
+) -> None:
+    boxes = [
+        [(x / 4 + 0.75 * i, y, z / 4 + 0.75 * k) for x, y, z in quad]
+        for i in range(3)
+        for k in range(3)
+        for quad in turned_box(0.0, 0.5)
+    ]
+    scene = scene_of(FLOOR, *boxes)
+    area, _, _ = seen_area(scene)
+    assert area == pytest.approx(4 - 9 * 0.25 / 16, rel=1e-6)
+    monkeypatch.setattr(contacts, "MOST_NEAR", 5)
+    monkeypatch.setattr(contacts, "MOST_MEET", most_meet)
+    if most_meet == 10:
+        assert "dark feet" in parametrize(scene, texels=3000).warnings[0]
+    else:
+        assert seen_area(scene)[0] == pytest.approx(area, rel=1e-9)
 
 
 def under(position: F64, margin: float = 0.0, angle: float = 0.4) -> NDArray[np.bool_]:

@@ -47,6 +47,16 @@ def test_few_texels_give_the_minimum() -> None:
     assert _covered(SCENES["room"], charts) == charts.chart_count == 6
 
 
+def test_small_charts_leave_half_of_the_texels_to_large_ones() -> None:
+    boxes = [shapes.box((0.1, 0.1, 0.1)).moved(k % 10 - 4.5, 0.3, k // 10 - 4.5) for k in range(100)]
+    scene = scene_of([*boxes, shapes.box((12.0, 0.1, 12.0)).moved(0, -1, 0)])
+    charts = parametrize(scene, texels=500)
+    real = np.bincount(charts.face_chart, face_areas(scene, charts))
+    floor = charts.chart_rects[real.argmax(), 2:].prod()
+    assert charts.chart_count == 501 and floor == pytest.approx(250 * real.max() / real.sum(), rel=0.1)
+    assert _covered(scene, charts) == 500 + floor
+
+
 @pytest.mark.parametrize("density", [5.0, 23.0])
 def test_density_is_texels_per_metre(density: float) -> None:
     scene = scene_of(CLUTTER)

@@ -1,0 +1,32 @@
+"""What a solve says of itself in words."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from app.commands.report import notes
+from app.solvers import SOLVERS
+
+
+def ended(solver: str, imbalance: float, note: str | None = None) -> Any:
+    """A session, as far as notes ask it."""
+    return SimpleNamespace(
+        family=SOLVERS[solver],
+        stats=SimpleNamespace(imbalance=imbalance),
+        run=SimpleNamespace(progress=SimpleNamespace(note=note)),
+    )
+
+
+@pytest.mark.parametrize(("imbalance", "words"), [(0.063, "6.3% of the light is lost"), (-0.2, "comes from nothing")])
+def test_light_that_is_lost_or_made_is_told(imbalance: float, words: str) -> None:
+    said = notes(ended("shooting", imbalance, "leaves are out of memory"))
+    assert said[0] == "leaves are out of memory"
+    assert words in said[1] and "--solver gathering" in said[1]
+
+
+def test_an_even_balance_needs_no_word() -> None:
+    assert notes(ended("shooting", 0.019)) == []
+    assert notes(ended("gathering", 0.05)) == [], "its imbalance is noise, which it states"
