@@ -282,16 +282,37 @@ GROWS: dict[str, object] = {"density": 4, "depth": 2, "gradient": 0.1}
 
 
 def test_leaves_grow_along_shadows_and_cost_shadow_rays_alone(gpu: Gpu) -> None:
-    """The rays that are kept are of texels of level 0, whatever leaves grow, through resizes of the pool too."""
+    """The rays that are kept are of points, whatever leaves grow, through resizes of the pool too."""
     flat = gathered(gpu, table_room(), adaptive=True, **(GROWS | {"depth": 0}))
     lit = gathered(gpu, table_room(), adaptive=True, **GROWS)
     assert len(lit.lightmap.refinement.tree) > 1.5 * len(flat.lightmap.refinement.tree)  # type: ignore[union-attr]
-    assert lit.rays.hits.traced == flat.rays.hits.traced
+    points = lit.rays.points.pool
+    assert (points.leaves.level == 2).all() and (flat.rays.points.pool.leaves.level == 0).all()
+    assert lit.rays.hits.traced == RAYS * lit.rays.points.texel_count
     levels = lit.lightmap.pool.leaves.level
     rough = [k for k in range(len(levels)) if levels[k] >= 0 and shadow_crosses(lit, k)]
     assert levels[rough].mean() > levels[levels >= 0].mean()
     np.testing.assert_allclose(lit.means(lit.H), flat.means(flat.H), rtol=0.03)
     flat.release()
+    lit.release()
+
+
+def test_the_rays_of_a_picked_texel_start_in_its_point(gpu: Gpu) -> None:
+    """Whether leaves are coarser than points or finer: no farther from the texel's middle than both are wide."""
+    lit = gathered(gpu, table_room(), adaptive=True, **GROWS)
+    pool = lit.lightmap.pool
+    levels = np.unique(pool.leaves.level[pool.used])
+    assert len(levels) > 1
+    for level in levels.tolist():
+        slot = int(np.flatnonzero(pool.used & (pool.leaves.level == level))[0])
+        row, column = np.argwhere(pool.surfaces.face[slot] >= 0)[-1]
+        x, y = pool.corner(slot)
+        rays = lit.rays.inspect((x + int(column), y + int(row))).rays
+        assert rays is not None
+        start = pool.space.world_from_local(rays.start.astype(np.float64))
+        wide = np.sqrt(2) * (0.5**level + 0.25) / 2 / 4  # at 4 texels a metre
+        far = np.linalg.norm(start - pool.surfaces.position[slot, row, column], axis=1)
+        assert len(far) == RAYS and far.max() < wide + 1e-4
     lit.release()
 
 

@@ -89,7 +89,7 @@ class Compose:
             textures |= {"t_own_leaves": lightmap.texture("t_leaves"), "t_own_normal": self._origins.normals}
             textures |= {"t_origin_normal": self._at.normals, "t_walls": self._walls}
             textures |= self._points.textures("t_pages", "t_leaves")
-            uniforms = self._places
+            uniforms = self._places | {"u_point": 0.5 ** float(self._points.pool.leaves.level.max())}
         self._compose.draw(self._target, textures=textures, uniforms=uniforms)
 
     @property

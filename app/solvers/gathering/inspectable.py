@@ -120,13 +120,15 @@ class Inspectable:
         return Rays(start, end, light * np.float32(self._lightmap.unit))
 
     def _point_of(self, texel: tuple[int, int]) -> tuple[int, int]:
-        """The texel of level 0 that a texel (column, row) of the lightmap lies in."""
+        """The point in which the middle of a texel (column, row) of the lightmap lies."""
         if self._points is self._lightmap:
             return texel
-        tile = self._points.pool.tile
-        u, v, *_ = self._lightmap.pool.atlas_rect(texel, 1)
-        column, row = self._points.pool.corner(self._points.pool.slot_at((u, v)))
-        return column + int(u) % tile, row + int(v) % tile
+        pool = self._points.pool
+        left, bottom, right, top = self._lightmap.pool.atlas_rect(texel, 1)
+        u, v = (left + right) / 2, (bottom + top) / 2
+        slot = pool.slot_at((u, v))
+        (column, row), finer = pool.corner(slot), 2 ** int(pool.leaves.level[slot])
+        return column + int(u * finer) % pool.tile, row + int(v * finer) % pool.tile
 
     def release(self) -> None:
         if self._rays is not None:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from app.atlas.texels import texel_count, uniform_leaves
 from app.gpu import Framebuffer, Gpu, ReadBack, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
@@ -34,8 +35,10 @@ from app.util.parts import is_running, run_to_end
 from app.visibility.rays import RayScene
 
 BATCH, FIRST = 16, 8  # rays of each texel at once, and at first
+MOST_POINTS = 100_000  # in quadtrees: as many as two cores trace rays from at interactive rates
 SYSTEM = 32  # rays of each texel along which bounces are solved; all of them then gather once more
 CHANGES_PER_RAY = 16  # leaves that split or merge at once: bounded work for a frame
+FIRST_LOOK = 32  # rays, after which leaves are looked at: what few rays say is noise
 LOOK_AGAIN = 2  # times as many rays, when leaves did not change at the last look
 SHADOW_RAYS = 4  # from each texel to each set of lamps, for FIRST rays
 FIRST_STEPS = 2  # of the bounces, before an edit is first shown
@@ -43,6 +46,15 @@ SHADOW_COST = 0.5  # of a shadow ray, beside a ray: it ends at the first hit
 MOST_SHADOW_RAYS = 4  # to each set, for a ray
 SOLVED = 1e-3  # of the bounces, that may be missing
 ALIKE = 3e-2  # of what solutions along other rays differ by, that may be missing
+
+
+def points_of(lightmap: Lightmap) -> TilePool:
+    """The points between which light bounces, where leaves of quadtrees come and go: texels of one level, whatever the leaves."""
+    pool, level = lightmap.pool, 0
+    roots = texel_count(pool.charts)
+    while level < lightmap.options.depth and roots * 4 ** (level + 1) <= MOST_POINTS:
+        level += 1
+    return TilePool(pool.scene, pool.charts, uniform_leaves(pool.charts, level))
 
 
 class Gathering:
@@ -54,9 +66,8 @@ class Gathering:
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: GatheringOptions) -> None:
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
         self.rays = RayScene(gpu, lightmap.pool)
-        # the points between which light bounces are the texels of level 0, whatever leaves are finer
         adaptive = lightmap.refinement is not None
-        self.points = Lightmap(gpu, TilePool(lightmap.scene, lightmap.charts)) if adaptive else lightmap
+        self.points = Lightmap(gpu, points_of(lightmap)) if adaptive else lightmap
         self.origins = Origins(gpu, lightmap)
         self._at = Origins(gpu, self.points) if adaptive else self.origins
         self.hits = Hits(gpu, self.points, self.rays, self._at)
@@ -113,7 +124,7 @@ class Gathering:
     def _leaves_wait(self) -> bool:
         """Whether leaves of quadtrees come and go, or are to be looked at."""
         refinement = self.lightmap.refinement
-        return refinement is not None and self.issued > 0 and (self._refining or self.issued >= self._look_at)
+        return refinement is not None and self.issued >= FIRST_LOOK and (self._refining or self.issued >= self._look_at)
 
     @property
     def _refining(self) -> bool:

@@ -11,15 +11,16 @@ uniform sampler2D t_own_leaves;
 uniform usampler2D t_own_normal;  // and the chart
 uniform usampler2D t_origin_normal;
 uniform sampler2D t_walls;  // see walls.frag.glsl
+uniform float u_point;      // edge of a point [texels of level 0]
 #endif
 
 layout(location = 0) out vec4 out_irradiance;  // a: direct light, the mean of RGB
 layout(location = 1) out float out_variance;   // of the mean of RGB
 
 #if FINER
-// The point at a place of the atlas; negative where there is none of the chart.
-ivec2 point_at(vec2 uv, uint chart) {
-    ivec2 px = texel_px_at(uv);
+// The point at a place of the atlas, counted in points; negative where there is none of the chart.
+ivec2 point_at(vec2 place, uint chart) {
+    ivec2 px = texel_px_at(place * u_point);
     return px.y >= 0 && texelFetch(t_origin_normal, px, 0).y == chart ? px : ivec2(-1);
 }
 
@@ -30,7 +31,8 @@ bool open(ivec2 px, ivec2 next_px, int axis, float step) {
 
 vec4 indirect_at(ivec2 px) {
     vec3 leaf = texelFetch(t_own_leaves, px / TILE, 0).xyz;
-    vec2 uv = (leaf.xy * float(TILE) + vec2(px % TILE) + 0.5) * leaf.z, own = floor(uv) + 0.5, step = sign(uv - own), share = abs(uv - own);
+    vec2 place = (leaf.xy * float(TILE) + vec2(px % TILE) + 0.5) * leaf.z / u_point;
+    vec2 own = floor(place) + 0.5, step = sign(place - own), share = abs(place - own);
     uint chart = texelFetch(t_own_normal, px, 0).y;
     ivec2 points[4];  // bit 0 of their number: a step along u; bit 1: along v
     for (int i = 0; i < 4; ++i) points[i] = point_at(own + step * vec2(i & 1, i >> 1), chart);
