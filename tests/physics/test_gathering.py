@@ -307,7 +307,7 @@ def test_the_rays_of_a_picked_texel_start_in_its_point(gpu: Gpu) -> None:
         slot = int(np.flatnonzero(pool.used & (pool.leaves.level == level))[0])
         row, column = np.argwhere(pool.surfaces.face[slot] >= 0)[-1]
         x, y = pool.corner(slot)
-        rays = lit.rays.inspect((x + int(column), y + int(row))).rays
+        rays = lit.rays.inspect((x + int(column), y + int(row)), images=True).rays
         assert rays is not None
         start = pool.space.world_from_local(rays.start.astype(np.float64))
         wide = np.sqrt(2) * (0.5**level + 0.25) / 2 / 4  # at 4 texels a metre
