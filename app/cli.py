@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from app import __version__
+from app.atlas.options import AtlasOptions
 from app.commands.flags import (
     Parser,
     json_flag,
@@ -34,6 +35,9 @@ from app.render.options import DisplayOptions
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
 
 ERROR_SCENES = ("furnace", "cornell-box")
+EDIT_RAYS = 192  # of each texel
+EDIT_SOLVER = "gathering"  # of `bench edits`: made to be edited
+EDIT_SCENES = ("cornell-box", "museum")
 RAY_SCENES = ("cornell-box", "museum", "grotto")
 HARD_SIZES = ("small", "large")
 
@@ -71,10 +75,10 @@ class Command(NamedTuple):
 
 
 def solver_named(arguments: Sequence[str]) -> str:
-    """The solver that is asked for, whose flags are then known; the default one where none is, or none of that name."""
+    """The solver that is asked for, whose flags are then known; the command's default where none is, or none of that name."""
     words = [word for argument in arguments for word in argument.split("=", 1)]
     named = [value for flag, value in itertools.pairwise(words) if flag == "--solver" and value in SOLVERS]
-    return named[-1] if named else DEFAULT_SOLVER
+    return named[-1] if named else EDIT_SOLVER if tuple(arguments[:2]) == ("bench", "edits") else DEFAULT_SOLVER
 
 
 def build_parser(solver: str = DEFAULT_SOLVER) -> Parser:
@@ -98,6 +102,9 @@ def _bench_flags(parser: Parser, family: Family) -> None:
         "shots": Command("milliseconds per shot, by pass, at the papers' sizes", _shots_flags, _bench_shots),
         "rays": Command(
             "millions of rays a second, and what the tree they walk takes to build", _rays_flags, _bench_rays
+        ),
+        "edits": Command(
+            "milliseconds from an edit of a material to its light", _edits_flags, _bench_edits
         ),
         "frames": Command("milliseconds per frame of the viewer, by part", _frames_flags, _bench_frames),
         "tables": Command("the papers' tables, ours beside theirs; minutes", _tables_flags, _bench_tables),
@@ -182,6 +189,31 @@ def _rays_flags(rays: Parser, family: Family) -> None:
         "--seconds", type=positive(float), default=2.0, metavar="S", help="of each figure, about (default %(default)s)"
     )
     json_flag(rays)
+
+
+def _edits_flags(edits: Parser, family: Family) -> None:
+    edits.add_argument(
+        "scenes",
+        nargs="*",
+        default=EDIT_SCENES,
+        metavar="scene",
+        help=f"files or names (default {' '.join(EDIT_SCENES)})",
+    )
+    add_flags(edits, AtlasOptions, only=("texels",))
+    before = EDIT_RAYS if family is SOLVERS["gathering"] else "until converged"
+    edits.add_argument(
+        f"--{family.unit}",
+        dest="work",
+        type=positive(int),
+        default=EDIT_RAYS if family is SOLVERS["gathering"] else None,
+        metavar="N",
+        help=f"{family.unit} before the edit (default {before})",
+    )
+    edits.add_argument(
+        "--repeats", type=positive(int), default=5, metavar="N", help="edits that each figure is of (default %(default)s)"
+    )
+    json_flag(edits)
+    solver_flags(edits, family, default=EDIT_SOLVER)
 
 
 def _tables_flags(tables: Parser, family: Family) -> None:
@@ -324,6 +356,12 @@ def _bench_rays(flags: argparse.Namespace) -> int:
     from app.bench.speed.rays import bench_rays
 
     return bench_rays(flags)
+
+
+def _bench_edits(flags: argparse.Namespace) -> int:
+    from app.bench.speed.edits import bench_edits
+
+    return bench_edits(flags)
 
 
 def _bench_frames(flags: argparse.Namespace) -> int:

@@ -48,7 +48,7 @@ ALIKE = 3e-2  # of what solutions along other rays differ by, that may be missin
 class Gathering:
     """Gathers the light of one lightmap. Whoever makes it releases it.
 
-    issued: rays of each texel.
+    issued: rays of each texel. drawn: how often the light that is shown was drawn anew.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: GatheringOptions) -> None:
@@ -69,7 +69,7 @@ class Gathering:
         self._under_way: Generator[None, None, int] | None = None
         self._judged: list[tuple[int, ReadBack]] = []
         self._progress = Progress(0, 1.0, np.zeros(3))
-        self._edited, self._shown = False, 0
+        self._edited, self._shown, self.drawn = False, 0, 0
         self._noise = 1.0, 0.0
         self._fresh: set[int] = set()  # slots whose leaves have no rays yet
         self._look_at = 0  # rays at which leaves are looked at again
@@ -184,7 +184,7 @@ class Gathering:
         """What so many rays of each texel have gathered."""
         self._compose.smooth(self.bounces.gathered, rays, smooth=self.options.smooth)
         self._compose.draw(self.direct.light)
-        self._shown = rays
+        self._shown, self.drawn = rays, self.drawn + 1
 
     @property
     def _directs(self) -> tuple[DirectLight, ...]:
