@@ -103,9 +103,7 @@ def _bench_flags(parser: Parser, family: Family) -> None:
         "rays": Command(
             "millions of rays a second, and what the tree they walk takes to build", _rays_flags, _bench_rays
         ),
-        "edits": Command(
-            "milliseconds from an edit of a material to its light", _edits_flags, _bench_edits
-        ),
+        "edits": Command("milliseconds from an edit of a material to its light", _edits_flags, _bench_edits),
         "frames": Command("milliseconds per frame of the viewer, by part", _frames_flags, _bench_frames),
         "tables": Command("the papers' tables, ours beside theirs; minutes", _tables_flags, _bench_tables),
         "error": Command("error against time and shots, of each method; minutes", _error_flags, _bench_error),
@@ -164,6 +162,11 @@ def _info_flags(info: Parser, family: Family) -> None:
     json_flag(info)
 
 
+def _scenes_flag(parser: Parser, default: Sequence[str]) -> None:
+    help = f"files or names (default {' '.join(default)})"
+    parser.add_argument("scenes", nargs="*", default=default, metavar="scene", help=help)
+
+
 def _shots_flags(shots: Parser, family: Family) -> None:
     json_flag(shots)
     add_flags(shots, SOLVERS["shooting"].options)
@@ -178,13 +181,7 @@ def _frames_flags(frames: Parser, family: Family) -> None:
 
 
 def _rays_flags(rays: Parser, family: Family) -> None:
-    rays.add_argument(
-        "scenes",
-        nargs="*",
-        default=RAY_SCENES,
-        metavar="scene",
-        help=f"files or names (default {' '.join(RAY_SCENES)})",
-    )
+    _scenes_flag(rays, RAY_SCENES)
     rays.add_argument(
         "--seconds", type=positive(float), default=2.0, metavar="S", help="of each figure, about (default %(default)s)"
     )
@@ -192,25 +189,23 @@ def _rays_flags(rays: Parser, family: Family) -> None:
 
 
 def _edits_flags(edits: Parser, family: Family) -> None:
-    edits.add_argument(
-        "scenes",
-        nargs="*",
-        default=EDIT_SCENES,
-        metavar="scene",
-        help=f"files or names (default {' '.join(EDIT_SCENES)})",
-    )
+    _scenes_flag(edits, EDIT_SCENES)
     add_flags(edits, AtlasOptions, only=("texels",))
-    before = EDIT_RAYS if family is SOLVERS["gathering"] else "until converged"
+    before = EDIT_RAYS if family is SOLVERS[EDIT_SOLVER] else None
     edits.add_argument(
         f"--{family.unit}",
         dest="work",
         type=positive(int),
-        default=EDIT_RAYS if family is SOLVERS["gathering"] else None,
+        default=before,
         metavar="N",
-        help=f"{family.unit} before the edit (default {before})",
+        help=f"{family.unit} before the edit (default {before or 'until converged'})",
     )
     edits.add_argument(
-        "--repeats", type=positive(int), default=5, metavar="N", help="edits that each figure is of (default %(default)s)"
+        "--repeats",
+        type=positive(int),
+        default=5,
+        metavar="N",
+        help="edits that each figure is of (default %(default)s)",
     )
     json_flag(edits)
     solver_flags(edits, family, default=EDIT_SOLVER)
@@ -242,13 +237,7 @@ def _hard_flags(hard: Parser, family: Family) -> None:
 
 
 def _error_flags(error: Parser, family: Family) -> None:
-    error.add_argument(
-        "scenes",
-        nargs="*",
-        default=ERROR_SCENES,
-        metavar="scene",
-        help=f"files or names (default {' '.join(ERROR_SCENES)})",
-    )
+    _scenes_flag(error, ERROR_SCENES)
     error.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write")
     error.add_argument(
         "--methods",

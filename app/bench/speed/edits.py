@@ -2,9 +2,9 @@
 
 The scene is solved, then the lamp of most power is made to emit twice as much, or the material that reflects most half as much,
 and back, again and again. Timed is, to the end of its GPU work, until the first picture that has all bounces along some of the
-rays, where a solver shows such, and until the whole new solution is there: the end of the piece of work that follows an edit, or,
-of solvers that distribute light, the moment when as little of it remains as before. CPU time is that of the whole process over
-all cores. Beside it stands how far the edited light is from light that is solved afresh: along the same rays, and to the end, of a
+rays, where a solver shows such, and until the whole new solution is there: the end of the piece of work that follows an edit,
+or, of solvers that distribute light, the moment when as little of it remains as before. CPU time is that of the whole process
+over all cores. Beside it stands how far the edited light is from light that is solved afresh: along the same rays, to the end, of a
 solver that keeps them; else from nothing, until as little remains.
 """
 
@@ -54,8 +54,8 @@ COLUMNS = (
     Column("median", "median", ".3%"),
 )
 NOTE = (
-    "Medians, in milliseconds, of wall time and of CPU time over all cores. Longest part: of all edits, what a frame waits for at "
-    "most. Work: of the longest edit. RMS (over the mean) and median of local errors: from light that is solved afresh."
+    "Medians, in milliseconds, of wall time and of CPU time over all cores. Longest part: of all edits, what a frame waits for "
+    "at most. Work: of the longest edit. RMS (over the mean) and median of local errors: from light that is solved afresh."
 )
 
 
@@ -118,9 +118,7 @@ def _times(colour: RGB, factor: float) -> RGB:
 class _Bench:
     """Edits of one lightmap's materials. most: work before the edits; None: until converged."""
 
-    def __init__(
-        self, gpu: Gpu, lightmap: Lightmap, solver: Solver[Any], family: Family, most: int | None
-    ) -> None:
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, solver: Solver[Any], family: Family, most: int | None) -> None:
         self._gpu, self._lightmap, self._solver, self._family, self._most = gpu, lightmap, solver, family, most
         warm_up(gpu, solver, family.batch)
 

@@ -30,6 +30,7 @@ from app.solvers.gathering.inspectable import Inspectable
 from app.solvers.gathering.lamps import by_rays
 from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.origins import Origins
+from app.solvers.shooting.material_edits import common_factor
 from app.util.parts import is_running, run_to_end
 from app.visibility.rays import RayScene
 
@@ -137,17 +138,16 @@ class Gathering:
             self._look_at = LOOK_AGAIN * self.issued
         return 0
 
-    def _solve(self, from_nothing: bool) -> Iterator[None]:
-        """The bounces along a few of the rays, then along some, then what all of them find."""
+    def _solve(self, from_nothing: bool, begun: int = 0) -> Iterator[None]:
+        """The bounces along a few of the rays, then along some, then what all of them find. What a few leave missing shrinks
+        again along some. begun: steps along a few that were taken."""
         few, some = min(BATCH, self.issued), min(SYSTEM, self.issued)
+        direct, reflected = self.at_points.light, self.bounces.reflected
         if from_nothing:
-            yield from self.bounces.solve(
-                self.hits, self.at_points.light, few, steps_to(SOLVED, self.bounces.reflected)
-            )
+            steps = steps_to(SOLVED / ALIKE if some > few else SOLVED, reflected)
+            yield from self.bounces.solve(self.hits, direct, few, steps, begun=begun)
         if some > few or not from_nothing:
-            yield from self.bounces.solve(
-                self.hits, self.at_points.light, some, steps_to(ALIKE, self.bounces.reflected)
-            )
+            yield from self.bounces.solve(self.hits, direct, some, steps_to(ALIKE, reflected))
         yield from self.bounces.gather(self.hits, 0, self.issued, anew=True)
 
     def _shadow_rays(self, count: int) -> int:
@@ -175,7 +175,7 @@ class Gathering:
             self._show(few)
             yield
             if not self._edited:
-                yield from self._solve(from_nothing=True)
+                yield from self._solve(from_nothing=True, begun=FIRST_STEPS)
                 self._show(self.issued)
         self._judged.append((self.issued, self._compose.judge(self.direct.light)))
         return 0
@@ -258,8 +258,10 @@ class Gathering:
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the whole new solution, along the rays that are there."""
-        before = self.lightmap.emitted
+        factor = common_factor(self.lightmap, materials)
+        before = factor * self.lightmap.emitted
         self.lightmap.set_materials(materials)
+        self.bounces.scale(factor)
         if (self.lightmap.emitted < before / 2).any():
             self.bounces.clear()  # a thousandth of much light may be more than all of little
         if not self.issued:
