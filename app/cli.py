@@ -232,6 +232,8 @@ def _tables_flags(tables: Parser, family: Family) -> None:
 
 def _hard_flags(hard: Parser, family: Family) -> None:
     hard.add_argument("--only", nargs="+", metavar="NAME", help="only these cases (default all)")
+    help = "by this one only (default all but pairs, whose time grows with the square of the texels)"
+    hard.add_argument("--solver", choices=tuple(SOLVERS), help=help)
     hard.add_argument("--size", choices=HARD_SIZES, default=HARD_SIZES[0], help="of scenes and texels (default small)")
     json_flag(hard)
 

@@ -4,8 +4,8 @@ The scene is solved, then the lamp of most power is made to emit twice as much, 
 and back, again and again. Timed is, to the end of its GPU work, until the first picture that has all bounces along some of the
 rays, where a solver shows such, and until the whole new solution is there: the end of the piece of work that follows an edit,
 or, of solvers that distribute light, the moment when as little of it remains as before. CPU time is that of the whole process
-over all cores. Beside it stands how far the edited light is from light that is solved afresh: along the same rays, to the end, of a
-solver that keeps them; else from nothing, until as little remains.
+over all cores. Beside it stands how far the edited light is from light that is solved afresh: along the same rays, to the end, by
+a solver that keeps them; else from nothing, until as little remains.
 """
 
 from __future__ import annotations
