@@ -16,6 +16,7 @@ from app.scene.model import F64, Material, Scene
 from app.session.run import Stop
 from app.session.session import Session
 from app.solvers import ShootingOptions
+from app.solvers.gathering.direct import _folded
 from app.solvers.gathering.lamps import ALONE
 from app.solvers.gathering.solver import BATCH, FIRST, SHADOW_RAYS, SOLVED, Gathering
 from app.validation.scenes import furnace
@@ -157,6 +158,17 @@ def test_a_scene_lit_after_it_was_dark(gpu: Gpu) -> None:
 
 
 # -- lamps -------------------------------------------------------------------------------------------------------------
+
+
+def test_lamps_may_be_more_than_a_texture_has_rows(gpu: Gpu) -> None:
+    """Their list is folded, in order."""
+    n = 5 * gpu.limits.max_texture + 1
+    values = np.arange(4 * n, dtype=np.float32).reshape(n, 4) % 1021
+    texture = _folded(gpu, values)
+    width, height = texture.size
+    assert width * height < n + width and height <= gpu.limits.max_texture
+    np.testing.assert_array_equal(np.frombuffer(texture.read(), np.float32).reshape(-1, 4)[:n], values)
+    gpu.release_all(texture)
 
 
 def lamps_at_the_ceiling(count: int, materials: int) -> Scene:
