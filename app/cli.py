@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from app import __version__
+from app.atlas.options import AtlasOptions
 from app.commands.flags import (
     Parser,
     json_flag,
@@ -34,6 +35,9 @@ from app.render.options import DisplayOptions
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
 
 ERROR_SCENES = ("furnace", "cornell-box")
+EDIT_RAYS = 192  # of each texel
+EDIT_SOLVER = "gathering"  # of `bench edits`: made to be edited
+EDIT_SCENES = ("cornell-box", "museum")
 RAY_SCENES = ("cornell-box", "museum", "grotto")
 HARD_SIZES = ("small", "large")
 
@@ -71,10 +75,10 @@ class Command(NamedTuple):
 
 
 def solver_named(arguments: Sequence[str]) -> str:
-    """The solver that is asked for, whose flags are then known; the default one where none is, or none of that name."""
+    """The solver that is asked for, whose flags are then known; the command's default where none is, or none of that name."""
     words = [word for argument in arguments for word in argument.split("=", 1)]
     named = [value for flag, value in itertools.pairwise(words) if flag == "--solver" and value in SOLVERS]
-    return named[-1] if named else DEFAULT_SOLVER
+    return named[-1] if named else EDIT_SOLVER if tuple(arguments[:2]) == ("bench", "edits") else DEFAULT_SOLVER
 
 
 def build_parser(solver: str = DEFAULT_SOLVER) -> Parser:
@@ -99,6 +103,7 @@ def _bench_flags(parser: Parser, family: Family) -> None:
         "rays": Command(
             "millions of rays a second, and what the tree they walk takes to build", _rays_flags, _bench_rays
         ),
+        "edits": Command("milliseconds from an edit of a material to its light", _edits_flags, _bench_edits),
         "frames": Command("milliseconds per frame of the viewer, by part", _frames_flags, _bench_frames),
         "tables": Command("the papers' tables, ours beside theirs; minutes", _tables_flags, _bench_tables),
         "error": Command("error against time and shots, of each method; minutes", _error_flags, _bench_error),
@@ -157,6 +162,11 @@ def _info_flags(info: Parser, family: Family) -> None:
     json_flag(info)
 
 
+def _scenes_flag(parser: Parser, default: Sequence[str]) -> None:
+    help = f"files or names (default {' '.join(default)})"
+    parser.add_argument("scenes", nargs="*", default=default, metavar="scene", help=help)
+
+
 def _shots_flags(shots: Parser, family: Family) -> None:
     json_flag(shots)
     add_flags(shots, SOLVERS["shooting"].options)
@@ -171,17 +181,34 @@ def _frames_flags(frames: Parser, family: Family) -> None:
 
 
 def _rays_flags(rays: Parser, family: Family) -> None:
-    rays.add_argument(
-        "scenes",
-        nargs="*",
-        default=RAY_SCENES,
-        metavar="scene",
-        help=f"files or names (default {' '.join(RAY_SCENES)})",
-    )
+    _scenes_flag(rays, RAY_SCENES)
     rays.add_argument(
         "--seconds", type=positive(float), default=2.0, metavar="S", help="of each figure, about (default %(default)s)"
     )
     json_flag(rays)
+
+
+def _edits_flags(edits: Parser, family: Family) -> None:
+    _scenes_flag(edits, EDIT_SCENES)
+    add_flags(edits, AtlasOptions, only=("texels",))
+    before = EDIT_RAYS if family is SOLVERS[EDIT_SOLVER] else None
+    edits.add_argument(
+        f"--{family.unit}",
+        dest="work",
+        type=positive(int),
+        default=before,
+        metavar="N",
+        help=f"{family.unit} before the edit (default {before or 'until converged'})",
+    )
+    edits.add_argument(
+        "--repeats",
+        type=positive(int),
+        default=5,
+        metavar="N",
+        help="edits that each figure is of (default %(default)s)",
+    )
+    json_flag(edits)
+    solver_flags(edits, family, default=EDIT_SOLVER)
 
 
 def _tables_flags(tables: Parser, family: Family) -> None:
@@ -205,18 +232,14 @@ def _tables_flags(tables: Parser, family: Family) -> None:
 
 def _hard_flags(hard: Parser, family: Family) -> None:
     hard.add_argument("--only", nargs="+", metavar="NAME", help="only these cases (default all)")
+    help = "by this one only (default all but pairs, whose time grows with the square of the texels)"
+    hard.add_argument("--solver", choices=tuple(SOLVERS), help=help)
     hard.add_argument("--size", choices=HARD_SIZES, default=HARD_SIZES[0], help="of scenes and texels (default small)")
     json_flag(hard)
 
 
 def _error_flags(error: Parser, family: Family) -> None:
-    error.add_argument(
-        "scenes",
-        nargs="*",
-        default=ERROR_SCENES,
-        metavar="scene",
-        help=f"files or names (default {' '.join(ERROR_SCENES)})",
-    )
+    _scenes_flag(error, ERROR_SCENES)
     error.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write")
     error.add_argument(
         "--methods",
@@ -324,6 +347,12 @@ def _bench_rays(flags: argparse.Namespace) -> int:
     from app.bench.speed.rays import bench_rays
 
     return bench_rays(flags)
+
+
+def _bench_edits(flags: argparse.Namespace) -> int:
+    from app.bench.speed.edits import bench_edits
+
+    return bench_edits(flags)
 
 
 def _bench_frames(flags: argparse.Namespace) -> int:

@@ -140,7 +140,7 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
             for k, at in enumerate((u, v)):
                 np.add.at(middle[k], slot, covered * at)
         slot, at = _beside(pieces, over, uv, face, middle / np.where(area > 0, area, 1.0), leaves, charts.tile)
-        f, (du, dv) = face[slot], (at - uv[face[slot], 0]).T * size
+        f, (du, dv) = face[slot].astype(np.int64), (at - uv[face[slot], 0]).T * size
         for k in range(3):
             lead[k, slot] = origin[f, k] + du * tangents[0, f, k] + dv * tangents[1, f, k]
         moment[:, slot] = area[slot] * lead[:, slot]

@@ -46,12 +46,10 @@ def scene_flags(parser: Parser, *, optional: bool = False) -> None:
     add_flags(parser, AtlasOptions)
 
 
-def solver_flags(parser: Parser, family: Family) -> None:
+def solver_flags(parser: Parser, family: Family, *, default: str = DEFAULT_SOLVER) -> None:
     """Which solver, its options, and how light is held."""
     help = "; ".join(f"{name}: {row.help}" for name, row in SOLVERS.items())
-    parser.add_argument(
-        "--solver", choices=tuple(SOLVERS), default=DEFAULT_SOLVER, help=f"{help} (default %(default)s)"
-    )
+    parser.add_argument("--solver", choices=tuple(SOLVERS), default=default, help=f"{help} (default %(default)s)")
     add_flags(parser, family.options)
     add_flags(parser, LightmapOptions)
 

@@ -13,7 +13,7 @@ from app.lightmap.options import STORAGE, LightmapOptions
 from app.lightmap.refinement import Refinement
 from app.lightmap.textures import LightTextures
 from app.lightmap.tile_pool import TilePool
-from app.scene.model import F32, F64, Scene
+from app.scene.model import F32, F64, Material, Scene
 
 SHARES = np.float32(glsl_constant("common/ambient.glsl", "SHARES"))  # of what is still to come, that a texel may have
 DEFAULT = LightmapOptions()
@@ -50,6 +50,19 @@ class Lightmap(LightTextures):
         """How it holds light now."""
         options = self._options if self.refinement is None else self.refinement.options
         return options.replace(storage=self.storage)
+
+    def common_factor(self, materials: tuple[Material, ...]) -> F64:
+        """(3,) by which light that is there is scaled for other emissions E': per channel, the median of E'/E, weighted with E A.
+        Of all factors a, it leaves least to shoot, min Σ |E' - a E| A. 1 where a channel emits nothing."""
+        before, after = (np.array([m.emission for m in ms]) for ms in (self.scene.materials, materials))
+        factor = np.ones(3)
+        for c in range(3):
+            emits = before[:, c] > 0
+            ratio, weight = after[emits, c] / before[emits, c], (before * self.pool.emission_weights)[emits, c]
+            order = np.argsort(ratio)
+            if weight.sum() > 0:
+                factor[c] = ratio[order][np.searchsorted(np.cumsum(weight[order]), weight.sum() / 2)]
+        return factor
 
     def set_options(self, options: LightmapOptions) -> None:
         """Hold light in another way: leaves follow by and by; with another storage it is undefined, reset the solver then."""

@@ -75,13 +75,13 @@ def projections_of(solver: str) -> tuple[str | None, ...]:
 
 
 def methods_of(solver: str) -> tuple[Method, ...]:
-    """Every lightmap by every projection."""
-    lightmaps = False, True
+    """Every lightmap by every projection; no quadtrees where texels are compared two by two."""
+    lightmaps = (False,) if SOLVERS[solver].quadratic else (False, True)
     return tuple(Method(solver, adaptive, by) for adaptive in lightmaps for by in projections_of(solver))
 
 
 METHODS = (
-    *(method for solver, family in SOLVERS.items() if not family.quadratic for method in methods_of(solver)),
+    *(method for solver in SOLVERS for method in methods_of(solver)),
     *(Method(storage=storage) for storage in STORAGE if storage != FULL),
 )
 # where how a shooter sees, and how light is stored, plays no part
@@ -203,6 +203,10 @@ class HardCase:
     grazes: bool = True
     methods: tuple[Method, ...] = METHODS
 
+    def methods_by(self, solver: str | None) -> list[Method]:
+        """Those of one solver, or of all but those that take the square of the texels' time."""
+        return [m for m in self.methods if (not m.family.quadratic if solver is None else m.solver == solver)]
+
     def run(self, gpu: Gpu, method: Method, size: str, controls: Controls) -> tuple[Solution, list[Check]]:
         """Solve it by this method; its light, and the checks of every case before its own. controls: solved so far, by cases that
         share them."""
@@ -247,6 +251,10 @@ class HardCase:
         atlas = AtlasOptions(density=self.density[i] / scale)
         light = LightmapOptions(adaptive=method.adaptive, depth=1, storage=method.storage)
         options = method.options(self.map[i], least)
+        if (
+            method.family.remains == "changed"
+        ):  # no less than what can be asked for: bounces change the last digits for ever
+            least = getattr(options, method.family.threshold)
         with opened(gpu, scene, atlas, light, options, method.solver) as (lightmap, solver):
             batch = method.family.batch
             few = FEW_RAYS if gathers else 0

@@ -1,6 +1,7 @@
 """``glowtree bench hard``: scenes that are hard on a light solver, each with the answer it must give and how far off it may be.
 
-Every case is solved by every method that suits it: uniform texels and quadtrees, all projections, and storage in fewer bits.
+Every case is solved by every method that suits it: uniform texels and quadtrees, all projections, and storage in fewer bits; with
+``--solver`` by those of one solver.
 """
 
 from __future__ import annotations
@@ -19,9 +20,11 @@ from app.validation.cases import CASES
 
 
 def bench_hard(flags: argparse.Namespace) -> int:
-    """Print the table; 1 if a check does not hold."""
+    """Print the table; 1 if a check does not hold. Raises UserError."""
     console = Console(quiet=flags.json)
-    work = [(case, method) for case in chosen(flags.only) for method in case.methods]
+    work = [(case, method) for case in chosen(flags.only) for method in case.methods_by(flags.solver)]
+    if not work:
+        raise UserError(f"--solver {flags.solver}: none of these cases is for it")
     results, controls = [], Controls()
     with gpu_context() as gpu, console.progress("hard cases") as tell:
         for i, (case, method) in enumerate(work):

@@ -17,9 +17,10 @@ from app.scene.shapes import box, merged
 from app.session.run import Stop
 from app.session.session import Session
 from app.solvers import ShootingOptions
+from app.solvers.gathering.direct import folded
 from app.solvers.gathering.lamps import ALONE
-from app.solvers.gathering.solver import FIRST, SHADOW_RAYS, SOLVED, Gathering
-from app.validation.scenes import across, scene_of
+from app.solvers.gathering.solver import BATCH, FIRST, SHADOW_RAYS, SOLVED, Gathering
+from app.validation.scenes import across, furnace, scene_of
 
 RAYS = 32
 LAMP, RED = 2, 1
@@ -81,6 +82,29 @@ def test_an_edit_traces_nothing_and_ends_where_a_fresh_solve_ends(gpu: Gpu, name
     fresh.release()
 
 
+def test_the_first_picture_of_a_lamp_that_is_brighter_as_a_whole_has_all_of_its_light(gpu: Gpu) -> None:
+    """Light is linear in it: what is there is scaled, and only then solved for."""
+    lit = gathered(gpu, table_room(), rays=BATCH)
+    before, drawn, lamp = lit.H, lit.rays.drawn, lit.lightmap.scene.materials[LAMP].emission
+    lit.rays.set_materials(edited(lit.lightmap.scene, lamp=(LAMP, {"emission": tuple(8 * e for e in lamp)})))
+    parts = lit.rays.work(BATCH)
+    while lit.rays.drawn == drawn:
+        next(parts)
+    assert_same(lit.H, 8 * before, 1e-2)
+    lit.release()
+
+
+def test_an_edit_finds_the_level_of_light_where_nearly_all_is_reflected(gpu: Gpu) -> None:
+    """In a closed room that glows B = E / (1 - ρ), whichever way its albedo went."""
+    lit = gathered(gpu, furnace(0.999))
+    for albedo in (0.97, 0.99):
+        lit.rays.set_materials(edited(lit.lightmap.scene, all=(0, {"albedo": (albedo,) * 3})))
+        lit.step(8)
+        lit.rays.settle()
+        assert np.average(lit.H.mean(1), weights=lit.area) * (1 - albedo) == pytest.approx(1.0, abs=0.01)
+    lit.release()
+
+
 @pytest.mark.usefixtures("same_rays")
 def test_a_lamp_switched_on_later_costs_its_own_shadow_rays(gpu: Gpu) -> None:
     """As many as the lamp that is there has had; and from then on its light is known, off or on."""
@@ -135,6 +159,17 @@ def test_a_scene_lit_after_it_was_dark(gpu: Gpu) -> None:
 
 
 # -- lamps -------------------------------------------------------------------------------------------------------------
+
+
+def test_lamps_may_be_more_than_a_texture_has_rows(gpu: Gpu) -> None:
+    """Their list is folded, in order."""
+    n = 5 * gpu.limits.max_texture + 1
+    values = np.arange(4 * n, dtype=np.float32).reshape(n, 4) % 1021
+    texture = folded(gpu, values)
+    width, height = texture.size
+    assert width * height < n + width and height <= gpu.limits.max_texture
+    np.testing.assert_array_equal(np.frombuffer(texture.read(), np.float32).reshape(-1, 4)[:n], values)
+    gpu.release_all(texture)
 
 
 def lamps_at_the_ceiling(count: int, materials: int) -> Scene:

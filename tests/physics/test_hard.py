@@ -32,7 +32,7 @@ def controls() -> Controls:
             case, method, id=f"{case.name} {method.name}", marks=() if method == Method() else pytest.mark.long
         )
         for case in CASES
-        for method in case.methods
+        for method in case.methods_by(None)
         if not method.adaptive or method.projection in (None, HEMICUBE)
     ],
 )
@@ -40,6 +40,27 @@ def test_hard_case(gpu: Gpu, controls: Controls, case: HardCase, method: Method)
     _, checks = case.run(gpu, method, "small", controls)
     broken = [c for c in checks if not c.holds]
     assert not broken, "; ".join(f"{c.what}: {c.measured:.6g}, not {c.expected:.4g} {allowed(c)}" for c in broken)
+
+
+@pytest.mark.parametrize("solver", [None, *SOLVERS])
+def test_one_solver_or_all_but_those_that_are_slow(solver: str | None) -> None:
+    solvers = {m.solver for case in CASES for m in case.methods_by(solver)}
+    assert solvers == ({solver} if solver else {"shooting", "gathering"})
+
+
+def test_command_solves_by_one_solver(gpu: Gpu, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["bench", "hard", "--solver", "gathering", "--only", "corner-90", "--json"]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert [(c["way"]["solver"], c["way"]["adaptive"]) for c in values["cases"]] == [
+        ("gathering", False),
+        ("gathering", True),
+    ]
+    assert all(c["rays"] > 0 for c in values["cases"])
+    assert run(["bench", "hard", "--solver", "pairs", "--only", "corner-90", "--json"]) == 0
+    [pairs] = json.loads(capsys.readouterr().out)["cases"]
+    assert pairs["way"]["solver"] == "pairs" and pairs["bounces"] > 0
+    assert run(["bench", "hard", "--solver", "gathering", "--only", "many-shots"]) == 2
+    assert "none of these cases" in capsys.readouterr().err
 
 
 def test_any_family_of_solvers_has_its_methods(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,6 @@ from solver_scenes import Solution, begin, grey, solve, table_room
 
 from app.gpu import Gpu
 from app.scene.model import Material, Scene
-from app.solvers.shooting.material_edits import common_factor
 
 pytestmark = pytest.mark.long
 
@@ -109,8 +108,8 @@ def test_the_factor_is_the_best_one(gpu: Gpu) -> None:
     )
     room = begin(gpu, scene, texels=1000)
     brighter = edited(scene, 0, {"emission": tuple(3 * e for e in scene.materials[0].emission)})
-    np.testing.assert_allclose(common_factor(room.lightmap, brighter)[1:], 3)  # nothing else is green or blue
+    np.testing.assert_allclose(room.lightmap.common_factor(brighter)[1:], 3)  # nothing else is green or blue
     small = edited(scene, 1, {"emission": (9.0, 0.0, 0.0)})
     area = room.lightmap.pool.emission_weights[:2, 0] * [m.emission[0] for m in scene.materials[:2]]
-    assert common_factor(room.lightmap, small)[0] == pytest.approx(1 if area[0] > area[1] else 9)
+    assert room.lightmap.common_factor(small)[0] == pytest.approx(1 if area[0] > area[1] else 9)
     room.release()

@@ -20,6 +20,7 @@ import numpy as np
 
 from app.gpu import Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
+from app.scene.model import F64
 from app.solvers.gathering.hits import Hits
 
 # Texels with few rays do not see each other alike: eigenvalues leave the real axis by about λ/√N, and the iteration diverges
@@ -55,6 +56,7 @@ class Bounces:
         area = np.bincount(scene.material_ids, scene.normals_areas[1], len(scene.materials))
         self._share = area / area.sum()  # of each material
         self.reflected, self.steps = 0.0, 0
+        self._omega = 1.0  # of the last step
         self._sources: Texture | None = None
         size = points.size
         self._solutions = [gpu.texture(size, 4, "f4") for _ in range(2)]
@@ -68,6 +70,11 @@ class Bounces:
         self.steps = 0
         for target in (*self._targets, self._gathered_target):
             target.clear()
+
+    def scale(self, factor: F64) -> None:
+        """Multiply the solution, and the one before, by a factor (3,) for each channel."""
+        for solution in self._targets:
+            self._scale.draw(solution, uniforms={"u_factor": tuple(factor.tolist())}, blend="multiply")
 
     @property
     def solution(self) -> Texture:
@@ -85,11 +92,15 @@ class Bounces:
         mean = self._share @ np.array([m.albedo for m in materials])
         self.reflected = min(float(mean.max()), MOST_REFLECTED)
 
-    def solve(self, hits: Hits, direct: Texture, rays: int, steps: int) -> Generator[None, None, None]:
-        """So many steps from the solution as it is, along so many rays of each texel, in parts."""
-        omega, self.steps = 1.0, steps
-        for step in range(steps):
-            yield from self.gather(hits, 0, rays, anew=True)
+    def solve(
+        self, hits: Hits, direct: Texture, rays: int, steps: int, *, begun: int = 0
+    ) -> Generator[None, None, None]:
+        """So many steps from the solution as it is, along so many rays of each texel, in parts. begun: steps of these that the
+        last solve took, along the same rays, and what they find was gathered since: it goes on."""
+        omega, self.steps = self._omega if begun else 1.0, max(steps, begun)
+        for step in range(begun, steps):
+            if step == 0 or step > begun:
+                yield from self.gather(hits, 0, rays, anew=True)
             if self.reflected >= MOST_REFLECTED and step > 0 and step in (1, steps // 2, steps - 1):
                 self._rebalance(direct, rays)
                 yield from self.gather(hits, 0, rays, anew=True)
@@ -97,6 +108,7 @@ class Bounces:
                 omega = 2 / (2 - self.reflected**2)
             elif step > 1:
                 omega = 1 / (1 - self.reflected**2 * omega / 4)
+            self._omega = omega
             self._solutions.reverse()
             self._targets.reverse()
             self._relax.draw(
@@ -117,9 +129,7 @@ class Bounces:
         self._sum.draw(target, textures=textures | points.textures("t_position_area"), uniforms={"u_rays": float(rays)})
         came, missing = (np.frombuffer(t.read(), np.float32).reshape(-1, 4).astype(np.float64).sum(0)[:3] for t in sums)
         self._gpu.release_all(target, *sums)
-        factor = np.where(missing > 0, came / np.maximum(missing, 1e-300), 1.0)
-        for solution in self._targets:
-            self._scale.draw(solution, uniforms={"u_factor": tuple(factor.tolist())}, blend="multiply")
+        self.scale(np.where(missing > 0, came / np.maximum(missing, 1e-300), 1.0))
 
     def gather(self, hits: Hits, first: int, count: int, *, anew: bool) -> Iterator[None]:
         """Add what so many rays of each texel find of the solution to ``gathered``, in parts; ``anew``: to nothing."""

@@ -32,9 +32,10 @@ class Compose:
         self._gpu, self._lightmap, self._origins, self._points, self._at = gpu, lightmap, origins, points, at
         reads = lightmap.defines("MATERIAL_BITS", "TILE")
         self._finer = points is not lightmap
-        self._aim = Pass(gpu, "solvers/gathering/pilot", defines=reads)
+        tile = lightmap.defines("TILE")
+        self._aim = Pass(gpu, "solvers/gathering/pilot", defines=tile)
         self._smooth = {
-            radius: Pass(gpu, "solvers/gathering/smooth", defines={"RADIUS": radius} | reads) for radius in (RADIUS, 0)
+            radius: Pass(gpu, "solvers/gathering/smooth", defines={"RADIUS": radius} | tile) for radius in (RADIUS, 0)
         }
         self._pilot = gpu.texture(points.size, 2, "f4")
         self._pilot_target = gpu.target(self._pilot)
@@ -45,6 +46,7 @@ class Compose:
         self._target: Framebuffer | None = None
         self._of: Texture | None = None
         self._walls = self._look_for_walls(rays)
+        self._windows = self._open_windows()
         self._fit()
 
     def _look_for_walls(self, rays: RayScene) -> Texture:
@@ -63,6 +65,27 @@ class Compose:
         self._gpu.release_all(target)
         return walls
 
+    def _open_windows(self) -> dict[str, Texture]:
+        """Which points the window around each one reaches, and where they are: see window.glsl."""
+        gpu, points = self._gpu, self._points
+        around = gpu.texture((3 * points.columns, 3 * points.rows), 2, "u4")
+        reach = gpu.texture(points.size, 4, "u4")
+        places = points.textures("t_pages", "t_leaves")
+        for name, texture, reads, defines in (
+            ("tiles_beside", around, {}, ("TILE",)),
+            (
+                "reach",
+                reach,
+                {"t_origin_normal": self._at.normals, "t_walls": self._walls},
+                ("MATERIAL_BITS", "TILE"),
+            ),
+        ):
+            target = gpu.target(texture)
+            look = Pass(gpu, f"solvers/gathering/{name}", defines=points.defines(*defines))
+            look.draw(target, textures=places | reads, uniforms=self._places)
+            gpu.release_all(target)
+        return {"t_reach": reach, "t_tiles_beside": around}
+
     def _fit(self) -> None:
         self.variance = self._gpu.texture(self._lightmap.size, 1, "f4")
         self._noise = self._gpu.texture((self._lightmap.columns, self._lightmap.rows), 4, "f4")
@@ -70,9 +93,8 @@ class Compose:
 
     def smooth(self, gathered: Texture, rays: int, *, smooth: bool) -> None:
         """Bring ``indirect`` up to date with what so many rays of each point have gathered."""
-        textures = {"t_gathered": gathered, "t_origin_normal": self._at.normals, "t_walls": self._walls}
-        textures |= self._points.textures("t_pages", "t_leaves")
-        uniforms = {"u_rays": float(max(rays, 1))} | self._places
+        textures = {"t_gathered": gathered} | self._windows
+        uniforms = {"u_rays": float(max(rays, 1))}
         self._aim.draw(self._pilot_target, textures=textures, uniforms=uniforms)
         how = self._smooth[RADIUS if smooth else 0]
         how.draw(self._indirect_target, textures=textures | {"t_pilot": self._pilot}, uniforms=uniforms)
@@ -118,6 +140,7 @@ class Compose:
         self._forget_target()
         self._gpu.release_all(self._noise_target, self._noise, self.variance, self._indirect_target, self.indirect)
         self._gpu.release_all(self._pilot_target, self._pilot, self._walls)
+        self._gpu.release_all(*self._windows.values())
 
 
 def noise_of(judged: ReadBack) -> tuple[float, float]:

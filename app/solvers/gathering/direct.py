@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
+from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import QUAD_FORMAT, quads, upload
 from app.lightmap.tile_pool import Moves
@@ -25,16 +25,19 @@ from app.solvers.gathering.origins import Origins
 from app.visibility.rays import RayScene
 
 PASS = 4  # shadow rays: one sample of the noise
+A_ROW = 1 << int(glsl_constant("solvers/gathering/folded.glsl", "FOLD_BITS"))
 STREAM = 1  # of random numbers, of the first set
 
 
 @dataclass
 class Lit:
-    """What is known of the light of one set. count: shadow rays of each texel, in passes of PASS."""
+    """What is known of the light of one set. count: shadow rays of each texel, in passes of PASS. alike: whether chances are the
+    same in all tiles."""
 
     lamps: LampSet
     table: Texture
     chances: Texture
+    alike: bool
     seen: Texture
     target: Framebuffer
     unoccluded: Texture | None
@@ -75,20 +78,23 @@ class DirectLight:
     def add(self, lamps: LampSet) -> None:
         """Another set, none of whose light is known yet."""
         gpu, size = self._gpu, self._lightmap.size
-        table = upload(gpu, lamps.rows)
-        chance = upload(gpu, chances(self._lightmap.pool, lamps)[..., None])
+        chance = chances(self._lightmap.pool, lamps)
         seen = gpu.texture(size, 4, "f4")
         target = gpu.target(seen)
         target.clear()
         unoccluded = gpu.texture(size, 1, "f4") if lamps.closed_form else None
         self._streams += 1
-        self.sets.append(Lit(lamps, table, chance, seen, target, unoccluded, STREAM + self._streams))
+        table, folded_chance = folded(gpu, lamps.rows.reshape(-1, 4)), folded(gpu, chance.reshape(-1, 1))
+        stream = STREAM + self._streams
+        self.sets.append(Lit(lamps, table, folded_chance, len(chance) == 1, seen, target, unoccluded, stream))
 
     def _look_unoccluded(self, lit: Lit, rects: F32) -> None:
         """Σ F of a set with a closed form, in these rectangles."""
         if lit.unoccluded is not None:
             target = self._gpu.target(lit.unoccluded)
-            self._draw(self._unoccluded, target, rects, {"t_lamps": lit.table}, {}, blend=None)
+            self._draw(
+                self._unoccluded, target, rects, {"t_lamps": lit.table}, {"u_lamps": len(lit.lamps.rows)}, blend=None
+            )
             self._gpu.release_all(target)
 
     def _draw(
@@ -144,6 +150,7 @@ class DirectLight:
         textures = {"t_lamps": lit.table, "t_chances": lit.chances}
         textures |= {name: texture for name, texture in self._rays.textures.items() if name != "t_bvh_uv"}
         uniforms = {"u_rays": (first, PASS), "u_stream": lit.stream}
+        uniforms |= {"u_lamps": len(lit.lamps.rows), "u_alike": lit.alike}
         self._draw(self._shoot[lit.lamps.closed_form], lit.target, rects, textures, uniforms, blend=blend)
 
     def shoot_tiles(self, slots: NDArray[np.int64]) -> Iterator[None]:
@@ -154,7 +161,7 @@ class DirectLight:
             self._look_unoccluded(lit, rects)
             table = chances(pool, lit.lamps)
             self._gpu.release_all(lit.chances)
-            lit.chances = upload(self._gpu, table[..., None])
+            lit.chances, lit.alike = folded(self._gpu, table.reshape(-1, 1)), len(table) == 1
             for first in range(0, lit.count, PASS):
                 self._trace(lit, rects, first, "add" if first else None)
                 yield
@@ -220,3 +227,11 @@ class DirectLight:
     def release(self) -> None:
         self.forget()
         self._gpu.release_all(self._target, self.light)
+
+
+def folded(gpu: Gpu, values: F32) -> Texture:
+    """A list (n, components) in rows of a texture, see folded.glsl."""
+    rows = -(-len(values) // A_ROW)
+    table = np.zeros((rows * A_ROW, values.shape[1]), np.float32)
+    table[: len(values)] = values
+    return upload(gpu, table.reshape(rows, A_ROW, -1))

@@ -122,7 +122,7 @@ class Hits:
                 self._gather.draw(
                     target,
                     textures={"t_hits": self._banks[bank].hits, "t_outgoing": outgoing},
-                    uniforms={"u_rays": (within, some), "u_bank": (width, height, self.edge)},
+                    uniforms={"u_rays": (within, some), "u_bank": (width, height, self.edge)} | self._rows,
                     blend="add",
                 )
             else:

@@ -60,7 +60,7 @@ def points_of(lightmap: Lightmap) -> TilePool:
 class Gathering:
     """Gathers the light of one lightmap. Whoever makes it releases it.
 
-    issued: rays of each texel.
+    issued: rays of each texel. drawn: how often the light that is shown was drawn anew.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: GatheringOptions) -> None:
@@ -80,7 +80,7 @@ class Gathering:
         self._under_way: Generator[None, None, int] | None = None
         self._judged: list[tuple[int, ReadBack]] = []
         self._progress = Progress(0, 1.0, np.zeros(3))
-        self._edited, self._shown = False, 0
+        self._edited, self._shown, self.drawn = False, 0, 0
         self._noise = 1.0, 0.0
         self._fresh: set[int] = set()  # slots whose leaves have no rays yet
         self._look_at = 0  # rays at which leaves are looked at again
@@ -148,17 +148,16 @@ class Gathering:
             self._look_at = LOOK_AGAIN * self.issued
         return 0
 
-    def _solve(self, from_nothing: bool) -> Iterator[None]:
-        """The bounces along a few of the rays, then along some, then what all of them find."""
+    def _solve(self, from_nothing: bool, begun: int = 0) -> Iterator[None]:
+        """The bounces along a few of the rays, then along some, then what all of them find. What a few leave missing shrinks
+        again along some. begun: steps along a few that were taken."""
         few, some = min(BATCH, self.issued), min(SYSTEM, self.issued)
+        direct, reflected = self.at_points.light, self.bounces.reflected
         if from_nothing:
-            yield from self.bounces.solve(
-                self.hits, self.at_points.light, few, steps_to(SOLVED, self.bounces.reflected)
-            )
+            steps = steps_to(SOLVED / ALIKE if some > few else SOLVED, reflected)
+            yield from self.bounces.solve(self.hits, direct, few, steps, begun=begun)
         if some > few or not from_nothing:
-            yield from self.bounces.solve(
-                self.hits, self.at_points.light, some, steps_to(ALIKE, self.bounces.reflected)
-            )
+            yield from self.bounces.solve(self.hits, direct, some, steps_to(ALIKE, reflected))
         yield from self.bounces.gather(self.hits, 0, self.issued, anew=True)
 
     def _shadow_rays(self, count: int) -> int:
@@ -186,7 +185,7 @@ class Gathering:
             self._show(few)
             yield
             if not self._edited:
-                yield from self._solve(from_nothing=True)
+                yield from self._solve(from_nothing=True, begun=FIRST_STEPS)
                 self._show(self.issued)
         self._judged.append((self.issued, self._compose.judge(self.direct.light)))
         return 0
@@ -195,7 +194,7 @@ class Gathering:
         """What so many rays of each texel have gathered."""
         self._compose.smooth(self.bounces.gathered, rays, smooth=self.options.smooth)
         self._compose.draw(self.direct.light)
-        self._shown = rays
+        self._shown, self.drawn = rays, self.drawn + 1
 
     @property
     def _directs(self) -> tuple[DirectLight, ...]:
@@ -269,8 +268,10 @@ class Gathering:
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the whole new solution, along the rays that are there."""
-        before = self.lightmap.emitted
+        factor = self.lightmap.common_factor(materials)
+        before = factor * self.lightmap.emitted
         self.lightmap.set_materials(materials)
+        self.bounces.scale(factor)
         if (self.lightmap.emitted < before / 2).any():
             self.bounces.clear()  # a thousandth of much light may be more than all of little
         if not self.issued:

@@ -66,17 +66,3 @@ def needs_restart(lightmap: Lightmap, materials: tuple[Material, ...]) -> bool:
 def exceeds_half(lightmap: Lightmap, materials: tuple[Material, ...]) -> bool:
     """Whether these emit so much more than what H and r are stored relative to that half floats would soon end."""
     return np.pi * max((max(m.emission) for m in materials), default=0.0) > HALF_HEADROOM * lightmap.unit
-
-
-def common_factor(lightmap: Lightmap, materials: tuple[Material, ...]) -> F64:
-    """(3,) by which light that is there is scaled for other emissions E': per channel, the median of E'/E, weighted with E A. Of
-    all factors a, it leaves least to shoot, min Σ |E' - a E| A. 1 where a channel emits nothing."""
-    before, after = (np.array([m.emission for m in ms]) for ms in (lightmap.scene.materials, materials))
-    factor = np.ones(3)
-    for c in range(3):
-        emits = before[:, c] > 0
-        ratio, weight = after[emits, c] / before[emits, c], (before * lightmap.pool.emission_weights)[emits, c]
-        order = np.argsort(ratio)
-        if weight.sum() > 0:
-            factor[c] = ratio[order][np.searchsorted(np.cumsum(weight[order]), weight.sum() / 2)]
-    return factor

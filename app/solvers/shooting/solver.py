@@ -21,7 +21,7 @@ from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.shooting.audit import Audit
 from app.solvers.shooting.batch import Batch
 from app.solvers.shooting.choose import Choice
-from app.solvers.shooting.material_edits import MaterialEdits, common_factor, needs_restart
+from app.solvers.shooting.material_edits import MaterialEdits, needs_restart
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.records import BATCH, Shot, powers_of, shot_of, sizes_of
 from app.solvers.shooting.reports import Reports
@@ -223,7 +223,7 @@ class Shooting:
         if self.lightmap.refinement is not None:
             self.lightmap.refinement.begin_again()
             self._look_at = 0
-        factor, before = common_factor(self.lightmap, materials), self.lightmap.scene.materials
+        factor, before = self.lightmap.common_factor(materials), self.lightmap.scene.materials
         batch.scale(self._edits, factor)
         self._edits.enter(materials, factor)
         batch.weigh(at_least=batch.groups.settled * float(factor.max()))

@@ -10,7 +10,8 @@
 #include "solvers/gathering/origin.glsl"
 #include "visibility/rays.glsl"
 
-uniform sampler2D t_chances;  // of each lamp in each tile, or the same in all, summed up
+uniform sampler2D t_chances;  // folded: of each lamp in each tile, or the same in all, summed up
+uniform bool u_alike;         // whether they are the same in all
 uniform ivec2 u_rays;         // the first, and how many
 uniform int u_stream;         // of random numbers
 
@@ -18,13 +19,13 @@ layout(location = 0) out vec4 out_direct;
 
 // The lamp in whose share of [0, 1) a number lies, its probability, and where in that share the number lies.
 int chosen_lamp(int tile, float number, out float probability, out float rest) {
-    int low = 0, high = lamp_count() - 1;
+    int low = 0, high = u_lamps - 1, row = tile * u_lamps;
     while (low < high) {
         int middle = (low + high) / 2;
-        if (number < texelFetch(t_chances, ivec2(middle, tile), 0).r) high = middle; else low = middle + 1;
+        if (number < texelFetch(t_chances, folded(row + middle), 0).r) high = middle; else low = middle + 1;
     }
-    float before = low == 0 ? 0.0 : texelFetch(t_chances, ivec2(low - 1, tile), 0).r;
-    probability = texelFetch(t_chances, ivec2(low, tile), 0).r - before;
+    float before = low == 0 ? 0.0 : texelFetch(t_chances, folded(row + low - 1), 0).r;
+    probability = texelFetch(t_chances, folded(row + low), 0).r - before;
     rest = clamp((number - before) / max(probability, 1e-30), 0.0, 0.999999);
     return low;
 }
@@ -35,7 +36,7 @@ void main() {
     out_direct = vec4(0.0);
     if (!o.there) return;
     ivec2 slot = px / TILE;
-    int tile = min(slot.y * textureSize(t_leaves, 0).x + slot.x, textureSize(t_chances, 0).y - 1);
+    int tile = u_alike ? 0 : slot.y * textureSize(t_leaves, 0).x + slot.x;
     float all = 0.0;
     vec3 seen = vec3(0.0);
     for (int k = u_rays.x; k < u_rays.x + u_rays.y; ++k) {

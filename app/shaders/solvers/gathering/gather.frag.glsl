@@ -1,6 +1,7 @@
 // Σ B over some rays of each texel, B = ρH, and E of what is lit by rays alone, of the texel that was hit: read from where the
 // hits are kept, or traced again. Blended.
 #define TRACED 0
+#include "solvers/gathering/hit.glsl"
 #if TRACED
 #include "solvers/gathering/ray.glsl"
 #else
@@ -18,17 +19,24 @@ layout(location = 0) out vec4 out_light;  // a: Σ over groups (Σ mean of RGB)�
 void main() {
     ivec2 px = ivec2(gl_FragCoord.xy);
     out_light = vec4(0.0);
+    int last = u_rays.x + u_rays.y;
 #if TRACED
     Origin o = load_origin(px);
     if (!o.there) return;
+#else
+    // pages side by side, without a division for each ray
+    ivec2 page = u_bank.xy * ivec2(u_rays.x % u_bank.z, u_rays.x / u_bank.z);
+    if (texelFetch(t_hits, px + page, 0).x == no_texel(NONE)) last = u_rays.x;  // no texel, and so no ray: nothing to walk through
 #endif
-    for (int first = u_rays.x; first < u_rays.x + u_rays.y; first += GROUP) {
+    for (int first = u_rays.x; first < last; first += GROUP) {
         vec3 sum = vec3(0.0);
         for (int k = first; k < first + GROUP; ++k) {
 #if TRACED
             uint hit = trace(o, k);
 #else
-            uint hit = texelFetch(t_hits, px + u_bank.xy * ivec2(k % u_bank.z, k / u_bank.z), 0).x;
+            uint hit = texelFetch(t_hits, px + page, 0).x;
+            page.x += u_bank.x;
+            if (page.x == u_bank.x * u_bank.z) page = ivec2(0, page.y + u_bank.y);
 #endif
             sum += texelFetch(t_outgoing, ivec2(hit & 0xFFFFu, hit >> 16), 0).rgb;
         }

@@ -1,5 +1,7 @@
-// Triangles that emit, of one set of lamps: four rows each. A lamp that shines to both sides does so with its whole exitance.
-uniform sampler2D t_lamps;
+// Triangles that emit, of one set of lamps: four texels each. A lamp that shines to both sides does so with its whole exitance.
+#include "solvers/gathering/folded.glsl"
+uniform sampler2D t_lamps;  // folded
+uniform int u_lamps;        // how many
 
 struct Lamp {
     vec3 corner;
@@ -10,12 +12,10 @@ struct Lamp {
 };
 
 Lamp load_lamp(int nth) {
-    vec4 a = texelFetch(t_lamps, ivec2(0, nth), 0), b = texelFetch(t_lamps, ivec2(1, nth), 0);
-    vec4 c = texelFetch(t_lamps, ivec2(2, nth), 0), d = texelFetch(t_lamps, ivec2(3, nth), 0);
+    vec4 a = texelFetch(t_lamps, folded(4 * nth), 0), b = texelFetch(t_lamps, folded(4 * nth + 1), 0);
+    vec4 c = texelFetch(t_lamps, folded(4 * nth + 2), 0), d = texelFetch(t_lamps, folded(4 * nth + 3), 0);
     return Lamp(a.xyz, a.w, b.xyz, c.xyz, b.w > 0.5, d.rgb);
 }
-
-int lamp_count() { return textureSize(t_lamps, 0).y; }
 
 // What is seen under a smaller solid angle [sr] is alike all over: a point is chosen evenly on its area. Rounding of angles,
 // 1e-6, is less than a ten-thousandth of any larger one.

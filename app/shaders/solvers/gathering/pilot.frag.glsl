@@ -20,9 +20,6 @@ void visit(ivec2 px) {
 }
 
 void main() {
-    Window w = window_at(ivec2(gl_FragCoord.xy));
     out_pilot = vec2(0.0);
-    if (w.chart == NO_CHART) return;
-    walk(w);
-    out_pilot /= vec2(count, count * count);
+    if (walk(ivec2(gl_FragCoord.xy))) out_pilot /= vec2(count, count * count);
 }

@@ -23,11 +23,7 @@ void visit(ivec2 px) {
 }
 
 void main() {
-    ivec2 own_px = ivec2(gl_FragCoord.xy);
-    Window w = window_at(own_px);
-    out_indirect = vec4(texelFetch(t_gathered, own_px, 0).rgb / u_rays, 0.0);
-    if (w.chart == NO_CHART) return;
-    own = texelFetch(t_pilot, own_px, 0).xy;
-    walk(w);
-    out_indirect = vec4(sum / (count * u_rays), own.y * 9.0 / count);
+    ivec2 px = ivec2(gl_FragCoord.xy);
+    own = texelFetch(t_pilot, px, 0).xy;
+    out_indirect = walk(px) ? vec4(sum / (count * u_rays), own.y * 9.0 / count) : vec4(texelFetch(t_gathered, px, 0).rgb / u_rays, 0.0);
 }

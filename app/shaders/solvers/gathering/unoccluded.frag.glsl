@@ -56,7 +56,7 @@ void main() {
     out_unoccluded = 0.0;
     if (!o.there) return;
     float width = max(length(o.u), length(o.v));
-    for (int nth = 0; nth < lamp_count(); ++nth) {
+    for (int nth = 0; nth < u_lamps; ++nth) {
         Lamp lamp = load_lamp(nth);
         vec3 facing = cross(lamp.u, lamp.v);
         float distance = distance_of(lamp, o.position);

@@ -1,65 +1,24 @@
-// The points around a point, of the same chart and facing the same way, to which no wall stands in the way.
-#include "common/atlas.glsl"
-#include "common/texel_at.glsl"
+// The points around a point that its window reaches, see reach.frag.glsl.
+#include "common/tile.glsl"
 
-uniform usampler2D t_origin_normal;  // and the chart
-uniform sampler2D t_walls;            // see walls.frag.glsl
-
-const uint NO_CHART = 0xFFFFFFFFu;
-const float COS_ALIKE = 0.94;  // 20°
-
-struct Window {
-    uint chart;
-    vec3 normal;
-    ivec2 px, inside;
-    vec2 uv;
-    float texel;
-};
-
-Window window_at(ivec2 px) {
-    uvec2 mine = texelFetch(t_origin_normal, px, 0).xy;
-    vec3 leaf = texelFetch(t_leaves, px / TILE, 0).xyz;
-    ivec2 inside = px % TILE;
-    vec2 uv = (leaf.xy * float(TILE) + vec2(inside) + 0.5) * leaf.z;
-    return Window(mine.y, normal_from_octahedral(mine.x), px, inside, uv, leaf.z);
-}
-
-// The point so many texels away; negative where there is none, or none alike.
-ivec2 beside(Window w, ivec2 step) {
-    ivec2 at = w.inside + step, there = w.px + step;
-    if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, ivec2(TILE)))) there = texel_px_at(w.uv + vec2(step) * w.texel);
-    if (there.y < 0) return ivec2(-1);
-    uvec2 other = texelFetch(t_origin_normal, there, 0).xy;
-    return other.y == w.chart && dot(normal_from_octahedral(other.x), w.normal) >= COS_ALIKE ? there : ivec2(-1);
-}
-
-// Whether a wall stands between a point and the one a step (along one axis) from it.
-bool walled(ivec2 px, ivec2 next_px, ivec2 step) {
-    vec2 walls = texelFetch(t_walls, step.x + step.y > 0 ? px : next_px, 0).rg;
-    return (step.x != 0 ? walls.r : walls.g) > 0.5;
-}
+uniform usampler2D t_reach;
+uniform usampler2D t_tiles_beside;  // see tiles_beside.frag.glsl
 
 void visit(ivec2 px);
 
-// Visit every point of the window, RADIUS wide either way, to which a way along v and then along u leads.
-void walk(Window w) {
-    for (int up = -1; up <= 1; up += 2) {
-        ivec2 row_px = w.px;
-        for (int j = up < 0 ? -1 : 0; abs(j) <= RADIUS; j += up) {
-            if (j != 0) {
-                ivec2 next = beside(w, ivec2(0, j));
-                if (next.y < 0 || walled(row_px, next, ivec2(0, up))) break;
-                row_px = next;
-            }
-            visit(row_px);
-            for (int along = -1; along <= 1; along += 2) {
-                ivec2 px = row_px;
-                for (int i = along; abs(i) <= RADIUS; i += along) {
-                    ivec2 next = beside(w, ivec2(i, j));
-                    if (next.y < 0 || walled(px, next, ivec2(along, 0))) break;
-                    visit(px = next);
-                }
-            }
+// Visit every point that is reached, RADIUS texels either way. Whether there is any: a point itself, where it lies on a surface.
+bool walk(ivec2 px) {
+    uvec3 reach = texelFetch(t_reach, px, 0).xyz;
+    ivec2 slot = px / TILE, inside = px - slot * TILE;
+    for (int j = -RADIUS; j <= RADIUS; ++j) {
+        int row = j + 4, third = row < 3 ? 0 : row < 6 ? 1 : 2;
+        uint bits = (third == 0 ? reach.x : third == 1 ? reach.y : reach.z) >> (9 * (row - 3 * third) + 4 - RADIUS);
+        bits &= (1u << (2 * RADIUS + 1)) - 1u;
+        for (int i = -RADIUS; bits != 0u; ++i, bits >>= 1) {
+            if ((bits & 1u) == 0u) continue;
+            ivec2 at = inside + ivec2(i, j), tile = (at + TILE) / TILE;
+            visit(ivec2(texelFetch(t_tiles_beside, 3 * slot + tile, 0).xy) * TILE + at + TILE - tile * TILE);
         }
     }
+    return reach != uvec3(0u);
 }
