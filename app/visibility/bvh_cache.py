@@ -15,6 +15,8 @@ FORMAT = b"glowtree bvh 1"  # changes when build_bvh makes other trees, or Bvh h
 FEWEST = 4096  # triangles that a file is worth: the tree of fewer is built within two frames
 CACHE_FILES = 16  # kept, newest first: of a million triangles a file takes 30 MB
 
+HELD = {"nodes": "float32 3", "order": "int32 1", "cost": "float64 0", "depth": "int64 0"}  # types and dimensions
+
 
 def bvh_of(corners: F64, tell: Callable[[float], None] | None = None) -> Bvh:
     """The tree of ``build_bvh``, which see, read from the cache where it is there."""
@@ -31,12 +33,7 @@ def bvh_of(corners: F64, tell: Callable[[float], None] | None = None) -> Bvh:
 def _read(file: Path, count: int) -> Bvh | None:
     """A tree of so many triangles, or None where there is no such file or it holds none."""
     data = cache.read(file)
-    if data is None or {name: (array.dtype, array.ndim) for name, array in data.items()} != {
-        "nodes": (np.float32, 3),
-        "order": (np.int32, 1),
-        "cost": (np.float64, 0),
-        "depth": (np.int64, 0),
-    }:
+    if data is None or {name: f"{array.dtype} {array.ndim}" for name, array in data.items()} != HELD:
         return None
     bvh = Bvh(data["nodes"], data["order"], float(data["cost"]), int(data["depth"]))
     return bvh if _is_tree(bvh, count) else None
