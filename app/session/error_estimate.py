@@ -7,9 +7,7 @@ from collections.abc import Generator
 from app.estimate.error import ErrorEstimate, ErrorEstimator
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
-from app.util.background import BackgroundTask
-from app.visibility.bvh import Bvh
-from app.visibility.rays import tree_of
+from app.session.ray_tree import RayTree
 
 SECONDS = 10.0  # that are spent on it, unless fewer points would be too few
 NODES = 32  # per part: 20 ms of a Cornell box in software
@@ -26,7 +24,7 @@ class RunningEstimate:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._tree: BackgroundTask[Bvh] | None = None
+        self._tree: RayTree | None = None
         self._expectation: ErrorEstimator | None = None
         self._parts: Generator[float, None, ErrorEstimate | None] | None = None
         self._of: object = None
@@ -41,9 +39,7 @@ class RunningEstimate:
         """Some points of the light in this state; of another state than the last one's from the first point on. The first of a
         scene need a tree of its triangles, which is built in the background; wait: for that."""
         if self._tree is None:
-            self._tree = BackgroundTask(
-                "the error estimate", lambda tell: tree_of(lightmap.pool, lambda share: tell("", share))
-            )
+            self._tree = RayTree(lightmap.pool)
         if self._of != state:
             if not (wait or self._tree.ended):
                 return

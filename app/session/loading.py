@@ -15,7 +15,10 @@ from app.lightmap.tile_pool import Array, TilePool
 from app.render.exposure import first_exposure
 from app.scene.load import load_scene
 from app.scene.model import Scene
+from app.session.ray_tree import SORTING
+from app.solvers import SOLVERS
 from app.util.background import BackgroundTask, Progress
+from app.visibility.rays import tree_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +62,11 @@ def load(
     *,
     default_light: bool = False,
     expose: bool = False,
+    rays: bool = False,
     progress: Progress | None = None,
 ) -> Loaded:
-    """Read a scene, or take one as it is; unfold it, cut it into texels, and with ``expose`` find its exposure. Raises UserError
-    (SceneError)."""
+    """Read a scene, or take one as it is; unfold it, cut it into texels, with ``expose`` find its exposure, and with ``rays``
+    build the tree that they walk. Raises UserError (SceneError)."""
     tell: Progress = progress or (lambda stage, share: None)
     options = options or LightmapOptions()
     scene, charts, seconds = read_and_unfold(source, atlas, default_light, tell, roots=options.adaptive)
@@ -71,27 +75,31 @@ def load(
     pool = quadtree_pool(scene, charts) if options.adaptive else TilePool(scene, charts)
     exposure, arrays = first_exposure(pool) if expose else None, pool.arrays
     _ = pool.emission_weights, pool.visible_mesh  # cached here: the window, which reads them next, does not wait
+    seconds["texels"] = time.perf_counter() - start
+    if rays:
+        start = time.perf_counter()
+        tree_of(pool, lambda share: tell(SORTING, 0.8 + 0.2 * share))
+        seconds["rays"] = time.perf_counter() - start
     tell("done", 1.0)
-    return Loaded(pool, arrays, atlas, options, exposure, seconds | {"texels": time.perf_counter() - start})
+    return Loaded(pool, arrays, atlas, options, exposure, seconds)
 
 
 class Loading(BackgroundTask[Loaded]):
-    """A scene on its way, see ``load``."""
+    """A scene on its way, see ``load``. solver: by name, what it is made ready for."""
 
     def __init__(
         self,
         source: str | Path | Scene,
         atlas: AtlasOptions,
         options: LightmapOptions,
+        solver: str,
         *,
         default_light: bool = False,
         expose: bool = False,
     ) -> None:
-        self.source = source
-        super().__init__(
-            "this scene",
-            lambda tell: load(source, atlas, options, default_light=default_light, expose=expose, progress=tell),
-        )
+        self.source, self.solver = source, solver
+        more = {"default_light": default_light, "expose": expose, "rays": SOLVERS[solver].rays}
+        super().__init__("this scene", lambda tell: load(source, atlas, options, **more, progress=tell))
 
     @property
     def name(self) -> str:

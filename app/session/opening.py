@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from app.errors import UserError
 from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap
+from app.lightmap.options import LightmapOptions
 from app.lightmap.textures import upload
 from app.options import Options
 from app.session.loading import Loaded, Loading
-from app.solvers import Family, Solver
+from app.solvers import SOLVERS, Solver
 from app.util.parts import run_to_end
 
 Prepare = Callable[
@@ -22,16 +23,31 @@ Prepare = Callable[
 ]  # what else a lightmap needs before it is shown; returns what undoes it
 
 
+class Opened(Protocol):
+    """Called when another lightmap is open, of the same scene cut anew or of another one."""
+
+    def __call__(self, exposure: float | None, *, same_scene: bool, reference_gone: bool) -> None: ...
+
+
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """What can take the place of what is open: its light is as before any work. family: of its solver. began: when its upload did
-    [s], of ``time.perf_counter``."""
+    """What can take the place of what is open: its light is as before any work. solver_name: of the table of solvers. began: when
+    its upload did [s], of ``time.perf_counter``."""
 
     loaded: Loaded
     lightmap: Lightmap
     solver: Solver[Any]
-    family: Family
+    solver_name: str
     began: float
+
+    def catch_up(self, light: LightmapOptions, options: Options) -> None:
+        """With what has been chosen since: how light is held, options of the solver. Raises UserError."""
+        light = light.replace(adaptive=self.loaded.options.adaptive)
+        if self.lightmap.options != light:
+            self.lightmap.set_options(light)
+            self.solver.reset()
+        if self.solver.options != options:
+            self.solver.set_options(options)
 
 
 class Opening:
@@ -59,12 +75,13 @@ class Opening:
             self._parts.close()
         self.loading = self._parts = None
 
-    def part(self, family: Family, options: Options) -> Ready | None:
-        """The next part of what was loaded; all of it after the last. Raises UserError, and ends then."""
+    def part(self, options: Mapping[str, Options]) -> Ready | None:
+        """The next part of what was loaded, with the options of its solver; all of it after the last. Raises UserError, and ends
+        then."""
         assert self.loading is not None
         try:
             if self._parts is None:
-                self._parts = self._upload(self.loading.result, family, options)
+                self._parts = self._upload(self.loading.result, self.loading.solver, options)
             next(self._parts)
         except StopIteration as last:
             self.loading = self._parts = None
@@ -75,11 +92,11 @@ class Opening:
             raise
         return None
 
-    def at_once(self, loaded: Loaded, family: Family, options: Options) -> Ready:
+    def at_once(self, loaded: Loaded, solver_name: str, options: Mapping[str, Options]) -> Ready:
         """All of what was loaded elsewhere. Raises UserError."""
-        return run_to_end(self._upload(loaded, family, options))
+        return run_to_end(self._upload(loaded, solver_name, options))
 
-    def _upload(self, loaded: Loaded, family: Family, options: Options) -> Generator[None, None, Ready]:
+    def _upload(self, loaded: Loaded, solver_name: str, options: Mapping[str, Options]) -> Generator[None, None, Ready]:
         """Upload what was loaded, and draw once with each program, since drivers compile it then; yields after each part. Raises
         UserError; then, and when given up between two parts, nothing stays on the GPU."""
         began, gpu = time.perf_counter(), self._gpu
@@ -95,7 +112,7 @@ class Opening:
             undo.callback(lightmap.release)
             gpu.ctx.finish()
             yield
-            solver = family.make(gpu, lightmap, options)
+            solver = SOLVERS[solver_name].make(gpu, lightmap, options[solver_name])
             undo.callback(solver.release)
             yield
             yield from solver.warm_up()
@@ -106,4 +123,4 @@ class Opening:
                 gpu.ctx.finish()
                 yield
             undo.pop_all()
-        return Ready(loaded, lightmap, solver, family, began)
+        return Ready(loaded, lightmap, solver, solver_name, began)

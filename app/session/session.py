@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from app.atlas.charts import Charts
 from app.atlas.options import AtlasOptions
@@ -23,23 +23,19 @@ from app.scene.model import Material, Scene
 from app.session.compared import Compared
 from app.session.error_estimate import SECONDS, RunningEstimate
 from app.session.loading import Loading, load
-from app.session.opening import Opening, Prepare, Ready
+from app.session.opening import Opened, Opening, Prepare, Ready
 from app.session.run import Run, Stop
+from app.session.solver_choice import SolverChoice
 from app.session.stats import Stats, stats_of
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family, Solver
-
-
-class Opened(Protocol):
-    """Called when another lightmap is open, of the same scene cut anew or of another one."""
-
-    def __call__(self, exposure: float | None, *, same_scene: bool, reference_gone: bool) -> None: ...
+from app.util.background import BackgroundTask
 
 
 class Session:
     """The open scene with its lightmap and solver. Raises UserError (SceneError, GpuError) from ``open_now``; ``open`` reports
     through ``message`` instead. Whoever makes it releases it.
 
-    options: of the solver that is chosen. atlas, light: how scenes are cut, and how their light is held. expose_on_open:
+    options: of the solver that is at work. atlas, light: how scenes are cut, and how their light is held. expose_on_open:
     whether the exposure is forecast of a scene that opens. unedited: the open scene as it was read, the same through edits and
     however it is cut. load_seconds: of each stage of opening. message: what the user should know.
     """
@@ -56,13 +52,7 @@ class Session:
         expose_on_open: bool = False,
     ) -> None:
         """options: of that solver, its defaults if None; default_light: give scenes a ceiling light."""
-        if solver not in SOLVERS:
-            raise UserError(f"--solver {solver}: must be one of {', '.join(SOLVERS)}")
-        self.gpu = gpu
-        self.solver_name = solver
-        self._options = {name: family.options() for name, family in SOLVERS.items()}
-        if options is not None:
-            self._options[solver] = options
+        self.gpu, self._choice = gpu, SolverChoice(solver, options)
         self.atlas, self.light = atlas or AtlasOptions(), light or LightmapOptions()
         self.default_light, self.expose_on_open = default_light, expose_on_open
         self.message: str | None = None
@@ -86,14 +76,15 @@ class Session:
     def open(self, source: str | Path, *, reference: Path | None = None) -> None:
         """Start to load in the background; ``poll`` swaps the scene when it is there. reference: a bake to open then."""
         self._then_reference = reference
-        light, expose = self.default_light, self.expose_on_open
-        self._opening.begin(Loading(source, self.atlas, self.light, default_light=light, expose=expose))
+        more = {"default_light": self.default_light, "expose": self.expose_on_open}
+        self._opening.begin(Loading(source, self.atlas, self.light, self.chosen_solver, **more))
 
     def open_now(self, source: str | Path | Scene, progress: Callable[[str, float], None] | None = None) -> None:
         """Load and wait."""
-        light, expose = self.default_light, self.expose_on_open
-        loaded = load(source, self.atlas, self.light, default_light=light, expose=expose, progress=progress)
-        self._take_over(self._opening.at_once(loaded, self.family, self.options))
+        solver = self.chosen_solver
+        more = {"default_light": self.default_light, "expose": self.expose_on_open, "rays": SOLVERS[solver].rays}
+        loaded = load(source, self.atlas, self.light, **more, progress=progress)
+        self._take_over(self._opening.at_once(loaded, solver, self._choice.options))
 
     def cut_anew(self, atlas: AtlasOptions, *, adaptive: bool | None = None) -> None:
         """Cut the open scene anew, in the background; its materials as edited, exposure and camera stay. adaptive: whether into
@@ -101,7 +92,7 @@ class Session:
         if self.loading is not None and not (self._opened and self.loading.source is self.unedited):
             raise UserError(f"{self.loading.name} is loading: cut {self.name or 'it'} anew before or after that")
         light = self.light if adaptive is None else self.light.replace(adaptive=adaptive)
-        self._opening.begin(Loading(self.unedited, atlas, light))
+        self._opening.begin(Loading(self.unedited, atlas, light, self.chosen_solver))
 
     def poll(self, *, interactive: bool = False) -> None:
         """Once per frame: take in what the GPU reports, and swap in a scene that has finished loading, a part of it per frame.
@@ -112,6 +103,9 @@ class Session:
             self._open_part(self.loading)
         elif self._opened:
             self._busy = self.run.poll()
+        if self._choice.has_arrived:
+            self._busy = True
+            self._end_switching()
         if self._opened:
             self.compare()
             if self._idle and not self._busy and not interactive:
@@ -125,20 +119,21 @@ class Session:
             self.message = f"{loading.name}: stopped" + (f"; {self.name} stays as it is" if self._opened else "")
             return
         try:
-            ready = self._opening.part(self.family, self.options)
+            ready = self._opening.part(self._choice.options)
             if ready is not None:
                 self._take_over(ready)
         except UserError as error:
             self.message = str(error)
 
     def _take_over(self, ready: Ready) -> None:
-        """In place of what is open."""
-        loaded, lightmap = ready.loaded, ready.lightmap
-        scene = loaded.pool.scene
+        """In place of what is open. Raises UserError, also where it is open but the solver that has been chosen since cannot be
+        had."""
+        loaded, lightmap, solver = ready.loaded, ready.lightmap, ready.solver
+        scene, chosen = loaded.pool.scene, self.chosen_solver
         try:
-            solver = self._catch_up(ready)
+            ready.catch_up(self.light, self._choice.options[ready.solver_name])
         except UserError:
-            ready.solver.release()
+            solver.release()
             lightmap.release()
             raise
         same_scene = self._opened and scene is self.unedited
@@ -147,6 +142,7 @@ class Session:
             solver.reset()
         self.close()
         self.lightmap, self.solver, self.unedited = lightmap, solver, scene
+        self._choice.at_work = ready.solver_name
         self.atlas, self.light = loaded.atlas, lightmap.options
         self.load_seconds = loaded.seconds | {"upload": time.perf_counter() - ready.began}
         self.source = self.scene.source or self.scene.name
@@ -159,25 +155,11 @@ class Session:
         if self._then_reference is not None:
             self.compared.open(self._then_reference)
             self._then_reference = None
-
-    def _catch_up(self, ready: Ready) -> Solver[Any]:
-        """The solver of what was uploaded, by what has been chosen since: solver, options, how light is held. Raises
-        UserError."""
-        solver, light = ready.solver, self.light.replace(adaptive=ready.loaded.options.adaptive)
-        if ready.lightmap.options != light:
-            ready.lightmap.set_options(light)
-            solver.reset()
-        if ready.family is not self.family:
-            chosen = self.family.make(self.gpu, ready.lightmap, self.options)
-            solver.release()
-            chosen.reset()
-            return chosen
-        if solver.options != self.options:
-            solver.set_options(self.options)
-        return solver
+        self.set_solver(chosen)
 
     def close(self) -> None:
         """Release the open scene; the session can open another."""
+        self._choice.stop()
         if self._opened:
             self.estimate.release()
             self.solver.release()
@@ -195,6 +177,11 @@ class Session:
     def loading(self) -> Loading | None:
         """The scene that is on its way."""
         return self._opening.loading
+
+    @property
+    def on_its_way(self) -> BackgroundTask[Any] | None:
+        """What is waited for: the scene that is loading, or the rays of the solver that was chosen."""
+        return self.loading or self._choice.switching
 
     @property
     def opened(self) -> bool:
@@ -227,8 +214,8 @@ class Session:
 
     @property
     def _idle(self) -> bool:
-        """Whether the light stays as it is by itself, and no other scene is on its way."""
-        return self.loading is None and not self.solving and self.run.settled
+        """Whether the light stays as it is by itself, and neither another scene nor solver is on its way."""
+        return self.on_its_way is None and not self.solving and self.run.settled
 
     def advance(self, *, budget_ms: float, amount: int = 1, interactive: bool = False) -> int:
         """Do up to ``amount`` of work within ``budget_ms``; how much was issued. None when paused or converged, nor in a frame
@@ -263,38 +250,52 @@ class Session:
 
     @property
     def family(self) -> Family:
-        """The row of the table of solvers that is chosen."""
-        return SOLVERS[self.solver_name]
+        """The row of the table of solvers that is at work."""
+        return self._choice.family
+
+    @property
+    def solver_name(self) -> str:
+        """Its name there."""
+        return self._choice.at_work
+
+    @property
+    def chosen_solver(self) -> str:
+        """The name of the solver that was chosen last: the one at work, or one that waits for its rays."""
+        return self._choice.latest
 
     @property
     def options(self) -> Any:
-        """Of the solver that is chosen."""
-        return self._options[self.solver_name]
+        """Of the solver that is at work."""
+        return self._choice.options[self.solver_name]
 
     def set_options(self, options: Options) -> None:
         """Other options of the solver, from its next piece of work on. Raises UserError, and keeps those that it has."""
         if self._opened:
             self.solver.set_options(options)
-        self._options[self.solver_name] = options
+        self._choice.options[self.solver_name] = options
         if self._opened:
             self.run.options_changed()
 
     def set_solver(self, name: str) -> None:
-        """Another solver, live. It begins with the light that is there if its method can, else from nothing. Raises UserError."""
-        if name not in SOLVERS:
-            raise UserError(f"--solver {name}: must be one of {', '.join(SOLVERS)}")
-        if name == self.solver_name:
-            return
+        """Another solver, live. It begins with the light that is there if its method can, else from nothing. One that needs a
+        tree for its rays is waited for in the background, and all goes on as it was until then. Raises UserError."""
+        if self._choice.choose(name, self.lightmap.pool if self._opened else None):
+            self._switch(name)
+
+    def _end_switching(self) -> None:
+        try:
+            self._switch(self._choice.arrived())
+        except UserError as error:
+            self.message = str(error)
+
+    def _switch(self, name: str) -> None:
         if self._opened:
-            family = SOLVERS[name]
-            solver = family.make(
-                self.gpu, self.lightmap, self._options[name]
-            )  # before the other one goes: it may not be had
-            self.solver.release()
+            solver = SOLVERS[name].make(self.gpu, self.lightmap, self._choice.options[name])
+            self.solver.release()  # only now: the other one might not have been had
             self.solver = solver
-            if not family.keeps_light:
+            if not SOLVERS[name].keeps_light:
                 solver.reset()
-        self.solver_name = name
+        self._choice.at_work = name
         if self._opened:
             self._begin()
 

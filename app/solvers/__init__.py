@@ -32,6 +32,7 @@ class Family:
     says how little may remain when it has converged. pictures: captions of the images of its Inspection, and what they show.
     shows: options that change the light that is shown without any work. layers: names of what its solvers know of every texel.
     distributes: whether what remains is light that is still to be distributed, in the energy balance; else it is an error.
+    rays: whether it looks along rays, and so needs a tree of the scene's triangles (visibility/rays.py) before it is made.
     """
 
     title: str
@@ -48,6 +49,7 @@ class Family:
     layers: tuple[str, ...] = ()
     distributes: bool = True
     quadratic: bool = False
+    rays: bool = False
 
 
 SOLVERS: dict[str, Family] = {
@@ -77,6 +79,7 @@ SOLVERS: dict[str, Family] = {
         layers=("direct", "variance", "rays"),
         pictures={HEMISPHERE: SEEN},
         distributes=False,
+        rays=True,
     ),
     "pairs": Family(
         title="Texel pairs",
@@ -88,6 +91,7 @@ SOLVERS: dict[str, Family] = {
         batch=1,
         threshold="change",
         quadratic=True,
+        rays=True,
     ),
 }
 DEFAULT_SOLVER = "shooting"

@@ -152,7 +152,7 @@ class Ui:
         overlays.invitation(view, state)
         self._open_files(view)
         overlays.legend_overlay(state.legend, state)
-        overlays.loading_overlay(view.session.loading)
+        overlays.loading_overlay(view.session.on_its_way)
         overlays.toasts(view, state, seconds)
         overlays.help_overlay(state)
 

@@ -79,12 +79,12 @@ def _open(view: View, state: State) -> None:
 
 
 def _escape(view: View, state: State) -> None:
-    """Close what is open above the view, or stop a scene on its way; with nothing left, quit."""
+    """Close what is open above the view, or stop what is on its way; with nothing left, quit."""
     if state.show_help:
         state.show_help = False
         return
-    if view.session.loading is not None:
-        view.session.loading.cancel()
+    if view.session.on_its_way is not None:
+        view.session.on_its_way.cancel()
         if view.session.opened:
             return
     state.requests.append(Request.QUIT)

@@ -148,7 +148,7 @@ def invitation(view: View, state: State) -> None:
 
 
 def loading_overlay(loading: Any) -> None:
-    """Stage, progress and a way out while a scene is loading."""
+    """Stage, progress and a way out while a scene or a solver is on its way."""
     if loading is None:
         return
     imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))

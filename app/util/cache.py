@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
-import zipfile
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -34,8 +34,8 @@ def read(path: Path) -> Arrays | None:
     """The arrays of a file, or None where there is no such file or it is not whole."""
     try:
         with np.load(path) as data:
-            return dict(data)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            return {name: np.asarray(data[name]) for name in data.files}
+    except Exception:  # what is no .npz file, or half of one, makes numpy and zipfile raise nearly anything
         return None
 
 
@@ -50,9 +50,12 @@ def store(file: bytes, path: Path, files: int) -> None:
     """Keep an .npz file for next time, and of its kind the newest so many; a cache that cannot be written is none."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_suffix(f".{os.getpid()}.tmp")
-        partial.write_bytes(file)
-        partial.replace(path)
+        partial = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}.tmp")
+        try:
+            partial.write_bytes(file)
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
         by_age = sorted(path.parent.glob("*.npz"), key=lambda p: p.stat().st_mtime, reverse=True)
         for old in by_age[files:]:
             old.unlink()

@@ -201,7 +201,7 @@ class ViewerWindow(WindowConfig):
             self.wnd.render(now, min(elapsed, REST_SECONDS))
             if not self.wnd.is_closing:
                 self.wnd.swap_buffers()
-            waiting = self._session.loading is not None or self._session.compared.fetching is not None
+            waiting = self._session.on_its_way is not None or self._session.compared.fetching is not None
             if waiting and not self._session.solving:
                 time.sleep(LOADING_PAUSE)
 

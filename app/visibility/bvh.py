@@ -109,7 +109,7 @@ def _grow(tree: _Tree, boxes: Boxes, tell: Callable[[float], None]) -> None:
     """Part the nodes of one level after the other. Of a level, triangles come node by node, from the slots ``first`` on."""
     count = len(boxes.lower)
     items, counts, first, parent = np.arange(count), np.array([count]), np.array([0]), np.array([-1])
-    done = 0
+    whole = _to_do(counts)
     while len(counts):
         level = len(tree.levels) - 1
         cost, right = split_nodes(boxes, counts)
@@ -119,8 +119,7 @@ def _grow(tree: _Tree, boxes: Boxes, tell: Callable[[float], None]) -> None:
         tree.order[slots[leaf]] = items[leaf]
         tree.add_leaves(parent[is_leaf], first[is_leaf], counts[is_leaf])
         tree.add_level(parent[~is_leaf])
-        done += int(counts[is_leaf].sum())
-        tell(done / count)
+        tell(1 - _to_do(counts[~is_leaf]) / whole)
         if is_leaf.any():
             items, right, boxes = items[~leaf], right[~leaf], Boxes(boxes.lower[~leaf], boxes.upper[~leaf])
             counts, first, cost = counts[~is_leaf], first[~is_leaf], cost[~is_leaf]
@@ -132,6 +131,11 @@ def _grow(tree: _Tree, boxes: Boxes, tell: Callable[[float], None]) -> None:
         parent = np.arange(2 * len(counts)) + 2 * tree.levels[-2]
         first = np.stack([first, first + counts - on_right], 1).reshape(-1)
         counts = np.stack([counts - on_right, on_right], 1).reshape(-1)
+
+
+def _to_do(counts: Ints) -> float:
+    """Triangles times levels to come, about: each level halves nodes."""
+    return float((counts * np.log2(counts)).sum())
 
 
 def _leaves(boxes: Boxes, counts: Ints, cost: NDArray[np.float32]) -> Mask:

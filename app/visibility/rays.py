@@ -21,11 +21,11 @@ from app.errors import UserError
 from app.gpu import Gpu, Texture, glsl_constant
 from app.lightmap.tile_pool import MAX_FACETS, TilePool
 from app.scene.model import F32, F64
-from app.visibility.bvh import Bvh, build_bvh
+from app.visibility.bvh import Bvh
+from app.visibility.bvh_cache import FEWEST, bvh_of
 from app.visibility.bvh_table import Words, node_table
 
-_TREES: WeakKeyDictionary[TilePool, Bvh] = WeakKeyDictionary()
-_LOCK = threading.Lock()
+TELL_SECONDS = 0.05  # between two looks at a tree that another thread builds
 ENTRIES_A_ROW = 1 << int(glsl_constant("visibility/rays.glsl", "ROW_BITS"))
 
 
@@ -63,13 +63,46 @@ class RayScene:
         self._gpu.release_all(*self.textures.values())
 
 
+class _Tree:
+    """The tree of one tile pool, as soon as it is there; whoever holds the lock builds it. share: of it that is done."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.share = 0.0
+        self.bvh: Bvh | None = None
+
+
+_TREES: WeakKeyDictionary[TilePool, _Tree] = WeakKeyDictionary()
+_LOCK = threading.Lock()  # of the dictionary
+
+
 def tree_of(pool: TilePool, tell: Callable[[float], None] | None = None) -> Bvh:
-    """The tree of ``corners_of(pool)``, built once for each pool, by whoever asks first: any thread may. tell: see
-    ``build_bvh``."""
+    """The tree of ``corners_of(pool)``, built or read from the cache once for each pool, by whoever asks first: any thread may,
+    others wait. tell: is given the share that is done, now and then; what it raises ends the work, or the waiting."""
+    tree, hear = _known(pool), tell or (lambda share: None)
+
+    def say(share: float) -> None:
+        tree.share = share
+        hear(share)
+
+    while not tree.lock.acquire(timeout=TELL_SECONDS):
+        hear(tree.share)
+    try:
+        if tree.bvh is None:
+            tree.bvh = bvh_of(corners_of(pool), say)
+        return tree.bvh
+    finally:
+        tree.lock.release()
+
+
+def tree_is_near(pool: TilePool) -> bool:
+    """Whether ``tree_of`` gives it at once: it is there, or has so few triangles that no frame waits for it."""
+    return _known(pool).bvh is not None or len(pool.scene.triangles) < FEWEST
+
+
+def _known(pool: TilePool) -> _Tree:
     with _LOCK:
-        if pool not in _TREES:
-            _TREES[pool] = build_bvh(corners_of(pool), tell)
-        return _TREES[pool]
+        return _TREES.setdefault(pool, _Tree())
 
 
 def corners_of(pool: TilePool) -> F64:

@@ -134,6 +134,14 @@ class FakeSession:
             light=light, error=error, lit=4001, errors=FakeErrors(), notes=lambda lightmap: ["a note"]
         )
 
+    @property
+    def chosen_solver(self) -> str:
+        return self.solver_name
+
+    @property
+    def on_its_way(self) -> SimpleNamespace | None:
+        return self.loading
+
     def drop_reference(self) -> None:
         self.calls.append(("drop_reference",))
 

@@ -164,6 +164,7 @@ def test_it_says_how_far_it_is_and_can_be_stopped(rng: np.random.Generator) -> N
     corners = soup(rng, 5000)
     build_bvh(corners, told.append)
     assert told == sorted(told) and told[-1] == 1.0 and len(told) > 5
+    assert told[0] == 0.0 and 0.3 < told[len(told) // 2] < 0.9, "each level is about as much work as any other"
 
     def stop(share: float) -> None:
         raise InterruptedError

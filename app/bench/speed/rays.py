@@ -25,7 +25,8 @@ from app.scene.model import F32
 from app.session.loading import load
 from app.util.console import Console
 from app.util.tables import Column, markdown_table
-from app.visibility.rays import RayScene, corners_of, tree_of
+from app.visibility.bvh import build_bvh
+from app.visibility.rays import RayScene, corners_of
 
 TEXELS = 30_000  # as many places as rays start from, about
 RAYS = 1 << 18
@@ -72,7 +73,7 @@ def _measure(gpu: Gpu, name: str, seconds: float) -> dict[str, Any]:
     """seconds: of each figure."""
     pool = load(name, AtlasOptions(texels=TEXELS)).pool
     start = time.perf_counter()
-    bvh = tree_of(pool)
+    bvh = build_bvh(corners_of(pool))
     row: dict[str, Any] = {
         "scene": Path(name).stem,
         "triangles": len(pool.scene.triangles),

@@ -50,10 +50,10 @@ def _choice(view: View, state: State) -> None:
     """Which solver it is; another one can be chosen while it runs."""
     names = list(SOLVERS)
     widgets.labelled("Solver")
-    now = names.index(view.session.solver_name)
+    now = names.index(view.session.chosen_solver)
     imgui.set_next_item_width(-1)
     changed, chosen = imgui.combo("##solver", now, [SOLVERS[name].title for name in names])
-    widgets.tooltip(view.session.family.help)
+    widgets.tooltip(SOLVERS[names[now]].help)
     if changed and chosen != now:
         state.act(lambda: view.session.set_solver(names[chosen]))
 
