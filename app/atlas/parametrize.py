@@ -235,7 +235,9 @@ def _density_for(layout: Layout, texels: int) -> float:
     high = min(by_area, longest)
     while high < longest and _texel_count(layout, high) < texels:
         high = min(2 * high, longest)
-    low = least
+    low = high / 2
+    while low > least and _texel_count(layout, low) > texels:
+        low /= 2
     # no finer: sizes jump at some densities, and rectangles alike but for rounding must jump together
     while high > low * (1 + 1e-3):
         middle = math.sqrt(low * high)

@@ -55,7 +55,7 @@ void mark(int i, int j) {
 void main() {
     Window w = window_at(ivec2(gl_FragCoord.xy));
     out_reach = uvec4(0u);
-    if (w.chart == NO_CHART) return;
+    if (w.chart == NO_CHART || w.texel <= 0.0) return;  // nothing here, or no slot
     for (int up = -1; up <= 1; up += 2) {
         ivec2 row_px = w.px;
         for (int j = up < 0 ? -1 : 0; abs(j) <= RADIUS; j += up) {
