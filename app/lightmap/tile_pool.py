@@ -206,6 +206,11 @@ class TilePool:
         """Texels that cover a surface."""
         return int(self._texels[self.used].sum())
 
+    @property
+    def slot_texels(self) -> NDArray[np.int64]:
+        """(tiles,) texels of each slot that cover a surface."""
+        return np.where(self.used, self._texels, 0)
+
     def uniform_texels(self, depth: int) -> int:
         """About as many as there would be if all leaves were of that level."""
         used = np.flatnonzero(self.used)

@@ -21,6 +21,7 @@ from app.render.layers import LAYER_SHADERS
 from app.render.options import TONE_MAPS
 from app.render.resolve import BORDER, PLACES_WIDTH
 from app.solvers.gathering.compose import RADIUS
+from app.solvers.gathering.direct import PASS
 from app.solvers.pairs.gather import CHOICES
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 from app.solvers.shooting.records import BATCH, BLOCK_LEVEL, BLOCK_ROWS, CELL_LEVEL, EMITTER, GROUP, LEVELS, RECORDS
@@ -68,6 +69,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "BOX_GRID": FLAG,
     "STACK": (DEEPEST,),
     "CLOSED_FORM": FLAG,
+    "PASS": (PASS,),
     "TRACED": FLAG,
     "FINER": FLAG,
     "RADIUS": (0, 1, RADIUS),

@@ -6,6 +6,7 @@ interpolate it. Direct light is known on every texel.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -143,9 +144,19 @@ class Compose:
         self._gpu.release_all(*self._windows.values())
 
 
-def noise_of(judged: ReadBack) -> tuple[float, float]:
-    """The mean standard deviation over all surfaces, over the mean irradiance [-], and which share of all variance is that of
-    direct light; see noise.frag.glsl. The mean, since the RMS is that of the few texels next to lamps."""
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """level: the mean standard deviation over all surfaces, over the mean irradiance [-]; the mean, since the RMS is that of the
+    few texels next to lamps. direct: which share of it more shadow rays would bring down. gain (slots,): that of each tile,
+    see allocate.py."""
+
+    level: float
+    direct: float
+    gain: F64
+
+
+def noise_of(judged: ReadBack) -> Noise:
+    """See noise.frag.glsl."""
     tiles: F64 = np.frombuffer(judged.take(), np.float32).reshape(-1, 4).astype(np.float64)
-    deviation, light, both, direct = tiles.sum(0)
-    return float(deviation / light) if light > 0 else 0.0, float(direct / both) if both > 0 else 0.0
+    deviation, light, direct, _ = tiles.sum(0).tolist()
+    return Noise(deviation / light if light > 0 else 0.0, direct / deviation if deviation > 0 else 0.0, tiles[:, 2])

@@ -19,7 +19,8 @@ from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import QUAD_FORMAT, quads, upload
 from app.lightmap.tile_pool import Moves
-from app.scene.model import F32, Scene
+from app.scene.model import F32, F64, Scene
+from app.solvers.gathering.allocate import allocate
 from app.solvers.gathering.lamps import LampSet, chances, lamp_sets
 from app.solvers.gathering.origins import Origins
 from app.visibility.rays import RayScene
@@ -42,14 +43,15 @@ class Lit:
     target: Framebuffer
     unoccluded: Texture | None
     stream: int
-    count: int = 0
+    passes: NDArray[np.int64]
+    passes_table: Texture
 
 
 class DirectLight:
     """On one lightmap: ``light`` holds it [stored units], and in its alpha the variance of the mean of RGB. Whoever makes it
     releases it.
 
-    traced: shadow rays so far, of all texels. count: of each texel, to each set.
+    traced: shadow rays so far, of all texels. count: of a texel to a set, on average.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, rays: RayScene, origins: Origins) -> None:
@@ -61,13 +63,20 @@ class DirectLight:
             closed: Pass(
                 gpu,
                 "solvers/gathering/direct",
-                defines={"CLOSED_FORM": closed} | defines | dict(rays.defines),
+                defines={"CLOSED_FORM": closed, "PASS": PASS} | defines | dict(rays.defines),
                 vertex="common/rects",
             )
             for closed in (True, False)
         }
         self._unoccluded = Pass(gpu, "solvers/gathering/unoccluded", defines=defines, vertex="common/rects")
-        self._add = {c: Pass(gpu, "solvers/gathering/lamp_light", defines={"CLOSED_FORM": c}) for c in (True, False)}
+        self._add = {
+            closed: Pass(
+                gpu,
+                "solvers/gathering/lamp_light",
+                defines={"CLOSED_FORM": closed, "PASS": PASS} | lightmap.defines("TILE"),
+            )
+            for closed in (True, False)
+        }
         self._fit()
 
     def _fit(self) -> None:
@@ -86,7 +95,14 @@ class DirectLight:
         self._streams += 1
         table, folded_chance = folded(gpu, lamps.rows.reshape(-1, 4)), folded(gpu, chance.reshape(-1, 1))
         stream = STREAM + self._streams
-        self.sets.append(Lit(lamps, table, folded_chance, len(chance) == 1, seen, target, unoccluded, stream))
+        passes, passes_table = np.zeros(self._lightmap.pool.tiles, np.int64), self._passes_table()
+        alike = len(chance) == 1
+        self.sets.append(
+            Lit(lamps, table, folded_chance, alike, seen, target, unoccluded, stream, passes, passes_table)
+        )
+
+    def _passes_table(self) -> Texture:
+        return self._gpu.texture((self._lightmap.columns, self._lightmap.rows), 1, "f4")
 
     def _look_unoccluded(self, lit: Lit, rects: F32) -> None:
         """Σ F of a set with a closed form, in these rectangles."""
@@ -118,8 +134,10 @@ class DirectLight:
         self._gpu.release_all(mesh)
 
     @property
-    def count(self) -> int:
-        return max((lit.count for lit in self.sets), default=0)
+    def count(self) -> float:
+        texels = self._lightmap.pool.slot_texels
+        cost = max(int(texels.sum()), 1)
+        return max((float(PASS * lit.passes @ texels) / cost for lit in self.sets), default=0.0)
 
     @property
     def _everywhere(self) -> F32:
@@ -129,43 +147,55 @@ class DirectLight:
         """Forget a set."""
         self.sets.remove(lit)
         optional = [] if lit.unoccluded is None else [lit.unoccluded]
-        self._gpu.release_all(lit.target, lit.seen, lit.table, lit.chances, *optional)
+        self._gpu.release_all(lit.target, lit.seen, lit.table, lit.chances, lit.passes_table, *optional)
 
-    def shoot(self, count: int) -> Generator[None, None, None]:
-        """So many shadow rays more from each texel to each set, whole passes of them, in parts."""
+    def shoot(self, count: int, gain: F64 | None = None) -> Generator[None, None, None]:
+        """So many shadow rays more from each texel to each set, whole passes of them, in parts; with ``gain`` (slots,) that many
+        on average, see allocate.py."""
+        texels, each = self._lightmap.pool.slot_texels, max(count // PASS, 1)
         for lit in self.sets:
-            for _ in range(max(count // PASS, 1)):
-                self._shoot_at(lit)
+            if not lit.passes.any():
+                self._look_unoccluded(lit, self._everywhere)
+            known = np.zeros(len(texels)) if gain is None else gain
+            more = allocate(lit.passes, known, texels, each)
+            for nth in range(int(more.max(initial=0))):
+                self._shoot_at(lit, np.flatnonzero(more > nth), "add")
                 yield
 
-    def _shoot_at(self, lit: Lit) -> None:
-        """One pass of shadow rays to a set."""
-        if not lit.count:
-            self._look_unoccluded(lit, self._everywhere)
-        self._trace(lit, self._everywhere, lit.count, "add")
-        lit.count += PASS
-        self.traced += PASS * self._lightmap.texel_count
-
-    def _trace(self, lit: Lit, rects: F32, first: int, blend: str | None) -> None:
-        textures = {"t_lamps": lit.table, "t_chances": lit.chances}
+    def _shoot_at(self, lit: Lit, slots: NDArray[np.int64], blend: str | None) -> None:
+        """One pass of shadow rays from the texels of these slots to a set."""
+        pool = self._lightmap.pool
+        textures = {"t_lamps": lit.table, "t_chances": lit.chances, "t_passes": lit.passes_table}
         textures |= {name: texture for name, texture in self._rays.textures.items() if name != "t_bvh_uv"}
-        uniforms = {"u_rays": (first, PASS), "u_stream": lit.stream}
-        uniforms |= {"u_lamps": len(lit.lamps.rows), "u_alike": lit.alike}
+        uniforms = {"u_stream": lit.stream, "u_lamps": len(lit.lamps.rows), "u_alike": lit.alike}
+        rects = quads(pool.corners(slots), pool.tile, pool.corners(slots))
         self._draw(self._shoot[lit.lamps.closed_form], lit.target, rects, textures, uniforms, blend=blend)
+        lit.passes[slots] += 1
+        self._write_passes(lit)
+        self.traced += PASS * int(pool.slot_texels[slots].sum())
+
+    def _write_passes(self, lit: Lit) -> None:
+        table = np.zeros(self._lightmap.columns * self._lightmap.rows, np.float32)
+        table[: len(lit.passes)] = lit.passes
+        lit.passes_table.write(table.tobytes())
 
     def shoot_tiles(self, slots: NDArray[np.int64]) -> Iterator[None]:
-        """Other leaves are in these slots: the shadow rays that the others have had, in parts."""
+        """Other leaves are in these slots: as many shadow rays as the others have had on average, in parts."""
         pool = self._lightmap.pool
         rects = quads(pool.corners(slots), pool.tile, pool.corners(slots))
+        others = np.setdiff1d(np.flatnonzero(pool.used), slots)
         for lit in self.sets:
             self._look_unoccluded(lit, rects)
             table = chances(pool, lit.lamps)
             self._gpu.release_all(lit.chances)
             lit.chances, lit.alike = folded(self._gpu, table.reshape(-1, 1)), len(table) == 1
-            for first in range(0, lit.count, PASS):
-                self._trace(lit, rects, first, "add" if first else None)
+            known = lit.passes[others] if len(others) else lit.passes[slots]
+            wanted = max(int(np.rint(known.mean())), 1)
+            lit.passes[slots] = 0
+            self._write_passes(lit)
+            for nth in range(wanted):
+                self._shoot_at(lit, slots, "add" if nth else None)
                 yield
-            self.traced += lit.count * int((pool.surfaces.face[slots] >= 0).sum())
 
     def resized(self, moves: Moves) -> None:
         """The tile pool has got another number of slots."""
@@ -173,6 +203,9 @@ class DirectLight:
             self._gpu.release_all(lit.target)
             lit.seen = self._lightmap.moved(lit.seen, moves)
             lit.target = self._gpu.target(lit.seen)
+            self._gpu.release_all(lit.passes_table)
+            lit.passes, lit.passes_table = moves.array(lit.passes, 0), self._passes_table()
+            self._write_passes(lit)
             if lit.unoccluded is not None:
                 lit.unoccluded = self._lightmap.moved(lit.unoccluded, moves)
         self._gpu.release_all(self._target, self.light)
@@ -192,28 +225,27 @@ class DirectLight:
             self.add(lamps)
 
     def catch_up(self, first: int) -> Iterator[None]:
-        """The shadow rays to sets that came later, as many as the others have had, or ``first``, in parts."""
-        wanted = self.count or first
+        """The shadow rays to sets that came later, as many as the others have had on average, or ``first``, in parts."""
+        wanted = int(self.count) or first
         for lit in self.sets:
-            while lit.count < wanted:
-                self._shoot_at(lit)
-                yield
+            if not lit.passes.any():
+                self._look_unoccluded(lit, self._everywhere)
+                for _ in range(max(wanted // PASS, 1)):
+                    self._shoot_at(lit, np.flatnonzero(self._lightmap.pool.slot_texels), "add")
+                    yield
 
     def sum(self, scene: Scene) -> None:
         """Bring ``light`` up to date, with what the lamps emit now."""
         self._target.clear()
         for lit in self.sets:
             exitance = lit.lamps.exitance_in(scene)
-            if lit.count and exitance.any():
+            if lit.passes.any() and exitance.any():
                 closed = lit.lamps.closed_form
                 self._add[closed].draw(
                     self._target,
-                    textures={"t_shadow_rays": lit.seen}
+                    textures={"t_shadow_rays": lit.seen, "t_passes": lit.passes_table}
                     | ({} if lit.unoccluded is None else {"t_unoccluded": lit.unoccluded}),
-                    uniforms={
-                        "u_exitance": tuple((exitance / self._lightmap.unit).tolist()),
-                        "u_count": (lit.count, lit.count // PASS),
-                    },
+                    uniforms={"u_exitance": tuple((exitance / self._lightmap.unit).tolist())},
                     blend="add",
                 )
 

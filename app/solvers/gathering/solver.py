@@ -20,11 +20,11 @@ from app.gpu import Framebuffer, Gpu, ReadBack, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
 from app.lightmap.tile_pool import Moves, TilePool
-from app.scene.model import Material
+from app.scene.model import F64, Material
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.gathering.balance import Balance
 from app.solvers.gathering.bounces import Bounces, steps_to
-from app.solvers.gathering.compose import Compose, noise_of
+from app.solvers.gathering.compose import Compose, Noise, noise_of
 from app.solvers.gathering.direct import PASS, DirectLight
 from app.solvers.gathering.hits import GROUP, Hits
 from app.solvers.gathering.inspectable import Inspectable
@@ -78,10 +78,11 @@ class Gathering:
         self._balance = Balance(gpu, self.points)
         self._inspectable = Inspectable(gpu, lightmap, self.points, self._at, self.hits, self._directs, self._compose)
         self._under_way: Generator[None, None, int] | None = None
-        self._judged: list[tuple[int, ReadBack]] = []
+        self._judged: list[tuple[int, int, ReadBack]] = []  # rays, version of the leaves
         self._progress = Progress(0, 1.0, np.zeros(3))
         self._edited, self._shown, self.drawn = False, 0, 0
-        self._noise = 1.0, 0.0
+        self._noise: Noise | None = None
+        self._noise_of = 0  # this version of the leaves
         self._fresh: set[int] = set()  # slots whose leaves have no rays yet
         self._look_at = 0  # rays at which leaves are looked at again
         if lightmap.refinement is not None:
@@ -109,7 +110,7 @@ class Gathering:
         kept = min(count, max(self.hits.room(self.options.ray_memory) - self.hits.count, 0))
         yield from self.hits.trace(kept, bands)
         for direct in self._directs:
-            yield from direct.shoot(self._shadow_rays(count))
+            yield from direct.shoot(self._shadow_rays(count), self._gain if direct is self.direct else None)
             direct.sum(self.lightmap.scene)
         self.issued = first + count
         if first < SYSTEM or first.bit_length() < self.issued.bit_length():  # twice as many as at the last time
@@ -117,7 +118,7 @@ class Gathering:
         else:
             yield from self.bounces.gather(self.hits, first, count, anew=False)
         self._show(self.issued)
-        self._judged.append((self.issued, self._compose.judge(self.direct.light)))
+        self._judge()
         return count
 
     @property
@@ -142,7 +143,7 @@ class Gathering:
             yield from self.direct.shoot_tiles(slots)
             self.direct.sum(self.lightmap.scene)
             self._compose.draw(self.direct.light)
-            self._judged.append((self.issued, self._compose.judge(self.direct.light)))
+            self._judge()
         yield from refinement.look(CHANGES_PER_RAY * BATCH, bands, self.issued)
         if refinement.stable:
             self._look_at = LOOK_AGAIN * self.issued
@@ -161,15 +162,22 @@ class Gathering:
         yield from self.bounces.gather(self.hits, 0, self.issued, anew=True)
 
     def _shadow_rays(self, count: int) -> int:
-        """How many shadow rays go with so many rays more: as many as make the whole the least noisy for its cost. Of variances
-        D / d and I / n and a cost c of each shadow ray, those of all sets, beside a ray, that is d / n = √(D / (I c))."""
-        share = self._noise[1]
-        if not self.direct.count or not 0 < share < 1:
+        """How many shadow rays go with so many rays more: as many as make the whole the least noisy for its cost. A cost c of
+        each shadow ray, those of all sets, beside a ray: where D is the share of the deviation that d shadow rays leave and I
+        that of n rays, d / n = √(D d / (I n c))."""
+        if self._noise is None or not 0 < self._noise.direct < 1:
             return SHADOW_RAYS * count // FIRST
-        D, I = share * self.direct.count, (1 - share) * self.issued  # noqa: E741
+        D, I = self._noise.direct * self.direct.count, (1 - self._noise.direct) * self.issued  # noqa: E741
         ratio = np.sqrt(D / (I * SHADOW_COST * len(self.direct.sets)))
         wanted = ratio * (self.issued + count) - self.direct.count
         return int(np.clip(wanted, PASS, MOST_SHADOW_RAYS * count))
+
+    @property
+    def _gain(self) -> F64 | None:
+        """Of the slots as they are, see allocate.py."""
+        if self._noise is None or self._noise_of != self.lightmap.version:
+            return None
+        return self._noise.gain[: self.lightmap.pool.tiles]
 
     def _follow_edit(self) -> Generator[None, None, int]:
         """The light of other materials, along the rays that are there: soon, along some of them, and once no more edits come
@@ -187,8 +195,12 @@ class Gathering:
             if not self._edited:
                 yield from self._solve(from_nothing=True, begun=FIRST_STEPS)
                 self._show(self.issued)
-        self._judged.append((self.issued, self._compose.judge(self.direct.light)))
+        self._judge()
         return 0
+
+    def _judge(self) -> None:
+        """Let the GPU say how noisy the light that is shown is."""
+        self._judged.append((self.issued, self.lightmap.version, self._compose.judge(self.direct.light)))
 
     def _show(self, rays: int) -> None:
         """What so many rays of each texel have gathered."""
@@ -214,9 +226,9 @@ class Gathering:
         if wait:
             self._finish()
         while len(self._judged) > (0 if wait else 1):
-            done, judged = self._judged.pop(0)
-            self._noise = noise_of(judged)
-            self._progress = Progress(done, self._noise[0], self._progress.escaped)
+            done, version, judged = self._judged.pop(0)
+            self._noise, self._noise_of = noise_of(judged), version
+            self._progress = Progress(done, self._noise.level, self._progress.escaped)
         refining, refinement = self._refining, self.lightmap.refinement
         converged = self._progress.remaining <= self.options.noise and not self._edited and not refining
         note = None if refinement is None else refinement.note
@@ -240,7 +252,7 @@ class Gathering:
         if self._under_way is not None:
             self._under_way.close()
             self._under_way = None
-        for _, judged in self._judged:
+        for *_, judged in self._judged:
             judged.take()
         self._judged.clear()
         if self.lightmap.refinement is not None:
@@ -256,7 +268,7 @@ class Gathering:
             direct.forget()
         self._set_materials()
         scene = self.lightmap.scene
-        self.issued, self._edited, self._noise = 0, False, (1.0, 0.0)
+        self.issued, self._edited, self._noise = 0, False, None
         self._progress = Progress(0, 1.0 if scene.emits else 0.0, np.zeros(3))
 
     def set_options(self, options: GatheringOptions) -> None:
@@ -354,7 +366,7 @@ class Gathering:
     def release(self) -> None:
         if self._under_way is not None:
             self._under_way.close()
-        for _, judged in self._judged:
+        for *_, judged in self._judged:
             judged.take()
         refinement = self.lightmap.refinement
         if refinement is not None and refinement.follower is self:

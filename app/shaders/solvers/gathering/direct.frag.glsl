@@ -6,13 +6,14 @@
 //
 // Blended.
 #define CLOSED_FORM 1
+#define PASS  // shadow rays
 #include "solvers/gathering/lamp.glsl"
 #include "solvers/gathering/origin.glsl"
 #include "visibility/rays.glsl"
 
 uniform sampler2D t_chances;  // folded: of each lamp in each tile, or the same in all, summed up
 uniform bool u_alike;         // whether they are the same in all
-uniform ivec2 u_rays;         // the first, and how many
+uniform sampler2D t_passes;   // of PASS shadow rays, that each slot has had
 uniform int u_stream;         // of random numbers
 
 layout(location = 0) out vec4 out_direct;
@@ -39,7 +40,8 @@ void main() {
     int tile = u_alike ? 0 : slot.y * textureSize(t_leaves, 0).x + slot.x;
     float all = 0.0;
     vec3 seen = vec3(0.0);
-    for (int k = u_rays.x; k < u_rays.x + u_rays.y; ++k) {
+    int first = PASS * int(texelFetch(t_passes, slot, 0).r);
+    for (int k = first; k < first + PASS; ++k) {
         vec4 share = numbers(o.place, uint(u_stream), k);
         float probability, rest;
         Lamp lamp = load_lamp(chosen_lamp(tile, share.x, probability, rest));
@@ -62,7 +64,7 @@ void main() {
     float V = all > 0.0 ? seen.x / all : 0.0;
     out_direct = vec4(seen.x, all, V * V, 0.0);
 #else
-    float mean = dot(seen, vec3(1.0 / 3.0)) / float(u_rays.y);
+    float mean = dot(seen, vec3(1.0 / 3.0)) / float(PASS);
     out_direct = vec4(seen, mean * mean);
 #endif
 }

@@ -1,5 +1,4 @@
-// What is left to do in a tile, one texel per slot: (Σ σ A, Σ H A, Σ σ² A, Σ σ² of direct light A), of the mean of
-// RGB.
+// What is left to do in a tile, one texel per slot: (Σ σ A, Σ H A, Σ D/σ A), of the mean of RGB, with D the variance of direct light.
 #include "common/tile.glsl"
 
 uniform sampler2D t_position_area;
@@ -15,7 +14,7 @@ void main() {
     for (int i = 0; i < TILE * TILE; ++i) {
         ivec2 px = corner_px + ivec2(i % TILE, i / TILE);
         float A = texelFetch(t_position_area, px, 0).w, H = dot(texelFetch(t_irradiance, px, 0).rgb, vec3(1.0 / 3.0));
-        float variance = texelFetch(t_variance, px, 0).r;
-        out_noise += A * vec4(sqrt(variance), H, variance, texelFetch(t_direct, px, 0).a);
+        float deviation = sqrt(texelFetch(t_variance, px, 0).r);
+        out_noise.rgb += A * vec3(deviation, H, texelFetch(t_direct, px, 0).a / max(deviation, 1e-30));
     }
 }
