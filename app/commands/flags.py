@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from app.atlas.options import AtlasOptions
 from app.lightmap.options import LightmapOptions
-from app.options import add_flags
+from app.options import add_flags, specs
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
 
 DEFAULT_SCENE = "cornell-box"
@@ -27,13 +27,21 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         flags, unknown = super().parse_known_args(args, namespace)
         if unknown:
+            flag = unknown[0].split("=")[0]
             known = re.findall(r"--[\w-]+", self.format_usage())
-            close = difflib.get_close_matches(unknown[0].split("=")[0], known, n=1, cutoff=ALIKE)
-            self.error(f"unknown argument {unknown[0]}" + (f"; did you mean {close[0]}?" if close else ""))
+            owners = [f"--solver {name}" for name, family in SOLVERS.items() if flag in _flags_of(family)]
+            close = difflib.get_close_matches(flag, known, n=1, cutoff=ALIKE)
+            hint = f"; it needs {' or '.join(owners)}" if owners and "--solver" in known else ""
+            self.error(f"unknown argument {unknown[0]}{hint or (f'; did you mean {close[0]}?' if close else '')}")
         return flags, unknown
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def _flags_of(family: Family) -> set[str]:
+    """Of its options, and of its unit of work."""
+    return {f"--{family.unit}", *(f"--{spec.name.replace('_', '-')}" for spec in specs(family.options))}
 
 
 def scene_flags(parser: Parser, *, optional: bool = False) -> None:

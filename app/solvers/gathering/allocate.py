@@ -1,8 +1,8 @@
 """Shadow rays are allocated to tiles: more where they bring down the noise most.
 
 The deviation σ of a texel falls with the passes n of its tile by ∂σ/∂n = -D/(2nσ), with D the share of direct light in σ².
-Passes are best allocated where Σ D/(nσ) A is the same in all tiles for their cost, the texels T [Veach97, 2.4]. Where direct light
-is all of the noise, σ ~ 1/√n, and so
+Passes are best allocated where Σ D/(nσ) A is the same in all tiles for their cost, the texels T [Veach97, 2.4]. Where direct
+light is all of the noise, σ ~ 1/√n, and so
 
     n' = n (g / (n T λ))^(2/3),    g = Σ (D / σ) A over the texels of a tile,    λ such that all passes are given out
 """

@@ -12,7 +12,7 @@ class GatheringOptions(Options):
     """``smooth`` acts on what is shown, the rest on the next rays: none restarts the solution."""
 
     noise: float = option(
-        5e-3,
+        1e-2,
         "converged when the noise that is left, the mean over all surfaces, is so much of the mean irradiance",
         minimum=1e-5,
         maximum=1,
