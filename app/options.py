@@ -15,7 +15,7 @@ import functools
 import math
 import types
 import typing
-from collections.abc import Container
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from typing import Any, Self, TypeVar
 
@@ -141,20 +141,29 @@ def _specs(options: Any) -> list[Spec]:
     return out
 
 
-def add_flags(parser: argparse.ArgumentParser, options: type[Options], *, only: Container[str] | None = None) -> None:
-    """Give ``parser`` one flag per declared option, or for some ``only``; booleans become ``--name`` / ``--no-name``."""
+def add_flags(
+    parser: argparse.ArgumentParser,
+    options: type[Options],
+    *,
+    only: Container[str] | None = None,
+    defaults: Mapping[str, Any] | None = None,
+) -> None:
+    """Give ``parser`` one flag per declared option, or for some ``only``; booleans become ``--name`` / ``--no-name``. defaults:
+    other ones than those declared, by name."""
+    own = defaults or {}
     group = parser.add_argument_group(options.__name__.removesuffix("Options").lower())
     for spec in specs(options):
         if only is not None and spec.name not in only:
             continue
         unit = f" [{spec.unit}]" if spec.unit else ""
-        default = "" if spec.default is None else f" (default {spec.default})"
+        value = own.get(spec.name, spec.default)
+        default = "" if value is None else f" (default {value})"
         text = (spec.help + unit + default).replace("%", "%%")
         if spec.type is bool:
-            group.add_argument(spec.flag, action=argparse.BooleanOptionalAction, default=None, help=text)
+            group.add_argument(spec.flag, action=argparse.BooleanOptionalAction, default=own.get(spec.name), help=text)
         else:
             meta = "{" + ",".join(map(str, spec.choices)) + "}" if spec.choices else spec.type.__name__.upper()
-            group.add_argument(spec.flag, type=_reader(spec), default=None, metavar=meta, help=text)
+            group.add_argument(spec.flag, type=_reader(spec), default=own.get(spec.name), metavar=meta, help=text)
 
 
 def from_flags(options: type[OptionsT], flags: argparse.Namespace) -> OptionsT:

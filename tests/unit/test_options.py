@@ -102,6 +102,14 @@ def test_help_gives_unit_and_default() -> None:
     assert "unset: none" in text and "None" not in text
 
 
+def test_a_command_may_have_other_defaults() -> None:
+    parser = argparse.ArgumentParser()
+    add_flags(parser, Sample, defaults={"size": 96})
+    assert "edge [px] (default 96)" in " ".join(parser.format_help().split())
+    assert from_flags(Sample, parser.parse_args([])).size == 96
+    assert from_flags(Sample, parser.parse_args(["--size", "32"])).size == 32
+
+
 @pytest.mark.parametrize(("options", "spec"), FIELDS, ids=[f"{o.__name__}.{s.name}" for o, s in FIELDS])
 def test_every_option_of_the_program_is_well_declared(options: type[Options], spec: Spec) -> None:
     assert spec.help and not spec.help.endswith(".")
