@@ -70,6 +70,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "STACK": (DEEPEST,),
     "CLOSED_FORM": FLAG,
     "PASS": (PASS,),
+    "PICTURE": FLAG,
     "TRACED": FLAG,
     "FINER": FLAG,
     "RADIUS": (0, 1, RADIUS),

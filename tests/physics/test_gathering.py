@@ -12,7 +12,7 @@ from solver_scenes import EVERY_LIGHTMAP, Solution, begin, grey, quads_scene, ro
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
 from app.lightmap.options import STORAGE
-from app.scene.model import F64, Material, Scene
+from app.scene.model import F64, Material, Scene, Texture
 from app.scene.shapes import box, merged
 from app.session.run import Stop
 from app.session.session import Session
@@ -245,6 +245,29 @@ def test_a_lamp_in_many_pieces_gives_the_light_of_one(gpu: Gpu) -> None:
     (one, none), (many, noise) = light
     assert none == pytest.approx(0, abs=1e-6) and 0 < noise < 0.01 * one
     assert abs(many - one) < 4 * noise
+
+
+def test_a_lamp_with_a_picture_gives_the_light_of_its_bright_parts(gpu: Gpu) -> None:
+    """Of which a picture lets one half shine, beside one that is cut in two: the same light on each wall, but for noise, Z = 4.
+    Each shadow ray brings the light of the texel that it is sent to."""
+    halves = Texture("halves", np.array([[[2.0] * 3, [0.0] * 3]], np.float32), wrap=("clamp", "clamp"), bilinear=False)
+    lamp = np.array([(0.25, 0.875, 0.5), (0.5, 0.875, 0.5), (0.5, 0.875, 0.75), (0.25, 0.875, 0.75)])
+    bright, dark = lamp.copy(), lamp.copy()
+    bright[1:3, 0] = dark[[0, 3], 0] = 0.375
+    whole = quads_scene(
+        [*room(), lamp], [grey(0.5), replace(grey(0.0, 50.0), emission_texture=halves)], [0, 0, 0, 0, 0, 0, 1]
+    )
+    whole = replace(whole, uv0=((whole.corners[..., [0, 2]] - [0.25, 0.5]) * 4).astype(np.float32))  # u along x
+    cut = quads_scene([*room(), bright, dark], [grey(0.5), grey(0.0, 100.0), grey(0.0)], [0, 0, 0, 0, 0, 0, 1, 2])
+    flux, noise = [], []
+    for scene in (whole, cut):
+        lit = gathered(gpu, scene, 256, density=16)
+        assert lit.rays.direct.sets[0].lamps.picture == (scene is whole)
+        flux.append([(lit.H[:, 0] * lit.area)[lit.object == k].sum() for k in range(6)])
+        noise.append([np.sqrt((lit.area**2 * lit.variance)[lit.object == k].sum()) for k in range(6)])
+        lit.release()
+    assert (np.abs(np.subtract(*flux)) < 4 * np.hypot(*noise) + 2 * SOLVED * np.mean(flux)).all()
+    assert max(map(max, noise)) < 0.01 * np.mean(flux)
 
 
 # -- what is kept ------------------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ whole: one factor brings it to where Σ A H = Σ A (H_direct + 1/N Σ B), the co
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator
 
 import numpy as np
 
@@ -43,7 +43,7 @@ class Bounces:
 
     def __init__(self, gpu: Gpu, points: Lightmap) -> None:
         self._gpu, self._points = gpu, points
-        reads = points.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE")
+        reads = points.defines("MATERIAL_BITS", "ALBEDO_TEXTURE")
         self._send = Pass(gpu, "solvers/gathering/outgoing", defines=reads)
         self._relax = Pass(gpu, "solvers/gathering/relax")
         self._sum = Pass(gpu, "solvers/gathering/rebalance", defines=points.defines("TILE"))
@@ -57,7 +57,6 @@ class Bounces:
         self._share = area / area.sum()  # of each material
         self.reflected, self.steps = 0.0, 0
         self._omega = 1.0  # of the last step
-        self._sources: Texture | None = None
         size = points.size
         self._solutions = [gpu.texture(size, 4, "f4") for _ in range(2)]
         self._targets = [self._gpu.target(texture) for texture in self._solutions]
@@ -80,15 +79,9 @@ class Bounces:
     def solution(self) -> Texture:
         return self._solutions[0]
 
-    def set_materials(self, by_rays: Sequence[int]) -> None:
-        """The lightmap's materials are others. by_rays: those whose light the rays bring that hit them."""
-        materials, unit = self._points.scene.materials, self._points.unit
-        table = np.zeros((len(materials), 1, 4), np.float32)
-        for i in by_rays:
-            table[i, 0, :3] = np.pi * np.array(materials[i].emission) / unit
-        if self._sources is not None:
-            self._gpu.release_all(self._sources)
-        self._sources = self._gpu.texture((1, len(materials)), 4, "f4", table.tobytes())
+    def set_materials(self) -> None:
+        """The lightmap's materials are others."""
+        materials = self._points.scene.materials
         mean = self._share @ np.array([m.albedo for m in materials])
         self.reflected = min(float(mean.max()), MOST_REFLECTED)
 
@@ -140,15 +133,13 @@ class Bounces:
 
     def send(self) -> None:
         """B = ρH of the solution."""
-        assert self._sources is not None
-        reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_emission"
+        reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo"
         self._send.draw(
             self._outgoing_target,
-            textures=self._points.textures(*reads) | {"t_sources": self._sources, "t_solution": self.solution},
+            textures=self._points.textures(*reads) | {"t_solution": self.solution},
             viewport=(0, 0, *self._points.size),
         )
 
     def release(self) -> None:
-        sources = [] if self._sources is None else [self._sources]
         self._gpu.release_all(*self._targets, *self._solutions, self._gathered_target, self.gathered)
-        self._gpu.release_all(self._outgoing_target, self.outgoing, *sources)
+        self._gpu.release_all(self._outgoing_target, self.outgoing)

@@ -60,13 +60,14 @@ class DirectLight:
         self.traced = self._streams = 0
         defines = lightmap.defines("MATERIAL_BITS", "TILE")
         self._shoot = {
-            closed: Pass(
+            (closed, picture): Pass(
                 gpu,
                 "solvers/gathering/direct",
-                defines={"CLOSED_FORM": closed, "PASS": PASS} | defines | dict(rays.defines),
+                defines={"CLOSED_FORM": closed, "PICTURE": picture, "PASS": PASS} | defines | dict(rays.defines),
                 vertex="common/rects",
             )
-            for closed in (True, False)
+            for closed, picture in ((True, False), (False, False), (False, True))
+            if not picture or lightmap.pool.emission_tiles is not None
         }
         self._unoccluded = Pass(gpu, "solvers/gathering/unoccluded", defines=defines, vertex="common/rects")
         self._add = {
@@ -167,9 +168,14 @@ class DirectLight:
         pool = self._lightmap.pool
         textures = {"t_lamps": lit.table, "t_chances": lit.chances, "t_passes": lit.passes_table}
         textures |= {name: texture for name, texture in self._rays.textures.items() if name != "t_bvh_uv"}
-        uniforms = {"u_stream": lit.stream, "u_lamps": len(lit.lamps.rows), "u_alike": lit.alike}
+        uniforms: dict[str, Any] = {"u_stream": lit.stream, "u_lamps": len(lit.lamps.rows), "u_alike": lit.alike}
+        if lit.lamps.picture:
+            textures |= self._lightmap.textures("t_pages", "t_emission")
+            uniforms["u_pages"] = float(self._lightmap.columns), pool.pages_per_texel
         rects = quads(pool.corners(slots), pool.tile, pool.corners(slots))
-        self._draw(self._shoot[lit.lamps.closed_form], lit.target, rects, textures, uniforms, blend=blend)
+        self._draw(
+            self._shoot[lit.lamps.closed_form, lit.lamps.picture], lit.target, rects, textures, uniforms, blend=blend
+        )
         lit.passes[slots] += 1
         self._write_passes(lit)
         self.traced += PASS * int(pool.slot_texels[slots].sum())

@@ -1,8 +1,8 @@
 """Lamps are the triangles that emit, in sets that share one exitance: what shadow rays are sent to.
 
 A set is one material, so that another exitance of it scales the light it gives and costs no ray. Beyond so many, materials share
-a set, and shadow rays choose among them. Materials with an image of what they emit are in none: their light is brought by the
-rays that hit them.
+a set, and shadow rays choose among them. Where a material has an image of what it emits, each shadow ray brings the light of the
+texel that it is sent to.
 """
 
 from __future__ import annotations
@@ -15,16 +15,18 @@ from numpy.typing import NDArray
 
 from app.lightmap.tile_pool import TilePool
 from app.scene.model import F32, F64, Scene
+from app.visibility.rays import places_of
 
 ALONE = 8  # materials that are a set of their own, the strongest ones
 CLOSED_FORM = 256  # triangles of a set, up to which all of them are summed up in closed form
+PLAIN, PICTURE = 4, 7  # texels of a lamp, and of one with an image
 CHANCES = 1 << 24  # of lamps in tiles: beyond, they are the same in all tiles
 
 
 @dataclass(frozen=True, eq=False)
 class LampSet:
-    """materials: that emit in it. exitance: E = πL of it, RGB [W/m²]. rows (n, 4, 4) f32: its triangles, see lamp.glsl. strength
-    (n,): mean of RGB of each triangle's exitance, over that of the set."""
+    """materials: that emit in it. exitance: E = πL of it, RGB [W/m²]. rows (n, 4, 4) f32: its triangles, see lamp.glsl, (n, 7, 4)
+    where they have an image. strength (n,): mean of RGB of each triangle's exitance, over that of the set."""
 
     materials: tuple[int, ...]
     exitance: F64
@@ -34,7 +36,12 @@ class LampSet:
     @property
     def closed_form(self) -> bool:
         """Whether its light is a closed form times visibility."""
-        return len(self.materials) == 1 and len(self.rows) <= CLOSED_FORM
+        return len(self.materials) == 1 and len(self.rows) <= CLOSED_FORM and not self.picture
+
+    @property
+    def picture(self) -> bool:
+        """Whether an image says what they emit."""
+        return bool(self.rows.shape[1] == PICTURE)
 
     def same_light(self, other: LampSet) -> bool:
         """Whether the other one gives the same light."""
@@ -50,17 +57,11 @@ class LampSet:
         return np.pi * np.array(scene.materials[self.materials[0]].emission) if alone else self.exitance
 
 
-def by_rays(scene: Scene) -> tuple[int, ...]:
-    """Materials whose light is brought by the rays that hit them."""
-    return tuple(i for i, m in enumerate(scene.materials) if m.emits and m.emission_texture is not None)
-
-
 def lamp_sets(pool: TilePool, scene: Scene, alone: Sequence[int] = ()) -> list[LampSet]:
     """Of all other materials that emit, but those that are a set already, ``alone``."""
-    left_out = {*by_rays(scene), *alone}
     area = np.bincount(scene.material_ids, scene.normals_areas[1], len(scene.materials))
     power = area * np.array([sum(m.emission) for m in scene.materials])
-    emitting = [i for i in np.argsort(-power, kind="stable").tolist() if power[i] > 0 and i not in left_out]
+    emitting = [i for i in np.argsort(-power, kind="stable").tolist() if power[i] > 0 and i not in alone]
     more = max(ALONE - len(alone), 0)
     groups = [(i,) for i in emitting[:more]]
     if rest := tuple(emitting[more:]):
@@ -77,14 +78,31 @@ def lamp_set(pool: TilePool, scene: Scene, materials: tuple[int, ...]) -> LampSe
     of_material = np.zeros((len(scene.materials), 3))
     of_material[list(materials)] = exitance
     relative = of_material[scene.material_ids[which]] / np.maximum(base, 1e-300)
-    rows = np.zeros((len(which), 4, 4), np.float32)
+    picture = any(scene.materials[i].emission_texture is not None for i in materials)
+    rows = np.zeros((len(which), PICTURE if picture else PLAIN, 4), np.float32)
     rows[:, 0, :3] = corners[:, 0]
     rows[:, 0, 3] = scene.normals_areas[1][which] / pool.space.scale**2
     rows[:, 1, :3] = corners[:, 1] - corners[:, 0]
     rows[:, 1, 3] = scene.sides[which]
     rows[:, 2, :3] = corners[:, 2] - corners[:, 0]
     rows[:, 3, :3] = relative
+    if picture:
+        rows[:, PLAIN:] = places_of(pool)[which]
+        relative = relative * _means(pool, which)
     return LampSet(materials, base, rows, relative.mean(1))
+
+
+def _means(pool: TilePool, triangles: NDArray[np.int64]) -> F64:
+    """(n, 3) mean of the image of what triangles emit, over the texels on them."""
+    assert pool.emission_tiles is not None
+    covered = pool.surfaces.face >= 0
+    triangle = pool.charts.face_triangle[pool.surfaces.face[covered]]
+    area, colour = pool.surfaces.area[covered], pool.emission_tiles[covered]
+    count = len(pool.scene.triangles)
+    sums = np.stack([np.bincount(triangle, area * colour[:, c], count) for c in range(3)], axis=1)
+    whole = np.bincount(triangle, area, count)
+    means = sums / np.maximum(whole, 1e-300)[:, None]
+    return np.asarray(np.where(whole[triangles, None] > 0, means[triangles], 1.0))
 
 
 def chances(pool: TilePool, lamps: LampSet) -> F32:

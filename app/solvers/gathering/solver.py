@@ -28,7 +28,6 @@ from app.solvers.gathering.compose import Compose, Noise, noise_of
 from app.solvers.gathering.direct import PASS, DirectLight
 from app.solvers.gathering.hits import GROUP, Hits
 from app.solvers.gathering.inspectable import Inspectable
-from app.solvers.gathering.lamps import by_rays
 from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.origins import Origins
 from app.util.parts import is_running, run_to_end
@@ -298,7 +297,7 @@ class Gathering:
         if self.points is not self.lightmap:
             self.points.set_materials(scene.materials)
             self.points.unit = self.lightmap.unit
-        self.bounces.set_materials(by_rays(scene))
+        self.bounces.set_materials()
         for direct in self._directs:
             direct.follow(scene)
 

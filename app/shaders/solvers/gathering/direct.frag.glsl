@@ -10,6 +10,10 @@
 #include "solvers/gathering/lamp.glsl"
 #include "solvers/gathering/origin.glsl"
 #include "visibility/rays.glsl"
+#if PICTURE
+#include "common/texel_at.glsl"
+uniform sampler2D t_emission;
+#endif
 
 uniform sampler2D t_chances;  // folded: of each lamp in each tile, or the same in all, summed up
 uniform bool u_alike;         // whether they are the same in all
@@ -31,6 +35,20 @@ int chosen_lamp(int tile, float number, out float probability, out float rest) {
     return low;
 }
 
+// Of a point on a lamp, ``way`` from its corner: what its exitance is multiplied with.
+vec3 picture(int nth, Lamp lamp, vec3 normal, vec3 way, bool front) {
+#if PICTURE
+    vec2 weights = vec2(dot(cross(way, lamp.v), normal), dot(cross(lamp.u, way), normal)) / (2.0 * lamp.area);
+    vec4 a = lamp_texel(nth, 4), b = lamp_texel(nth, 5), c = lamp_texel(nth, 6);
+    vec4 place = a + (b - a) * weights.x + (c - a) * weights.y;
+    vec2 uv = front ? place.xy : place.zw;
+    ivec2 px = uv.x < 0.0 ? ivec2(-1) : texel_px_at(uv);
+    return px.y < 0 ? vec3(0.0) : texelFetch(t_emission, px, 0).rgb;
+#else
+    return vec3(1.0);
+#endif
+}
+
 void main() {
     ivec2 px = ivec2(gl_FragCoord.xy);
     Origin o = load_origin(px);
@@ -44,11 +62,12 @@ void main() {
     for (int k = first; k < first + PASS; ++k) {
         vec4 share = numbers(o.place, uint(u_stream), k);
         float probability, rest;
-        Lamp lamp = load_lamp(chosen_lamp(tile, share.x, probability, rest));
+        int nth = chosen_lamp(tile, share.x, probability, rest);
+        Lamp lamp = load_lamp(nth);
         vec3 normal = cross(lamp.u, lamp.v) / (2.0 * lamp.area);
         vec3 from = start_of(o, share.zw);
         float area;
-        vec3 way = point_on(lamp, normal, from, vec2(rest, share.y), area) - from;
+        vec3 point = point_on(lamp, normal, from, vec2(rest, share.y), area), way = point - from;
         float side = dot(way, normal) < 0.0 ? 1.0 : -1.0;
         if (side < 0.0 && !lamp.two_sided) continue;
         float r2 = dot(way, way);
@@ -58,7 +77,7 @@ void main() {
         all += w;
         way += 2.0 * COPLANAR * side * normal;  // off the lamp's own surface
         float r = length(way);
-        if (!any_hit(from, way / r, 0.0, r)) seen += w * lamp.exitance;
+        if (!any_hit(from, way / r, 0.0, r)) seen += w * lamp.exitance * picture(nth, lamp, normal, point - lamp.corner, side > 0.0);
     }
 #if CLOSED_FORM
     float V = all > 0.0 ? seen.x / all : 0.0;

@@ -1,5 +1,7 @@
-// Triangles that emit, of one set of lamps: four texels each. A lamp that shines to both sides does so with its whole exitance.
+// Triangles that emit, of one set of lamps: four texels each; where an image says what they emit, three more: the places in the
+// virtual atlas of their corners, on the front and on the back. A lamp that shines to both sides does so with its whole exitance.
 #include "solvers/gathering/folded.glsl"
+#define PICTURE 0
 uniform sampler2D t_lamps;  // folded
 uniform int u_lamps;        // how many
 
@@ -11,9 +13,12 @@ struct Lamp {
     vec3 exitance;   // relative to that of its set
 };
 
+const int LAMP_TEXELS = PICTURE == 1 ? 7 : 4;
+
+vec4 lamp_texel(int nth, int texel) { return texelFetch(t_lamps, folded(LAMP_TEXELS * nth + texel), 0); }
+
 Lamp load_lamp(int nth) {
-    vec4 a = texelFetch(t_lamps, folded(4 * nth), 0), b = texelFetch(t_lamps, folded(4 * nth + 1), 0);
-    vec4 c = texelFetch(t_lamps, folded(4 * nth + 2), 0), d = texelFetch(t_lamps, folded(4 * nth + 3), 0);
+    vec4 a = lamp_texel(nth, 0), b = lamp_texel(nth, 1), c = lamp_texel(nth, 2), d = lamp_texel(nth, 3);
     return Lamp(a.xyz, a.w, b.xyz, c.xyz, b.w > 0.5, d.rgb);
 }
 
