@@ -20,6 +20,11 @@ def test_without_knowledge_all_tiles_get_as_many() -> None:
     assert allocate(np.zeros(3, np.int64), np.ones(3), texels, 5).tolist() == [5, 5, 0], "nothing is known yet"
 
 
+def test_tiles_that_are_as_noisy_get_as_many() -> None:
+    passes, texels = np.full(9, 3), np.full(9, 64)
+    assert allocate(passes, np.full(9, 2.0), texels, 7).tolist() == [7] * 9
+
+
 def test_noisy_tiles_get_more_of_the_same_number() -> None:
     random = np.random.default_rng(1)
     texels = random.integers(1, 65, 500)

@@ -98,7 +98,7 @@ def test_light_that_breaks_is_one_line_and_what_is_there_is_kept(
     """In the last batch, where no shot follows that would notice, and before."""
     poison(monkeypatch, texture, call)
     output = tmp_path / ("a.png" if kind == "shot" else "out")
-    size = ["--size", "64x48"] if kind == "shot" else []
+    size = ["--size", "64x48"] if kind == "shot" else ["--solver", "shooting"]
     line = [kind, "cornell-box", "-o", str(output), "--texels", "2000", "--residual", "1e-9", "--shots", str(shots)]
     assert run([*line, *size]) == 2
     out, err = capsys.readouterr()

@@ -31,7 +31,11 @@ def allocate(passes: NDArray[np.int64], gain: F64, texels: NDArray[np.int64], ea
         wanted = np.maximum(passes * (marginal * scale) ** (2 / 3), floor)
         return np.where(texels > 0, np.clip(wanted - passes, 0.0, MOST * each), 0.0)
 
-    low, high = 0.0, 1.0 / float(marginal[marginal > 0].min())
+    some = marginal > 0
+    low, high = (
+        0.0,
+        float((((passes[some] + MOST * each) / passes[some]) ** 1.5 / marginal[some]).max()),
+    )  # there all get the most
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if float(more(middle) @ texels) < each * cost else (low, middle)
