@@ -15,16 +15,18 @@ from PIL import Image
 
 from app.gpu import gpu_context
 from app.lightmap.options import LightmapOptions
+from app.options import Options
 from app.render.options import DisplayOptions
 from app.session.run import Stop
 from app.session.session import Session
 from app.session.view import View
+from app.solvers import GatheringOptions, ShootingOptions
 from app.viewer.ui_frame import ui_image
 
 ROOT = Path(__file__).parent.parent.parent
 FAILED = Path(__file__).parent / "failed"
 SIZE = (1280, 720)
-SHOTS, RAYS = 1000, 128
+SHOTS, RAYS = 1000, 256
 STEP = 8  # of 255: what the last bit of a float does to a pixel after exposure and tone curve
 SHARE = (
     0.005  # of the pixels may differ by more: a digit of a number that stands on the edge of rounding, a line of a plot
@@ -39,6 +41,7 @@ class Golden(NamedTuple):
     light: LightmapOptions = LightmapOptions()
     display: DisplayOptions = DisplayOptions()
     solver: str = "shooting"
+    options: Options = ShootingOptions()
     work: int = SHOTS
     click: tuple[float, float] | None = None
 
@@ -46,7 +49,7 @@ class Golden(NamedTuple):
 GOLDENS = {
     "viewer": Golden(),
     "viewer-quadtree": Golden(LightmapOptions(adaptive=True), DisplayOptions(grid=True)),
-    "viewer-rays": Golden(solver="gathering", work=RAYS, click=CLICK),
+    "viewer-rays": Golden(solver="gathering", options=GatheringOptions(noise=1e-3), work=RAYS, click=CLICK),
 }
 
 
@@ -55,7 +58,7 @@ def test_the_viewer_looks_as_it_did(request: pytest.FixtureRequest, name: str) -
     golden = ROOT / "screenshots" / f"{name}.png"
     kind = GOLDENS[name]
     with gpu_context() as gpu:
-        session = Session(gpu, solver=kind.solver, light=kind.light, expose_on_open=True)
+        session = Session(gpu, solver=kind.solver, options=kind.options, light=kind.light, expose_on_open=True)
         view = View(session, kind.display)
         session.open_now("cornell-box")
         session.solve(Stop(work=kind.work))
