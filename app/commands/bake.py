@@ -13,7 +13,7 @@ import numpy as np
 
 from app.bake import prepare_directory, write_bake
 from app.commands.report import report, summary
-from app.commands.steps import open_scene, session_options, solve
+from app.commands.steps import not_reached, open_scene, session_options, solve
 from app.errors import UserError
 from app.gpu import gpu_context
 from app.lightmap.collapse import collapse
@@ -32,6 +32,8 @@ def bake(flags: argparse.Namespace) -> int:
         failure = solve(session, flags, console)
         stopped = failure is not None or session.run.interrupted
         whole = stopped or _estimate(session, console)
+        if (unreached := not_reached(session, flags)) is not None:
+            console.warn(unreached)
         clock = time.perf_counter()
         lightmap = session.lightmap
         irradiance, covered = collapse(lightmap.pool, lightmap.irradiance(ambient=True))

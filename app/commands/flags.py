@@ -40,8 +40,9 @@ class Parser(argparse.ArgumentParser):
 
 
 def _flags_of(family: Family) -> set[str]:
-    """Of its options, and of its unit of work."""
-    return {f"--{family.unit}", *(f"--{spec.name.replace('_', '-')}" for spec in specs(family.options))}
+    """The flags that a solver's options and its unit of work have."""
+    own = specs(family.options)
+    return {f"--{family.unit}", *(s.flag for s in own), *(f"--no-{s.flag[2:]}" for s in own if s.type is bool)}
 
 
 def scene_flags(parser: Parser, *, optional: bool = False) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from app import __version__
+from app.options import specs
 from app.session.session import Session
 
 UNBALANCED = 0.02  # of the emitted power: more is worth a word
@@ -57,11 +58,17 @@ def notes(session: Session) -> list[str]:
     """What the solver has to say of the solution, and what its energy balance says of it."""
     note, share = session.run.progress.note, session.stats.imbalance
     found = [] if note is None else [note]
-    if session.family.distributes and abs(share) > UNBALANCED:
+    if abs(share) > UNBALANCED:
         what = "is lost" if share > 0 else "comes from nothing"
+        why, smaller = "texels are", "--density"
+        if not session.family.distributes:
+            why = f"it is {session.family.remains}, or {why}"
+        elif "level" in {spec.name for spec in specs(session.family.options)}:
+            why, smaller = f"patches and {why}", "--density, --level"
+        other = " or --solver gathering" if session.family.distributes else ""
         found.append(
-            f"{abs(share):.1%} of the light {what}: patches and texels are large beside what stands between them; "
-            "smaller ones (--density, --level) or --solver gathering would do"
+            f"{abs(share):.1%} of the light {what}: {why} large beside what stands between them; "
+            f"smaller ones ({smaller}){other} would do"
         )
     return found
 

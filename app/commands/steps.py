@@ -9,7 +9,7 @@ from app.atlas.options import AtlasOptions
 from app.commands.report import notes
 from app.errors import UserError
 from app.lightmap.options import LightmapOptions
-from app.options import from_flags
+from app.options import Options, from_flags, specs
 from app.render.layers import LAYER_SHADERS, layers_with
 from app.render.options import DisplayOptions
 from app.scene.load import NO_LIGHT
@@ -19,18 +19,40 @@ from app.session.stats import Stats
 from app.solvers import SOLVERS
 from app.util.console import Console
 
-__all__ = ["check_display", "open_scene", "session_options", "solve"]
+__all__ = ["check_display", "not_reached", "open_scene", "session_options", "solve"]
 
 
 def session_options(flags: argparse.Namespace) -> dict[str, Any]:
     """What the flags say, as a Session takes it."""
     return {
         "solver": flags.solver,
-        "options": from_flags(SOLVERS[flags.solver].options, flags),
+        "options": _solver_options(flags),
         "atlas": from_flags(AtlasOptions, flags),
         "light": from_flags(LightmapOptions, flags),
         "default_light": flags.light,
     }
+
+
+def _solver_options(flags: argparse.Namespace) -> Options:
+    """What the flags say; where they ask for an error, and not how little may remain, no more remains than that error allows."""
+    family = SOLVERS[flags.solver]
+    options: Options = from_flags(family.options, flags)
+    asked = [error for name in ("error", "error_rms") if (error := getattr(flags, name, None)) is not None]
+    if not asked or family.per_error is None or getattr(flags, family.threshold) is not None:
+        return options
+    spec = next(spec for spec in specs(family.options) if spec.name == family.threshold)
+    allowed = family.per_error * min(asked) / 100
+    return options.replace(**{family.threshold: max(min(allowed, spec.default), spec.minimum)})
+
+
+def not_reached(session: Session, flags: argparse.Namespace) -> str | None:
+    """What to say where a solve has converged and its expected error is still larger than was asked for."""
+    for flag, asked, name in (("--error", flags.error, "median"), ("--error-rms", flags.error_rms, "rms")):
+        expected = None if session.expected is None else getattr(session.expected, name)
+        if asked is not None and expected is not None and session.run.converged and 100 * expected > asked:
+            end = f"--{session.family.threshold}, or the texels, end at"
+            return f"{flag} {asked:g} was not reached: {end} {expected:.1%}"
+    return None
 
 
 def check_display(flags: argparse.Namespace) -> None:

@@ -41,7 +41,7 @@ class Ready:
     began: float
 
     def catch_up(self, light: LightmapOptions, options: Options) -> None:
-        """With what has been chosen since: how light is held, options of the solver. Raises UserError."""
+        """Take over what has been chosen since: how light is held, options of the solver. Raises UserError."""
         light = light.replace(adaptive=self.loaded.options.adaptive)
         if self.lightmap.options != light:
             self.lightmap.set_options(light)

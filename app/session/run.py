@@ -225,8 +225,12 @@ class Run:
             if tell and now - told > TELL_SECONDS:
                 told = now
                 tell()
-            if self.converged or (stop.seconds is not None and self.seconds >= stop.seconds):
+            if stop.seconds is not None and self.seconds >= stop.seconds:
                 return True
+            if self.converged:
+                self.settle()  # what has arrived is a piece of work old: the last one may say otherwise
+                self.settled = False
+                return self.converged
             if good is None or self.solver.issued == 0 or self.seconds < ask_at:
                 return False
             self.settle()

@@ -126,8 +126,8 @@ class Session:
             self.message = str(error)
 
     def _take_over(self, ready: Ready) -> None:
-        """In place of what is open. Raises UserError, also where it is open but the solver that has been chosen since cannot be
-        had."""
+        """Put what was opened in the place of what is open. Raises UserError, also where it is open but the solver that has been
+        chosen since cannot be had."""
         loaded, lightmap, solver = ready.loaded, ready.lightmap, ready.solver
         scene, chosen = loaded.pool.scene, self.chosen_solver
         try:
@@ -255,7 +255,7 @@ class Session:
 
     @property
     def solver_name(self) -> str:
-        """Its name there."""
+        """The name in SOLVERS of the solver at work."""
         return self._choice.at_work
 
     @property

@@ -34,7 +34,7 @@ class SolverChoice:
 
     @property
     def family(self) -> Family:
-        """Of the solver at work."""
+        """The family of the solver at work."""
         return SOLVERS[self.at_work]
 
     @property

@@ -32,6 +32,7 @@ class Family:
     says how little may remain when it has converged. pictures: captions of the images of its Inspection, and what they show.
     shows: options that change the light that is shown without any work. layers: names of what its solvers know of every texel.
     distributes: whether what remains is light that is still to be distributed, in the energy balance; else it is an error.
+    per_error: how little may remain where an expected error is asked for, as a share of that.
     rays: whether it looks along rays, and so needs a tree of the scene's triangles (visibility/rays.py) before it is made.
     """
 
@@ -49,6 +50,7 @@ class Family:
     layers: tuple[str, ...] = ()
     distributes: bool = True
     quadratic: bool = False
+    per_error: float | None = None
     rays: bool = False
 
 
@@ -79,6 +81,7 @@ SOLVERS: dict[str, Family] = {
         layers=("direct", "variance", "rays"),
         pictures={HEMISPHERE: SEEN},
         distributes=False,
+        per_error=0.25,
         rays=True,
     ),
     "pairs": Family(

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.scene.model import F64
 from app.util import cache
@@ -55,4 +56,13 @@ def _is_tree(bvh: Bvh, count: int) -> bool:
         and ends[-1:].sum() == count
         and np.array_equal(np.sort(reference[inner]), np.arange(1, len(bvh.nodes)))
         and (reference > np.arange(len(bvh.nodes))[:, None])[inner].all()
+        and bvh.depth == _depth(reference, inner)
     )
+
+
+def _depth(reference: NDArray[np.int64], inner: NDArray[np.bool_]) -> int:
+    """The number of levels of inner nodes: the stack of a ray holds as many."""
+    depth, nodes = 0, np.arange(1)
+    while len(nodes):
+        depth, nodes = depth + 1, reference[nodes][inner[nodes]]
+    return depth

@@ -19,7 +19,8 @@ from app.session.session import Session
 from app.solvers import ShootingOptions
 from app.solvers.gathering.direct import folded
 from app.solvers.gathering.lamps import ALONE
-from app.solvers.gathering.solver import BATCH, FIRST, SHADOW_RAYS, SOLVED, Gathering
+from app.solvers.gathering.solver import BATCH, FIRST, JUDGED, SHADOW_RAYS, SOLVED, Gathering
+from app.util.parts import run_to_end
 from app.validation.scenes import across, furnace, scene_of
 
 RAYS = 32
@@ -156,6 +157,62 @@ def test_a_scene_lit_after_it_was_dark(gpu: Gpu) -> None:
     assert lit.rays.traced == fresh.rays.traced
     lit.release()
     fresh.release()
+
+
+def test_a_lamp_that_goes_on_while_leaves_get_their_shadow_rays_lights_all_of_them(gpu: Gpu) -> None:
+    """As one that goes on between two pieces of work: what is under way does without it."""
+    light = []
+    for mid in (True, False):
+        lit = gathered(gpu, table_room(), adaptive=True, **(GROWS | {"gradient": 0.05}))
+        lit.refine(gradient=0.02)
+        while not lit.rays._fresh:
+            lit.step(4)
+        under_way = lit.rays.work(16)
+        assert lit.rays._leaves_wait
+        if mid:
+            next(under_way)
+        lit.rays.set_materials(edited(lit.lightmap.scene, wall=(RED, {"emission": (9.0, 9.0, 9.0)})))
+        run_to_end(under_way)
+        lit.step(4)
+        new = lit.rays.direct.sets[-1]
+        there = lit.lightmap.pool.slot_texels > 0
+        assert new.lamps.materials == (RED,) and new.passes[there].min() > 1
+        for _ in range(20):
+            lit.step(4)
+        light.append(lit.means(lit.H))
+        lit.release()
+    np.testing.assert_allclose(*light, rtol=0.03)
+
+
+def test_lamps_that_share_a_set_are_edited_while_rays_are_under_way(gpu: Gpu) -> None:
+    """The set is another then, after the piece of work that goes through the old one."""
+    scene = lamps_at_the_ceiling(16, 2 * ALONE)
+    lit = gathered(gpu, scene, 32, density=2)
+    materials = scene.materials
+    shared = lit.rays.direct.sets[-1]
+    dimmer = replace(materials[-1], emission=tuple(e / 2 for e in materials[-1].emission))
+    under_way, before = lit.rays.work(16), shared.passes.sum()
+    while shared.passes.sum() == before:
+        next(under_way)
+    lit.rays.set_materials((*materials[:-1], dimmer))
+    run_to_end(under_way)
+    assert lit.rays.direct.sets[-1] is shared
+    lit.gather(64)
+    assert np.isfinite(lit.H).all() and len(lit.rays.direct.sets) == ALONE + 1
+    assert lit.rays.direct.sets[-1] is not shared
+    lit.release()
+
+
+def test_nothing_has_converged_before_its_noise_is_known(gpu: Gpu) -> None:
+    """One group of rays, or one pass of shadow rays, has no spread."""
+    lit = begin(gpu, table_room(), solver="gathering", density=4, noise=1.0)
+    assert not lit.rays.poll(wait=True).converged, "no ray has been traced"
+    seen = []
+    while not lit.rays.poll(wait=True).converged:
+        lit.step(4)
+        seen.append(lit.rays.poll(wait=True).done)
+    assert seen[0] == 4 and JUDGED <= seen[-1] <= JUDGED + BATCH
+    lit.release()
 
 
 # -- lamps -------------------------------------------------------------------------------------------------------------

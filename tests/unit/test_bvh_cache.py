@@ -84,6 +84,8 @@ def damaged(kind: str, file: Path) -> None:
         file.write_bytes(whole[:at] + bytes([whole[at] ^ 4]) + whole[at + 1 :])
     elif kind == "empty":
         file.write_bytes(b"")
+    elif kind == "too shallow":
+        np.savez(file, **(data | {"depth": data["depth"] - 1}))
     elif kind == "one array":
         with file.open("wb") as out:
             np.save(out, nodes)
@@ -109,7 +111,7 @@ def damaged(kind: str, file: Path) -> None:
     "kind",
     [
         *("half", "a flipped bit", "empty", "one array", "of other triangles"),
-        *("a triangle twice", "a circle", "a leaf too long", "no numbers", "doubles"),
+        *("a triangle twice", "a circle", "a leaf too long", "no numbers", "doubles", "too shallow"),
     ],
 )
 def test_a_file_that_holds_no_such_tree_is_made_anew(own_cache: Path, builds: list[int], kind: str) -> None:

@@ -27,6 +27,11 @@ def test_light_that_is_lost_or_made_is_told(imbalance: float, words: str) -> Non
     assert words in said[1] and "--solver gathering" in said[1]
 
 
+def test_it_names_only_what_the_solver_has() -> None:
+    (shooting,), (gathering,), (pairs,) = (notes(ended(name, 0.05)) for name in ("shooting", "gathering", "pairs"))
+    assert "--level" in shooting and "--level" not in gathering + pairs
+    assert "noise" in gathering and "--solver gathering" not in gathering
+
+
 def test_an_even_balance_needs_no_word() -> None:
     assert notes(ended("shooting", 0.019)) == []
-    assert notes(ended("gathering", 0.05)) == [], "its imbalance is noise, which it states"

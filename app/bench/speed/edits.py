@@ -206,7 +206,7 @@ class _Bench:
         return self._solver.drawn if isinstance(self._solver, Gathering) else 0
 
     def _errors(self, edited: tuple[Material, ...]) -> PointErrors:
-        """Of the edited light, from light that is solved afresh."""
+        """The errors of the edited light, from light that is solved afresh."""
         solver, H, remaining = self._solver, self._light(), self._solver.poll(wait=True).remaining
         if isinstance(gathering := solver, Gathering):
             gathering.bounces.clear()

@@ -5,6 +5,8 @@ Passes are best allocated where Σ D/(nσ) A is the same in all tiles for their 
 light is all of the noise, σ ~ 1/√n, and so
 
     n' = n (g / (n T λ))^(2/3),    g = Σ (D / σ) A over the texels of a tile,    λ such that all passes are given out
+
+All sets of lamps get as many passes: D is that of all of them.
 """
 
 from __future__ import annotations

@@ -156,7 +156,7 @@ class Noise:
 
 
 def noise_of(judged: ReadBack) -> Noise:
-    """See noise.frag.glsl."""
+    """The noise of the light that is shown, as noise.frag.glsl has summed it up."""
     tiles: F64 = np.frombuffer(judged.take(), np.float32).reshape(-1, 4).astype(np.float64)
     deviation, light, direct, _ = tiles.sum(0).tolist()
     return Noise(deviation / light if light > 0 else 0.0, direct / deviation if deviation > 0 else 0.0, tiles[:, 2])

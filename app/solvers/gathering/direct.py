@@ -141,6 +141,12 @@ class DirectLight:
         return max((float(PASS * lit.passes @ texels) / cost for lit in self.sets), default=0.0)
 
     @property
+    def known(self) -> bool:
+        """Whether every texel has had two passes of shadow rays to each set: from one, nothing is known of its noise."""
+        texels = self._lightmap.pool.slot_texels > 0
+        return all((lit.passes[texels] > 1).all() for lit in self.sets)
+
+    @property
     def _everywhere(self) -> F32:
         return np.array([(0, 0, *self._lightmap.size, 0, 0)], np.float32)
 

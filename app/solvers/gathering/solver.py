@@ -36,6 +36,7 @@ from app.visibility.rays import RayScene
 BATCH, FIRST = 16, 8  # rays of each texel at once, and at first
 MOST_POINTS = 100_000  # in quadtrees: as many as two cores trace rays from at interactive rates
 SYSTEM = 32  # rays of each texel along which bounces are solved; all of them then gather once more
+JUDGED = 32  # rays of each texel, and at least two passes of shadow rays, from which on the noise is known well enough to end
 CHANGES_PER_RAY = 16  # leaves that split or merge at once: bounded work for a frame
 FIRST_LOOK = 32  # rays, after which leaves are looked at: what few rays say is noise
 LOOK_AGAIN = 2  # times as many rays, when leaves did not change at the last look
@@ -173,7 +174,7 @@ class Gathering:
 
     @property
     def _gain(self) -> F64 | None:
-        """Of the slots as they are, see allocate.py."""
+        """What shadow rays gain in each slot as it is now, see allocate.py; None where that is not known."""
         if self._noise is None or self._noise_of != self.lightmap.version:
             return None
         return self._noise.gain[: self.lightmap.pool.tiles]
@@ -183,6 +184,7 @@ class Gathering:
         along all. No ray is traced, but to lamps that were off."""
         while self._edited:
             self._edited = False
+            self._follow_lamps()
             for direct in self._directs:
                 yield from direct.catch_up(SHADOW_RAYS * self.issued // FIRST)
                 direct.sum(self.lightmap.scene)
@@ -227,9 +229,11 @@ class Gathering:
         while len(self._judged) > (0 if wait else 1):
             done, version, judged = self._judged.pop(0)
             self._noise, self._noise_of = noise_of(judged), version
-            self._progress = Progress(done, self._noise.level, self._progress.escaped)
+            level = self._noise.level if done > GROUP else 1.0  # of one group nothing is known
+            self._progress = Progress(done, level, self._progress.escaped)
         refining, refinement = self._refining, self.lightmap.refinement
-        converged = self._progress.remaining <= self.options.noise and not self._edited and not refining
+        known = not self.lightmap.scene.emits or (self._progress.done >= JUDGED and self.direct.known)
+        converged = known and self._progress.remaining <= self.options.noise and not self._edited and not refining
         note = None if refinement is None else refinement.note
         return replace(self._progress, converged=converged, refining=refining, note=note)
 
@@ -266,6 +270,7 @@ class Gathering:
         for direct in self._directs:
             direct.forget()
         self._set_materials()
+        self._follow_lamps()
         scene = self.lightmap.scene
         self.issued, self._edited, self._noise = 0, False, None
         self._progress = Progress(0, 1.0 if scene.emits else 0.0, np.zeros(3))
@@ -292,14 +297,17 @@ class Gathering:
         self._edited = True
 
     def _set_materials(self) -> None:
-        """Let points and lamps follow the lightmap's materials."""
+        """Let points and bounces follow the lightmap's materials."""
         scene = self.lightmap.scene
         if self.points is not self.lightmap:
             self.points.set_materials(scene.materials)
             self.points.unit = self.lightmap.unit
         self.bounces.set_materials()
+
+    def _follow_lamps(self) -> None:
+        """Let the sets of lamps follow the lightmap's materials: between pieces of work, which go through these sets."""
         for direct in self._directs:
-            direct.follow(scene)
+            direct.follow(self.lightmap.scene)
 
     # -- leaves that come and go, see app/lightmap/refinement.py -------------------------------------------------------
 

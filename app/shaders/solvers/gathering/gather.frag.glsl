@@ -1,5 +1,4 @@
-// Σ B over some rays of each texel, B = ρH, and E of what is lit by rays alone, of the texel that was hit: read from where the
-// hits are kept, or traced again. Blended.
+// Σ B over some rays of each texel, B = ρH of the texel that was hit: read from where the hits are kept, or traced again. Blended.
 #define TRACED 0
 #include "solvers/gathering/hit.glsl"
 #if TRACED
