@@ -75,7 +75,7 @@ class Blocks:
     """A grid of blocks, all of it air to begin with.
 
     material (x, y, z) u8: AIR, or 1 + the number of the block's material in ``materials``; thing (x, y, z) i32: the number of
-    the object that it is part of, in ``things``; lowest (3,): coordinates of the grid's first block. What lies beyond the
+    the object that it is part of, by name in ``things``; lowest (3,): coordinates of the grid's first block. What lies beyond the
     sides of the grid and below it counts as blocks, what lies above it as air.
     """
 
@@ -84,13 +84,11 @@ class Blocks:
         self.thing = np.zeros(size, np.int32)
         self.lowest = np.array(lowest)
         self.materials = materials
-        self.things: list[str] = []
+        self.things: dict[str, int] = {}
 
     def numbers(self, thing: str, material: str) -> tuple[int, int]:
-        """Of an object, a new one unless it is the last, and of a material, as ``thing`` and ``material`` hold them."""
-        if not self.things or self.things[-1] != thing:
-            self.things.append(thing)
-        return len(self.things) - 1, self.materials.index(material) + 1
+        """Of an object, a new one if need be, and of a material, as ``thing`` and ``material`` hold them."""
+        return self.things.setdefault(thing, len(self.things)), self.materials.index(material) + 1
 
     def fill(self, thing: str, material: str, box: Box) -> None:
         """Put blocks into a box."""
@@ -148,9 +146,9 @@ class Blocks:
         several = np.bincount(thing, minlength=len(self.things)) > 1
         ends = np.append(first[1:], len(owner))
         cuts = np.searchsorted(triangles[:, 0], np.append(first, len(owner)))
-        out = []
+        names, out = list(self.things), []
         for k, (t, m) in enumerate(zip(thing.tolist(), material.tolist(), strict=True)):
-            name = f"{self.things[t]}, {self.materials[m]}" if several[t] else self.things[t]
+            name = f"{names[t]}, {self.materials[m]}" if several[t] else names[t]
             span = slice(first[k], ends[k])
             mesh = Mesh(positions[span], triangles[cuts[k] : cuts[k + 1]] - first[k], uv[span])
             out.append((name, self.materials[m], mesh))
@@ -162,7 +160,9 @@ class Blocks:
         count = len(faces.u)
         border = 2 * (faces.width + faces.height)
         which = np.repeat(np.arange(count), border)
-        step = np.arange(len(which)) - np.repeat(np.cumsum(border) - border, border)  # from the lowest corner, along u first
+        step = np.arange(len(which)) - np.repeat(
+            np.cumsum(border) - border, border
+        )  # from the lowest corner, along u first
         w, h = faces.width[which], faces.height[which]
         along_u = np.minimum(step, w) - np.clip(step - w - h, 0, w)
         along_v = np.clip(step - w, 0, h) - np.clip(step - 2 * w - h, 0, h)
@@ -174,7 +174,9 @@ class Blocks:
         first = np.searchsorted(which, np.arange(count))
         following = np.where(np.append(which[1:] == which[:-1], False), this + 1, first[which])
         # the fan starts where no side that its first point lies on has another point inside, else in the middle
-        on_side = np.bincount(4 * which + side, minlength=4 * count).reshape(-1, 4)  # the corner where it starts, and points inside
+        on_side = np.bincount(4 * which + side, minlength=4 * count).reshape(
+            -1, 4
+        )  # the corner where it starts, and points inside
         is_start = np.append(True, np.diff(4 * which + side) != 0)
         alone = np.where(is_start, on_side[which, side] + on_side[which, side - 1] == 2, on_side[which, side] == 2)
         apex = np.full(count, -1)

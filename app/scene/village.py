@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.scene.blocks import AIR, Blocks, Box, Span
 from app.scene.grotto import fractal_noise, random01
-from app.scene.shapes import Mesh
+from app.scene.shapes import Mesh, quad
 
 MATERIALS = (
     "grass",
@@ -45,17 +45,19 @@ WALL = 4  # blocks, height of a house up to its roof
 
 class Village(BaseModel):
     """``blocks``: blocks, of 1 m, along each side of the world; the number of houses, trees and lamps grows with its area.
-    Uses the materials in MATERIALS."""
+    Uses the materials in MATERIALS and moon."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     kind: Literal["village"]
-    blocks: Annotated[int, Field(ge=80, le=1000, multiple_of=2)] = 144
+    blocks: Annotated[int, Field(ge=80, le=1000, multiple_of=2)] = 140
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 3
 
     def pieces(self) -> list[tuple[str, str, Mesh]]:
-        """(object name, material name, mesh) of the surface of all blocks."""
-        return self.world().pieces()
+        """(object name, material name, mesh) of the surface of all blocks, and of the moon, a square that looks down."""
+        side, high = 4 * round(self.blocks / 44), round(0.6 * self.blocks)
+        moon = quad((0.3 * self.blocks, high, 0.25 * self.blocks), (side, 0, 0), (0, 0, side))
+        return [*self.world().pieces(), ("moon", "moon", moon)]
 
     def world(self) -> Blocks:
         """All blocks."""
@@ -73,7 +75,7 @@ class Village(BaseModel):
     @property
     def rings(self) -> int:
         """Of plots about the square."""
-        return max(1, round(self.blocks / 72))
+        return max(1, round(self.blocks / 64))
 
     @property
     def half(self) -> int:
@@ -153,19 +155,23 @@ class Village(BaseModel):
             if covered and k % 5 == 0 and k > self.hill + 7:
                 side = low - 1 if k % 2 else high
                 world.fill("tunnel torches", "torch", ((side, side + 1), (1, 2), (k, k + 1)))
-        for i in range(9):
-            angle = 2.0 * np.pi * (i + 0.5) / 9
-            spot = int(0.62 * a * np.sin(angle)), self.hill + int(0.62 * c * np.cos(angle))
-            self._stand(world, f"torch {i + 1}", spot, "wood", "torch", 1)
+        for i in range(7):
+            angle = 2.0 * np.pi * (i + 0.5) / 7
+            spot = int(0.72 * a * np.sin(angle)), self.hill + int(0.72 * c * np.cos(angle))
+            self._stand(world, f"torch {i + 1}", spot, "torch", 1)
 
-    def _stand(self, world: Blocks, thing: str, spot: tuple[int, int], post: str, light: str, high: int) -> None:
-        """A post with a light, on the first block below y = 1 with air above it; nothing where there is none."""
+    def _stand(self, world: Blocks, thing: str, spot: tuple[int, int], light: str, high: int) -> None:
+        """A post with a light on the first block below y = 1 that has air above it; nothing where there is none."""
         x, z = ((a, a + 1) for a in spot)
         column = world.material[world.within((x, (-DEPTH, 2), z))].reshape(-1)
         if column.size and column[-1] == AIR:
             floor = int(np.flatnonzero(column).max()) + 1 - DEPTH
-            world.fill(thing, post, (x, (floor, floor + high), z))
-            world.fill(thing, light, (x, (floor + high, floor + high + 1), z))
+            self._post(world, thing, (spot[0], floor, spot[1]), light, high)
+
+    def _post(self, world: Blocks, thing: str, foot: tuple[int, int, int], light: str, high: int) -> None:
+        x, y, z = ((a, a + 1) for a in foot)
+        world.fill(thing, "wood", (x, (y[0], y[0] + high), z))
+        world.fill(thing, light, (x, (y[0] + high, y[1] + high), z))
 
     def _square(self, world: Blocks) -> None:
         """Cobbles, a well under a roof, and two benches."""
@@ -177,7 +183,7 @@ class Village(BaseModel):
             world.fill("well", "wood", ((x, x + 1), (1, 4), (1, 2)))
         world.fill("well", "roof", ((-3, 3), (4, 5), (-3, 3)))
         world.fill("well", "roof", ((-2, 2), (5, 6), (-2, 2)))
-        world.fill("well", "lamp", ((-1, 1), (3, 4), (-1, 1)))
+        world.fill("well", "lantern", ((-1, 1), (3, 4), (-1, 1)))
         for x in (-5, 4):
             world.fill("benches", "planks", ((x, x + 1), (0, 1), (-2, 2)))
 
@@ -192,7 +198,9 @@ class Village(BaseModel):
             place = (PLOT * i, PLOT * j)
             if max(abs(i), abs(j)) == 1 or self._random(i, j, 1) < 0.6:
                 houses += 1
-                _House(world, f"house {houses}", place, self._turn(i, j), [self._random(i, j, 10 + k) for k in range(20)])
+                _House(
+                    world, f"house {houses}", place, self._turn(i, j), [self._random(i, j, 10 + k) for k in range(20)]
+                )
             else:
                 for k, (dx, dz) in enumerate(((-4, -3), (3, 4), (3, -4))):
                     trees += 1
@@ -205,13 +213,12 @@ class Village(BaseModel):
         return 0 if j < 0 else 2
 
     def _lanterns(self, world: Blocks) -> None:
-        """One at each crossing, about the square, and along the way to the cave."""
-        corners = [a - 2 for a in range(-self.half, self.half + 1, PLOT)]
-        spots = [(x, z) for x in corners for z in corners]
-        spots += [(x, z) for x in (-6, 5) for z in (-6, 5)]
+        """One at each crossing, and along the way to the cave."""
+        beside = [a - 2 if a > 0 else a + 2 for a in range(-self.half, self.half + 1, PLOT)]
+        spots = [(x, z) for x in beside for z in beside]
         spots += [(3 * (-1) ** k, -PLOT // 2 - 5 - 7 * k) for k in range((self.half - PLOT // 2) // 7)]
         for i, spot in enumerate(spots):
-            self._stand(world, f"lantern {i + 1}", spot, "wood", "lantern", 2)
+            self._stand(world, f"lantern {i + 1}", spot, "lantern", 2)
 
     def _forest(self, world: Blocks, ground: NDArray[np.int64]) -> None:
         """Trees where the ground rolls, and here and there a lantern among them."""
@@ -226,13 +233,12 @@ class Village(BaseModel):
                 if beyond < 4 or way or height > 14:
                     continue
                 kind = self._random(x, z, 2)
-                if kind < 0.62:
+                if kind < 0.57:
                     trees += 1
                     self._tree(world, f"tree {trees}", at_x, height, at_z, (x, z, 3))
-                elif kind > 0.95:
+                elif kind > 0.87:
                     lanterns += 1
-                    where = ((at_x, at_x + 1), (height, height + 1), (at_z, at_z + 1))
-                    world.fill(f"forest lantern {lanterns}", "lantern", where)
+                    self._post(world, f"forest lantern {lanterns}", (at_x, height, at_z), "lantern", 2)
 
     def _tree(self, world: Blocks, thing: str, x: int, y: int, z: int, numbers: tuple[int, ...]) -> None:
         """A trunk and a crown of three steps."""
