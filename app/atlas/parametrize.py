@@ -148,13 +148,13 @@ def _unfold(
     chart = np.full(len(facet), -1, np.int32)
     uv = np.zeros((len(facet), 3, 2))
     count = 0
-    for flat in (rectangles, rectilinear):
+    for found in (rectangles, rectilinear):
         slot = np.full(int(facet.max()) + 1, -1, np.int32)
-        slot[flat.facet] = np.arange(len(flat.facet), dtype=np.int32)
+        slot[found.facet] = np.arange(len(found.facet), dtype=np.int32)
         mine = used[slot[facet[used]] >= 0]
-        uv[mine] = _in_rectangle(scene.corners[mine], flat, slot[facet[mine]])
+        uv[mine] = _in_rectangle(scene.corners[mine], found, slot[facet[mine]])
         chart[mine] = count + slot[facet[mine]]
-        count += len(flat.facet)
+        count += len(found.facet)
     rest = used[chart[used] < 0]
     unfolded = unwrap(
         points,
