@@ -106,7 +106,7 @@ class Village(BaseModel):
         (x0, x1), (z0, z1) = self._spans
         x, z = (a + 0.5 for a in np.meshgrid(np.arange(x0, x1), np.arange(z0, z1), indexing="ij"))
         noise = fractal_noise(np.stack([x / 26.0, np.zeros_like(x), z / 26.0], -1).reshape(-1, 3), self.seed)
-        outside = np.maximum(np.hypot(*(np.maximum(np.abs(a) - self.half, 0.0) for a in (x, z))), 0.0)
+        outside = np.hypot(*(np.maximum(np.abs(a) - self.half, 0.0) for a in (x, z)))
         rim = np.minimum(np.minimum(x - x0, x1 - x), np.minimum(z - z0, z1 - z))
         rolling = _smooth(outside / 16.0) * (2.0 + 7.0 * noise.reshape(x.shape)) + 9.0 * _smooth(1.0 - rim / 14.0) ** 2
         from_hill = np.hypot(x, z - self.hill)
@@ -123,13 +123,9 @@ class Village(BaseModel):
         world.material[crag] = world.numbers("terrain", "stone")[1]
         for middle in range(-self.half, self.half + 1, PLOT):
             street, all_ = (middle - STREET, middle + STREET + 1), (-self.half - STREET, self.half + STREET + 1)
-            self._pave(world, street, all_)
-            self._pave(world, all_, street)
+            world.fill("terrain", "path", (street, (-1, 0), all_))
+            world.fill("terrain", "path", (all_, (-1, 0), street))
         return height
-
-    def _pave(self, world: Blocks, x: Span, z: Span) -> None:
-        """Turn the topmost blocks of flat ground into a street."""
-        world.fill("terrain", "path", (x, (-1, 0), z))
 
     def _cave(self, world: Blocks, ground: NDArray[np.int64]) -> None:
         """Dig a hall under the hill and a tunnel to the village; torches along both."""
@@ -145,14 +141,13 @@ class Village(BaseModel):
         number, stone = world.numbers("cave", "stone")
         world.thing[where][deep], world.material[where][deep] = number, stone
         world.material[where][hollow] = AIR
-        for k in range(-self.half - 26, -self.half):  # the tunnel and, before it, a way through whatever rises there
+        for k in range(self.hill + 6, -self.half):  # the tunnel and, before it, a way through whatever rises there
             bend = round(1.6 * np.sin((k + self.half + STREET) / 3.0))
             low, high = bend - 1, bend + 2
             covered = ground[bend - self._spans[0][0], k - self._spans[1][0]] > 4
-            if k > self.hill + 5:
-                world.fill("cave", "path", ((low, high), (-1, 0), (k, k + 1)))
-                world.dig(((low, high), (0, 3 if covered else 12), (k, k + 1)))
-            if covered and k % 5 == 0 and k > self.hill + 7:
+            world.fill("cave", "path", ((low, high), (-1, 0), (k, k + 1)))
+            world.dig(((low, high), (0, 3 if covered else 12), (k, k + 1)))
+            if covered and k - self.hill in (8, 11):  # one on either side
                 side = low - 1 if k % 2 else high
                 world.fill("tunnel torches", "torch", ((side, side + 1), (1, 2), (k, k + 1)))
         for i in range(7):
@@ -169,6 +164,7 @@ class Village(BaseModel):
             self._post(world, thing, (spot[0], floor, spot[1]), light, high)
 
     def _post(self, world: Blocks, thing: str, foot: tuple[int, int, int], light: str, high: int) -> None:
+        """A light on a post of so many blocks."""
         x, y, z = ((a, a + 1) for a in foot)
         world.fill(thing, "wood", (x, (y[0], y[0] + high), z))
         world.fill(thing, light, (x, (y[0] + high, y[1] + high), z))

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scene_files import written
+from scipy.ndimage import label
 
 from app.atlas.charts import ALIGN
 from app.atlas.parametrize import parametrize
@@ -105,6 +106,19 @@ def test_cameras_stand_in_the_air() -> None:
     for camera in load_scene("village").cameras:
         cell = tuple(np.floor(camera.world_from_camera[:3, 3]).astype(int) - world.lowest)
         assert world.material[cell] == 0, camera.name
+
+
+@pytest.mark.parametrize("blocks", [SMALL, 140])
+def test_a_tunnel_leads_from_the_square_into_the_cave(blocks: int) -> None:
+    made = Village(kind="village", blocks=blocks)
+    world = made.world()
+    head = (
+        1 - world.lowest[1]
+    ).item()  # y = 1, where a head is: only on foot, neither over the hill nor through its roof
+    places, _ = label(world.material[:, head] == 0)
+    square, hall = (places[0 - world.lowest[0], z - world.lowest[2]] for z in (-7, made.hill))
+    assert square == hall > 0
+    assert world.material[-world.lowest[0], head + 8, made.hill - world.lowest[2]] != 0  # a roof above the hall
 
 
 @pytest.mark.parametrize(
