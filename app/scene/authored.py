@@ -11,7 +11,8 @@
                                 # without = ["bottom", ...] of left right bottom top back front; name
     [[mesh]]                    # file beside the TOML (.glb .gltf .obj .ply .stl); translate, rotate = degrees about
                                 # x, then y, then z, scale = number or [x, y, z]; material to replace its own; name
-    [[procedural]]              # kind = "museum" | "grotto" | "icosphere" | "cylinder" and parameters: procedural.py
+    [[procedural]]              # kind = "museum" | "grotto" | "village" | "icosphere" | "cylinder" and parameters:
+                                # procedural.py
     [[camera]]                  # name; position, target; yfov_deg = 45
 
 Colours are linear Rec.709, or one number for grey. A texture multiplies the albedo, which is then 1 unless given; it

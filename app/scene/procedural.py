@@ -13,6 +13,7 @@ from app.scene import shapes
 from app.scene.grotto import Grotto
 from app.scene.museum import Museum
 from app.scene.shapes import Mesh
+from app.scene.village import Village
 
 Vec3 = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0.0)]
@@ -57,4 +58,4 @@ class Cylinder(Solid):
         return self._pieces(self.kind, mesh)
 
 
-Procedural = Annotated[Museum | Grotto | Icosphere | Cylinder, Field(discriminator="kind")]
+Procedural = Annotated[Museum | Grotto | Village | Icosphere | Cylinder, Field(discriminator="kind")]

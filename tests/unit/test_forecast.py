@@ -22,10 +22,13 @@ CONVERGED = {
     "museum": 1.63,
     "textured-room": 0.66,
     "two-rooms": 3.31,
+    "village": 3.92,  # gathered, 400 rays
 }
 TOLERANCE = (
     0.5  # EV: some hundred points lose 0.3 EV where they are near each other, and cells are coarse beside crystals
 )
+# the village has hundreds of lamps of a block: few of the points that stand for all surfaces lie near one
+TOLERANCES = {"village": 0.8}
 TEXELS = {"grotto": 200_000}  # with few, cells are as large as its crystals, and what is near hides nothing
 
 
@@ -35,7 +38,7 @@ def nodes_of(name: str) -> TilePool:
 
 @pytest.mark.parametrize("name", scene_names())
 def test_a_scene_opens_with_about_the_exposure_it_will_have(name: str) -> None:
-    assert first_exposure(nodes_of(name)) == pytest.approx(CONVERGED[name], abs=TOLERANCE)
+    assert first_exposure(nodes_of(name)) == pytest.approx(CONVERGED[name], abs=TOLERANCES.get(name, TOLERANCE))
 
 
 def test_light_grows_with_the_lamp_and_no_lamp_gives_none() -> None:

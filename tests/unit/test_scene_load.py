@@ -26,7 +26,7 @@ def scene_of(*meshes: Mesh) -> Scene:
 
 
 def test_scenes_that_come_along() -> None:
-    assert {"cornell-box", "furnace", "museum", "grotto", "two-rooms", "textured-room"} <= set(scene_names())
+    assert {"cornell-box", "furnace", "museum", "grotto", "two-rooms", "textured-room", "village"} <= set(scene_names())
     assert load_scene("furnace").source == scene_path("furnace")
     assert load_scene(scene_path("furnace")).name == load_scene(str(scene_path("furnace"))).name
     with pytest.raises(UserError, match="must be one of cornell-box"):
