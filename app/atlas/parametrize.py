@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from app.atlas.charts import ALIGN, DEFAULT_TILE, GAP, Charts
 from app.atlas.contacts import hidden_pieces
 from app.atlas.packing import MAX_SIDE, outlines, pack
-from app.atlas.rectangles import Rectangles, find_rectangles, find_rectilinear
+from app.atlas.rectangles import Rectangles, find_rectangles
 from app.atlas.sides import Sides, distinct_rows, facets, lit_sides, scene_size, totals, weld
 from app.atlas.unwrap import unwrap
 from app.errors import UserError
@@ -142,20 +142,15 @@ def _unfold(
 ) -> tuple[Layout, str, tuple[str, ...]]:
     """Charts in metres for every triangle with a lit side; their story in words; warnings."""
     used = np.unique(lit.triangle)
-    given = points, corners[used], scene.material_ids[used], facet[used]
-    rectangles = find_rectangles(*given)
-    rectilinear = find_rectilinear(*given, rectangles.facet)
+    rectangles = find_rectangles(points, corners[used], scene.material_ids[used], facet[used])
+    slot = np.full(int(facet.max()) + 1, -1, np.int32)
+    slot[rectangles.facet] = np.arange(len(rectangles.facet), dtype=np.int32)
+    count = len(rectangles.facet)
     chart = np.full(len(facet), -1, np.int32)
     uv = np.zeros((len(facet), 3, 2))
-    count = 0
-    for found in (rectangles, rectilinear):
-        slot = np.full(int(facet.max()) + 1, -1, np.int32)
-        slot[found.facet] = np.arange(len(found.facet), dtype=np.int32)
-        mine = used[slot[facet[used]] >= 0]
-        uv[mine] = _in_rectangle(scene.corners[mine], found, slot[facet[mine]])
-        chart[mine] = count + slot[facet[mine]]
-        count += len(found.facet)
-    rest = used[chart[used] < 0]
+    chart[used] = slot[facet[used]]
+    whole, rest = used[chart[used] >= 0], used[chart[used] < 0]
+    uv[whole] = _in_rectangle(scene.corners[whole], rectangles, chart[whole])
     unfolded = unwrap(
         points,
         corners[rest],
@@ -167,12 +162,7 @@ def _unfold(
     )
     chart[rest], uv[rest] = count + unfolded.chart, unfolded.uv
     flat = int(unfolded.chart.max(initial=-1)) + 1 - unfolded.by_xatlas
-    kinds = (
-        (len(rectangles.facet), "rectangles"),
-        (len(rectilinear.facet), "rectilinear pieces"),
-        (unfolded.by_xatlas, "xatlas charts"),
-        (flat, "flat pieces"),
-    )
+    kinds = ((count, "rectangles"), (unfolded.by_xatlas, "xatlas charts"), (flat, "flat pieces"))
     method = ", ".join(f"{number} {kind}" for number, kind in kinds if number)
     return _measured(chart, uv, rectangles.size, lit), method, unfolded.warnings
 

@@ -1,5 +1,4 @@
-"""Facets that are whole rectangles: one axis-aligned chart each, no unwrap, no empty texels [Coombe03, 3.1]; and those whose
-border has right angles only, which lie in charts along their edges.
+"""Facets that are whole rectangles: one axis-aligned chart each, no unwrap, no empty texels [Coombe03, 3.1].
 
 The strips of a column or an arch are rectangles too, but unfold better together: those are left out.
 The answer depends on the surface only: not on its diagonals, the order of its triangles, or where a modeller cut it.
@@ -63,32 +62,6 @@ def find_rectangles(points: F64, triangles: I32, materials: I32, facet: I32) -> 
     heights = totals(facet, np.einsum("mck,mk->mc", corners, normal[facet]).mean(axis=1), count)
     heights /= np.maximum(np.bincount(facet, minlength=count), 1)
     return _oriented(index, normal[index], heights[index], axes[index], lows[index], highs[index])
-
-
-def find_rectilinear(points: F64, triangles: I32, materials: I32, facet: I32, taken: I32) -> Rectangles:
-    """The rectangles around the facets whose edges are all along or across the longest one, such as floors of L shape, walls
-    with windows and the ground of worlds of blocks; without those ``taken``, and the strips of a curved surface.
-
-    points (n, 3) [m], triangles (m, 3), materials (m,), facet (m,) as from ``sides.facets``; taken (k,): facets.
-    """
-    count = int(facet.max(initial=-1)) + 1
-    corners = points[triangles]
-    normal = totals(facet, np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), count)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
-    left = _smooth_neighbours(triangles, materials, facet, normal) < CURVED
-    left[taken] = False
-    mine = left[facet]
-    edge_facet, edge_rank, edge_along = _ranked_boundary(points, triangles[mine], facet[mine])
-    axes, bordered = np.zeros((count, 3)), np.zeros(count, bool)
-    longest = edge_facet[edge_rank == 0]
-    axes[longest], bordered[longest] = edge_along[edge_rank == 0], True
-    cosine = np.abs(np.einsum("ek,ek->e", edge_along, axes[edge_facet]))
-    askew = np.bincount(edge_facet, (cosine > SAME) & (cosine < np.sqrt(1 - SAME**2)), count)
-    index = np.flatnonzero(bordered & (askew == 0))
-    low, high = _extents(corners, facet, normal, axes, index)
-    at = totals(facet, np.einsum("mck,mk->mc", corners, normal[facet]).mean(axis=1), count)
-    at /= np.maximum(np.bincount(facet, minlength=count), 1)
-    return _oriented(index, normal[index], at[index], axes[index], low, high)
 
 
 def _ranked_boundary(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from atlas_scenes import TURN, box_room, moved, scene_of, split_grid
 
-from app.atlas.rectangles import find_rectangles, find_rectilinear
+from app.atlas.rectangles import find_rectangles
 from app.atlas.sides import facets, lit_sides, scene_size, weld
 from app.scene import shapes
 from app.scene.model import Material, Scene
@@ -144,21 +144,3 @@ NOT_RECTANGLES = {
 @pytest.mark.parametrize("name", NOT_RECTANGLES)
 def test_what_is_no_rectangle(name: str) -> None:
     assert _rectangles(moved(scene_of([NOT_RECTANGLES[name]]), TURN)) == []
-
-
-@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
-def test_pieces_with_right_angles_only_lie_along_their_edges(scale: float) -> None:
-    foot = shapes.quad((0, -1, 0), (1, 0, 0), (0, 1, 0))  # under the left half of the sheet: an L
-    slant = Mesh(
-        np.array([[5.0, 0, 0], [8, 0, 0], [8, 1, 0], [6, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]), np.zeros((4, 2))
-    )
-    scene = moved(scene_of([SHEET, foot, slant, SHEET.moved(0, 0, 3)]), TURN @ np.diag([scale, scale, scale, 1.0]))
-    points, corners = weld(scene)
-    label = facets(points, corners, scene.material_ids, scene_size(scene))
-    given = points, corners, scene.material_ids, label
-    whole = find_rectangles(*given)
-    r = find_rectilinear(*given, whole.facet)
-    assert len(whole.facet) == 1 and r.facet.tolist() == [label[0]]
-    assert np.allclose(r.size, 2 * scale)
-    local = (points[corners[label == label[0]]] - r.corner[0]) @ np.stack([r.u[0], r.v[0]], axis=1) / scale
-    assert np.allclose(local, np.round(local), atol=1e-9) and local.min() > -1e-9 and local.max() < 2 + 1e-9
