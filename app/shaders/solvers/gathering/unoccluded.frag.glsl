@@ -58,7 +58,11 @@ void main() {
     float width = max(length(o.u), length(o.v));
     for (int nth = 0; nth < u_lamps; ++nth) {
         Lamp lamp = load_lamp(nth);
-        vec3 facing = cross(lamp.u, lamp.v);
+        vec3 facing = cross(lamp.u, lamp.v), way = lamp.corner - o.position;
+        // wholly behind the lamp, or the lamp wholly below the horizon: no place of the texel sees it
+        if (!lamp.two_sided && dot(way, facing) > width * length(facing)) continue;
+        float rise = dot(way, o.normal) + max(max(dot(lamp.u, o.normal), dot(lamp.v, o.normal)), 0.0);
+        if (rise < -COPLANAR) continue;
         float distance = distance_of(lamp, o.position);
         int edge = o.square ? int(clamp(ceil(width / (SPACING * distance)), distance > AFAR * width ? 1.0 : 2.0, float(MOST))) : 1;
         for (int k = 0; k < edge * edge; ++k) {
