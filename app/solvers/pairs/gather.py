@@ -20,6 +20,9 @@ MAP = 256
 MAPS = 10  # drawn above each other
 OPEN = 0.0  # of an item, see common/item.glsl
 Area = tuple[int, int, int, int]
+# Of one draw. Mesa's llvmpipe ends the loops of a fragment after 65,536 rounds of all of them, inner ones too: a way through
+# voxels takes up to 3·128, a ray some hundred.
+AT_ONCE = 128
 
 
 class Gather(Protocol):
@@ -49,7 +52,8 @@ class PairGather:
         self._lightmap, self._senders, self._occlusion = lightmap, senders, occlusion
         self._choice = CHOICES.get(options.senders, 0)
         table = senders.table
-        self.choices = self.most = len(table.windows) if self._choice == 1 else table.senders
+        self.choices = len(table.windows) if self._choice == 1 else table.senders
+        self.most = min(self.choices, AT_ONCE)
         self._pass = Pass(
             gpu,
             "solvers/pairs/gather",
@@ -134,7 +138,7 @@ class DirectionGather:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, senders: Senders, scenes: Scenes, directions: int) -> None:
         self._lightmap, self._senders, self._scenes = lightmap, senders, scenes
-        self.choices = self.most = directions
+        self.choices, self.most = directions, min(directions, AT_ONCE)
         defines = lightmap.defines("MATERIAL_BITS", "TILE") | scenes.rays.defines
         self._pass = Pass(gpu, "solvers/pairs/directions", defines=defines)
 
