@@ -225,7 +225,7 @@ def test_a_bounce_stops_anywhere_and_goes_on(gpu: Gpu, even_parts: None, monkeyp
     solved = Solved(gpu, table_room(), 2.0, senders="all")
     right = solved.bounce(1)
     solved.solver.reset()
-    for _ in range(3):
+    for _ in range(5):
         assert run_to_end(solved.solver.work(1)) == 0, "a piece, not the whole"
     part = solved.solver.work(1)
     next(part)
