@@ -156,13 +156,13 @@ def _lids(all_: _Facets, own: I64, up: F64, within: float, flat: float) -> tuple
     near = dict(zip(np.flatnonzero(few).tolist(), tree.query_ball_point(planes[few], 1.0), strict=True))
     crowded = np.flatnonzero(~few)
     side, lid = _boxes_that_meet(all_, own[crowded], lids, np.abs(up[crowded]).argmax(1), within)
-    if len(side) <= MOST_MEET:
+    if len(crowded) and len(side) <= MOST_MEET:
         one_plane = ((planes[crowded[side]] - lid_planes[lid]) ** 2).sum(1) <= 1
-        side, lid = crowded[side[one_plane]], lid[one_plane]
-        ends_of = np.searchsorted(side, crowded, "right")
-        near |= zip(crowded.tolist(), np.split(lid, ends_of[:-1]), strict=True) if len(crowded) else ()
+        side, lid = side[one_plane], lid[one_plane]
+        ends_of = np.searchsorted(side, np.arange(len(crowded)), "right")
+        near |= zip(crowded.tolist(), np.split(lid, ends_of[:-1]), strict=True)
     found = []
-    for one, those in sorted(near.items(), key=lambda item: item[0]):
+    for one, those in sorted(near.items()):
         mine, lid = own[one], lids[those]
         height = (all_.point[lid] - all_.point[mine]) @ up[one]
         lies = ((height > flat) | body[those] & (height >= -flat)) & (lid != mine)

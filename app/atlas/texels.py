@@ -137,8 +137,9 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
                 np.add.at(normal[k], slot, covered * towards[f, k])
                 lead[k, slot[leading]] = centre[leading]
             np.add.at(area, slot, covered)
+            here = cut[slot]
             for k, at in enumerate((u, v)):
-                np.add.at(middle[k], slot, covered * at)
+                np.add.at(middle[k], slot[here], (covered * at)[here])
         slot, at = _beside(pieces, over, uv, face, middle / np.where(area > 0, area, 1.0), leaves, charts.tile)
         f, (du, dv) = face[slot].astype(np.int64), (at - uv[face[slot], 0]).T * size
         for k in range(3):

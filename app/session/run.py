@@ -228,8 +228,9 @@ class Run:
             if stop.seconds is not None and self.seconds >= stop.seconds:
                 return True
             if self.converged:
-                self.settle()  # what has arrived is a piece of work old: the last one may say otherwise
-                self.settled = False
+                self.progress = (
+                    self.solver.settle()
+                )  # what had arrived is a piece of work old: the last may say otherwise
                 return self.converged
             if good is None or self.solver.issued == 0 or self.seconds < ask_at:
                 return False

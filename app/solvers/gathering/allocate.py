@@ -34,10 +34,8 @@ def allocate(passes: NDArray[np.int64], gain: F64, texels: NDArray[np.int64], ea
         return np.where(texels > 0, np.clip(wanted - passes, 0.0, MOST * each), 0.0)
 
     some = marginal > 0
-    low, high = (
-        0.0,
-        float((((passes[some] + MOST * each) / passes[some]) ** 1.5 / marginal[some]).max()),
-    )  # there all get the most
+    enough = ((passes + MOST * each)[some] / passes[some]) ** 1.5 / marginal[some]
+    low, high = 0.0, float(enough.max())  # there all tiles that gain get the most
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if float(more(middle) @ texels) < each * cost else (low, middle)

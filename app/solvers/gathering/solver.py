@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from app.atlas.texels import texel_count, uniform_leaves
+from app.atlas.texels import uniform_leaves
 from app.gpu import Framebuffer, Gpu, ReadBack, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
@@ -51,8 +51,7 @@ ALIKE = 3e-2  # of what solutions along other rays differ by, that may be missin
 def points_of(lightmap: Lightmap) -> TilePool:
     """The points between which light bounces, where leaves of quadtrees come and go: texels of one level, whatever the leaves."""
     pool, level = lightmap.pool, 0
-    roots = texel_count(pool.charts)
-    while level < lightmap.options.depth and roots * 4 ** (level + 1) <= MOST_POINTS:
+    while level < lightmap.options.depth and pool.uniform_texels(level + 1) <= MOST_POINTS:
         level += 1
     return TilePool(pool.scene, pool.charts, uniform_leaves(pool.charts, level))
 
