@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from app.atlas.charts import TILES
+from app.direct_light.shadow_rays import PASS
 from app.gpu import Glsl, Gpu, Mesh, Pass, ShaderError, ShaderLibrary
 from app.gpu.shader import SHADERS, Source
 from app.options import specs
@@ -21,7 +22,6 @@ from app.render.layers import LAYER_SHADERS
 from app.render.options import TONE_MAPS
 from app.render.resolve import BORDER, PLACES_WIDTH
 from app.solvers.gathering.compose import RADIUS
-from app.solvers.gathering.direct import PASS
 from app.solvers.pairs.gather import CHOICES
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 from app.solvers.shooting.records import BATCH, BLOCK_LEVEL, BLOCK_ROWS, CELL_LEVEL, EMITTER, GROUP, LEVELS, RECORDS

@@ -10,6 +10,8 @@ import pytest
 from solver_scenes import EVERY_LIGHTMAP, Solution, begin, grey, quads_scene, room, table_room
 
 from app.atlas.options import AtlasOptions
+from app.direct_light.lamps import ALONE
+from app.direct_light.shadow_rays import folded
 from app.gpu import Gpu
 from app.lightmap.options import STORAGE
 from app.scene.model import F64, Material, Scene, Texture
@@ -17,8 +19,6 @@ from app.scene.shapes import box, merged
 from app.session.run import Stop
 from app.session.session import Session
 from app.solvers import ShootingOptions
-from app.solvers.gathering.direct import folded
-from app.solvers.gathering.lamps import ALONE
 from app.solvers.gathering.solver import BATCH, FIRST, JUDGED, SHADOW_RAYS, SOLVED, Gathering
 from app.util.parts import run_to_end
 from app.validation.scenes import across, furnace, scene_of

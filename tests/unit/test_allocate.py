@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from app.direct_light.allocate import LEAST, MOST, allocate
 from app.scene.model import F64
-from app.solvers.gathering.allocate import LEAST, MOST, allocate
 
 
 def spent(more: NDArray[np.int64], texels: NDArray[np.int64]) -> float:

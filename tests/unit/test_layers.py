@@ -16,7 +16,7 @@ LAYERS = [
     {"atlas"},
     {"lightmap"},
     {"visibility"},
-    {"reference"},
+    {"reference", "direct_light"},
     {"solvers", "bake"},
     {"estimate", "compare"},
     {"render"},

@@ -14,7 +14,7 @@ import numpy as np
 from app.gpu import Framebuffer, Gpu, Pass, ReadBack, Texture
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
-from app.solvers.gathering.origins import Origins
+from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
 RADIUS = 4  # of the window that indirect light is smoothed over, in points

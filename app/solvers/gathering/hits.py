@@ -13,7 +13,7 @@ from typing import Any
 
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
-from app.solvers.gathering.origins import Origins
+from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
 GROUP = 4  # rays whose mean is one sample of the noise, see gather.frag.glsl

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.direct_light.shadow_rays import DirectLight
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
 from app.solvers.base import Inspection, Progress, Rays
 from app.solvers.gathering.compose import Compose
-from app.solvers.gathering.direct import DirectLight
 from app.solvers.gathering.hits import Hits
-from app.solvers.gathering.origins import Origins
+from app.visibility.origins import Origins
 
 MOST_RAYS = 4096  # of a texel that are looked at: the first ones are spread as evenly as all
 SEEN = (

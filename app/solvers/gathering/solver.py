@@ -2,9 +2,9 @@
 
     H = H_direct + 1/N Σ_k B(hit_k),    B = ρH
 
-A piece of work is some rays more of each texel, what they hit kept (hits.py); shadow rays to the lamps (direct.py); the bounces
-along all that is kept (bounces.py); and the light that is shown (compose.py). Other materials cost no ray: the bounces are solved
-again along what is kept.
+A piece of work is some rays more of each texel, what they hit kept (hits.py); shadow rays to the lamps (app/direct_light); the
+bounces along all that is kept (bounces.py); and the light that is shown (compose.py). Other materials cost no ray: the bounces
+are solved again along what is kept.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from app.atlas.texels import uniform_leaves
+from app.direct_light.shadow_rays import PASS, DirectLight
 from app.gpu import Framebuffer, Gpu, ReadBack, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
@@ -25,12 +26,11 @@ from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.gathering.balance import Balance
 from app.solvers.gathering.bounces import Bounces, steps_to
 from app.solvers.gathering.compose import Compose, Noise, noise_of
-from app.solvers.gathering.direct import PASS, DirectLight
 from app.solvers.gathering.hits import GROUP, Hits
 from app.solvers.gathering.inspectable import Inspectable
 from app.solvers.gathering.options import GatheringOptions
-from app.solvers.gathering.origins import Origins
 from app.util.parts import is_running, run_to_end
+from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
 BATCH, FIRST = 16, 8  # rays of each texel at once, and at first

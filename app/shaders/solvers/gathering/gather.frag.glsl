@@ -1,8 +1,8 @@
 // Σ B over some rays of each texel, B = ρH of the texel that was hit: read from where the hits are kept, or traced again. Blended.
 #define TRACED 0
-#include "solvers/gathering/hit.glsl"
+#include "visibility/hit.glsl"
 #if TRACED
-#include "solvers/gathering/ray.glsl"
+#include "visibility/texel_ray.glsl"
 #else
 uniform usampler2D t_hits;
 uniform ivec3 u_bank;  // size of a page [texels], pages side by side

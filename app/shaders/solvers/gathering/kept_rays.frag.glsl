@@ -1,7 +1,7 @@
 // The kept rays of one texel, the k-th in the k-th column: where it starts, where it ends, and the light that it brings. No ray is
 // traced: what it hit is known by its texel, in whose plane it ends. One that has hit no texel ends far outside.
-#include "solvers/gathering/hit.glsl"
-#include "solvers/gathering/origin.glsl"
+#include "visibility/hit.glsl"
+#include "visibility/origin.glsl"
 
 uniform usampler2D t_hits;
 uniform sampler2D t_outgoing;

@@ -1,5 +1,5 @@
 // How many of some kept rays of each texel left the scene (r), and how many met sides without texels, which are black (g). Blended.
-#include "solvers/gathering/hit.glsl"
+#include "visibility/hit.glsl"
 
 uniform usampler2D t_hits;
 uniform ivec3 u_bank;  // size of a page [texels], pages side by side

@@ -1,5 +1,5 @@
 // What the rays of texels hit: pages side by side, the k-th ray of each texel in the k-th page.
-#include "solvers/gathering/ray.glsl"
+#include "visibility/texel_ray.glsl"
 
 uniform int u_first;    // ray of the first page
 uniform ivec3 u_bank;  // size of a page [texels], pages side by side

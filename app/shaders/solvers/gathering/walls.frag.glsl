@@ -1,7 +1,7 @@
 // Whether something stands between a point and the next one of its chart along u (r), or along v (g): light on one side of it says
 // nothing of that on the other. Seen from a tenth of their distance above both, more than a surface that turns by 20° rises between.
 #include "common/texel_at.glsl"
-#include "solvers/gathering/origin.glsl"
+#include "visibility/origin.glsl"
 #include "visibility/rays.glsl"
 
 layout(location = 0) out vec2 out_walls;

@@ -1,7 +1,7 @@
 // The k-th ray of a point, and what it hits [Kahl22]. It is the same whenever it is traced.
 #include "common/texel_at.glsl"
-#include "solvers/gathering/hit.glsl"
-#include "solvers/gathering/origin.glsl"
+#include "visibility/hit.glsl"
+#include "visibility/origin.glsl"
 #include "visibility/rays.glsl"
 
 uint trace(Origin o, int k) {

@@ -15,18 +15,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.direct_light.allocate import allocate
+from app.direct_light.lamps import LampSet, chances, lamp_sets
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import QUAD_FORMAT, quads, upload
 from app.lightmap.tile_pool import Moves
 from app.scene.model import F32, F64, Scene
-from app.solvers.gathering.allocate import allocate
-from app.solvers.gathering.lamps import LampSet, chances, lamp_sets
-from app.solvers.gathering.origins import Origins
+from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
 PASS = 4  # shadow rays: one sample of the noise
-A_ROW = 1 << int(glsl_constant("solvers/gathering/folded.glsl", "FOLD_BITS"))
+A_ROW = 1 << int(glsl_constant("direct_light/folded.glsl", "FOLD_BITS"))
 STREAM = 1  # of random numbers, of the first set
 
 
@@ -62,18 +62,18 @@ class DirectLight:
         self._shoot = {
             (closed, picture): Pass(
                 gpu,
-                "solvers/gathering/direct",
+                "direct_light/shadow_rays",
                 defines={"CLOSED_FORM": closed, "PICTURE": picture, "PASS": PASS} | defines | dict(rays.defines),
                 vertex="common/rects",
             )
             for closed, picture in ((True, False), (False, False), (False, True))
             if not picture or lightmap.pool.emission_tiles is not None
         }
-        self._unoccluded = Pass(gpu, "solvers/gathering/unoccluded", defines=defines, vertex="common/rects")
+        self._unoccluded = Pass(gpu, "direct_light/unoccluded", defines=defines, vertex="common/rects")
         self._add = {
             closed: Pass(
                 gpu,
-                "solvers/gathering/lamp_light",
+                "direct_light/lamp_light",
                 defines={"CLOSED_FORM": closed, "PASS": PASS} | lightmap.defines("TILE"),
             )
             for closed in (True, False)

@@ -7,8 +7,8 @@
 // Blended.
 #define CLOSED_FORM 1
 #define PASS  // shadow rays
-#include "solvers/gathering/lamp.glsl"
-#include "solvers/gathering/origin.glsl"
+#include "direct_light/lamp.glsl"
+#include "visibility/origin.glsl"
 #include "visibility/rays.glsl"
 #if PICTURE
 #include "common/texel_at.glsl"

@@ -1,7 +1,7 @@
 // Σ_j F_ij over the lamps of a set, as if nothing stood between: Lambert's closed form [Lambert1760; Baum89], the mean over places
 // of the texel: one from afar, 2×2, and more of them where a lamp is nearer than the texel is wide.
-#include "solvers/gathering/lamp.glsl"
-#include "solvers/gathering/origin.glsl"
+#include "direct_light/lamp.glsl"
+#include "visibility/origin.glsl"
 
 layout(location = 0) out float out_unoccluded;
 

@@ -2,7 +2,7 @@
 #define CLOSED_FORM 1
 #define PASS  // shadow rays
 #include "common/tile.glsl"
-uniform sampler2D t_shadow_rays;  // see direct.frag.glsl
+uniform sampler2D t_shadow_rays;  // see shadow_rays.frag.glsl
 #if CLOSED_FORM
 uniform sampler2D t_unoccluded;
 #endif

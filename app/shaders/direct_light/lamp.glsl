@@ -1,6 +1,6 @@
 // Triangles that emit, of one set of lamps: four texels each; where an image says what they emit, three more: the places in the
 // virtual atlas of their corners, on the front and on the back. A lamp that shines to both sides does so with its whole exitance.
-#include "solvers/gathering/folded.glsl"
+#include "direct_light/folded.glsl"
 #define PICTURE 0
 uniform sampler2D t_lamps;  // folded
 uniform int u_lamps;        // how many

@@ -1,0 +1,1 @@
+"""Direct light: what comes straight from lamps, by shadow rays."""
