@@ -37,6 +37,7 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
         _choose_camera(view, flags.camera)
         if flags.reference is not None:
             _open_reference(session, flags.reference, console)
+        view.tell_observer()
         failure = solve(session, flags, console)
         session.compare(wait=True)
         if flags.exposure is None:

@@ -19,7 +19,7 @@ from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
 from app.options import Options
-from app.scene.model import Material, Scene
+from app.scene.model import F64, Material, Scene
 from app.session.compared import Compared
 from app.session.error_estimate import SECONDS, RunningEstimate
 from app.session.loading import Loading, load
@@ -298,6 +298,12 @@ class Session:
         self._choice.at_work = name
         if self._opened:
             self._begin()
+
+    def observe(self, position: F64) -> None:
+        """The eye is at ``position`` (3,) [m]: told before each piece of work, for solvers that light what is near."""
+        if self._opened:
+            self.solver.set_observer(position)
+            self.run.progress = self.solver.poll()
 
     def set_light(self, light: LightmapOptions) -> None:
         """Other ways to hold the light: thresholds of quadtrees act on the next work, another format begins again, and quadtrees

@@ -68,6 +68,11 @@ class View:
         distance = float(np.linalg.norm(np.asarray(camera.world_from_camera)[:3, 3] - centre))
         self.camera = CameraView.from_camera(camera, distance)
 
+    def tell_observer(self) -> None:
+        """Let the session know where the eye is now."""
+        if self.session.opened:
+            self.session.observe(self.camera.eye)
+
     # -- pictures ------------------------------------------------------------------------------------------------------
 
     def draw(

@@ -125,6 +125,10 @@ class Solver(Protocol[OptionsT]):
         """Use other albedos and emissions of the scene from the next piece of work on; solve for the difference where the method
         can."""
 
+    def set_observer(self, position: F64) -> None:
+        """The eye is at ``position`` (3,) [m]: what a solver does first, or alone, where the world is too large to solve at
+        once. The others solve for all surfaces alike, wherever they are seen from."""
+
     def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
         """Do about so much work, in the family's unit, but no more than suits the method at once (one batch), in bounded parts:
         one for each ``next``, the longest passes cut into so many bands. Returns how much was issued. Whatever needs whole pieces

@@ -220,6 +220,7 @@ class ViewerWindow(WindowConfig):
         session, state, look = self._session, self._ui.state, True
         try:
             session.poll(interactive=self._ui.held)
+            self._view.tell_observer()
             solve, look = self._turns.next(frame_time) if session.solving else (False, True)
             if solve:
                 pace = state.pace

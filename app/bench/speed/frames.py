@@ -86,6 +86,7 @@ class _Viewer:
         session, held = self.session, light is not None
         cpu, clock = time.process_time(), [time.perf_counter()]
         session.poll()
+        self._view.tell_observer()
         clock.append(time.perf_counter())
         solve, look = self._turns.next(self._seconds) if session.solving else (False, True)
         if solve:

@@ -281,6 +281,9 @@ class Gathering:
         if self.issued and options.smooth != smooth:
             self._show(self._shown)
 
+    def set_observer(self, position: F64) -> None:
+        """The light is the same wherever it is seen from."""
+
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the whole new solution, along the rays that are there."""
         factor = self.lightmap.common_factor(materials)

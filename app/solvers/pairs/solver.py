@@ -19,7 +19,7 @@ import numpy as np
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
-from app.scene.model import Material
+from app.scene.model import F64, Material
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.pairs.books import Books
 from app.solvers.pairs.bounce import Bounce
@@ -180,6 +180,9 @@ class Pairs:
         self._drop_bounce()
         self._forget_bounce()
         self._progress = self._judged(self._left)
+
+    def set_observer(self, position: F64) -> None:
+        """The light is the same wherever it is seen from."""
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: bounces go on from the light that is there."""

@@ -16,7 +16,7 @@ from app.gpu import Framebuffer, Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
 from app.lightmap.tile_pool import Moves
-from app.scene.model import Material
+from app.scene.model import F64, Material
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.shooting.audit import Audit
 from app.solvers.shooting.batch import Batch
@@ -209,6 +209,9 @@ class Shooting:
         if self.issued:
             self.batch.unshot()
             self.batch.ambient.update(self.batch.bins, shown=options.ambient)
+
+    def set_observer(self, position: F64) -> None:
+        """The light is the same wherever it is seen from."""
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light that is there stays, and the difference is shot, negative too [Chen90]. Begins
