@@ -1,4 +1,4 @@
-"""The scenes that come along: the TOML files of the folder ``scenes``, by name."""
+"""The scenes that come along, and the walks through them: the TOML files of ``scenes`` and of ``scenes/paths``, by name."""
 
 from __future__ import annotations
 
@@ -26,3 +26,15 @@ def scene_path(name: str) -> Path:
     if name not in scene_names():
         raise UserError(f"scene {name}: must be one of {', '.join(scene_names())}")
     return path
+
+
+def path_names() -> list[str]:
+    """Names of all walks that come along, sorted."""
+    return sorted(path.stem for path in (scenes_folder() / "paths").glob("*.toml"))
+
+
+def path_file(source: str) -> Path:
+    """The file that ``source`` means, whether or not there is one; a name of a walk that comes along wins unless a file of that
+    name exists."""
+    own = Path(source).expanduser()
+    return scenes_folder() / "paths" / f"{source}.toml" if source in path_names() and not own.is_file() else own
