@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,7 @@ from app.render.false_colour import measured
 from app.session.view import View
 from app.viewer.ui_frame import SAMPLES, pixels, ui_image
 
-__all__ = ["check_size", "picture", "save_png"]
+__all__ = ["check_size", "picture", "replacing", "save_png"]
 
 
 def picture(view: View, size: tuple[int, int]) -> np.ndarray:
@@ -39,13 +41,21 @@ def check_size(gpu: Gpu, size: tuple[int, int]) -> None:
         raise UserError(f"--size {size[0]}x{size[1]}: at most {limit} pixels along a side on this GPU")
 
 
-def save_png(path: Path, image: np.ndarray) -> None:
-    """Beside its name first, so that a picture is whole or not there."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}")
+def save_png(path: Path, image: np.ndarray, *, level: int = 6) -> None:
+    """Write (height, width, 3) u8, top row first; level: of zlib. Raises UserError."""
     try:
-        Image.fromarray(image).save(partial, format="PNG")
-        partial.replace(path)
+        with replacing(path) as partial:
+            Image.fromarray(image).save(partial, format="PNG", compress_level=level)
     except OSError as error:
         raise UserError(f"-o {path}: cannot be written: {error.strerror or error}") from None
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A name beside ``path`` to write to, which takes its place in the end: a picture is whole or not there."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        yield partial
+        partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
