@@ -21,6 +21,7 @@ from app.commands.flags import (
     Parser,
     json_flag,
     output_flag,
+    path_flags,
     positive,
     reference_flag,
     scene_flags,
@@ -141,9 +142,12 @@ def _view_flags(view: Parser, family: Family) -> None:
 
 def _shot_flags(shot: Parser, family: Family) -> None:
     scene_flags(shot)
-    output_flag(shot, "PNG", "the picture to write")
+    output_flag(
+        shot, "FILE", "the .png to write; with --path a .webp, .gif or animated .png, or a folder for numbered ones"
+    )
     size_flag(shot, "picture")
     shot.add_argument("--camera", metavar="NAME", help="a camera of the scene (default: its first)")
+    path_flags(shot)
     reference_flag(shot)
     shot.add_argument("--ui", action="store_true", help="draw the viewer's panels too")
     json_flag(shot)

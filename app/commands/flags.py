@@ -6,16 +6,26 @@ import argparse
 import difflib
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
 from app.atlas.options import AtlasOptions
 from app.lightmap.options import LightmapOptions
-from app.options import add_flags, specs
+from app.options import Options, add_flags, option, specs
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
 
 DEFAULT_SCENE = "cornell-box"
 ALIKE = 0.75  # share of letters in common that makes a flag a likely slip for another; all begin with the same dashes
+
+
+@dataclass(frozen=True)
+class WalkOptions(Options):
+    """What is done between the pictures of a walk."""
+
+    work_per_frame: int = option(
+        1, "work between two pictures of a --path, until converged", unit="pieces", minimum=0, maximum=100_000
+    )
 
 
 class Parser(argparse.ArgumentParser):
@@ -70,6 +80,13 @@ def output_flag(parser: Parser, what: str, help: str) -> None:
 def reference_flag(parser: Parser) -> None:
     help = "a bake of the same scene, to compare with: the error, and --layer error and --show"
     parser.add_argument("--reference", type=Path, metavar="DIR", help=help)
+
+
+def path_flags(parser: Parser) -> None:
+    """A walk instead of one picture."""
+    help = "a walk of the camera instead of one picture: a .toml file or the name of one that comes along"
+    parser.add_argument("--path", metavar="FILE", help=help)
+    add_flags(parser, WalkOptions)
 
 
 def size_flag(parser: Parser, what: str) -> None:

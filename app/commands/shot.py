@@ -1,4 +1,4 @@
-"""``glowtree shot``: solve without a window and save a picture."""
+"""``glowtree shot``: solve without a window and save a picture, or with ``--path`` those of a walk."""
 
 from __future__ import annotations
 
@@ -7,16 +7,22 @@ import os
 import tempfile
 from pathlib import Path
 
+import numpy as np
+
+from app.commands.flags import WalkOptions
 from app.commands.report import report, summary
 from app.commands.steps import check_display, open_scene, session_options, solve
+from app.commands.walk import Walk, save_walk
 from app.errors import UserError
 from app.gpu import gpu_context
 from app.options import from_flags
+from app.render.camera_path import CameraPath, load_path
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
 from app.session.session import Session
 from app.session.view import View
 from app.util.console import Console
+from app.viewer.animation import check_animation
 from app.viewer.picture import check_size, picture, save_png
 from app.viewer.ui_frame import ui_image
 
@@ -24,8 +30,9 @@ __all__ = ["shot"]
 
 
 def shot(flags: argparse.Namespace, note: str | None = None) -> int:
-    """Solve and save a picture. note: what else the user should know. Raises UserError."""
-    _check_file(flags.output)
+    """Solve and save a picture, or the pictures of a walk. note: what else the user should know. Raises UserError."""
+    path = _path(flags)
+    _check_output(flags, path)
     check_display(flags)
     console = Console(quiet=flags.json)
     with gpu_context() as gpu:
@@ -34,7 +41,10 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
         check_size(gpu, flags.size)
         shows_light = flags.ui or LAYER_SHADERS[view.display.layer].light is not None
         open_scene(session, flags.scene, console, note, needs_light=shows_light)
-        _choose_camera(view, flags.camera)
+        if path is None:
+            _choose_camera(view, flags.camera)
+        else:
+            view.camera = path.cameras[0]
         if flags.reference is not None:
             _open_reference(session, flags.reference, console)
         view.tell_observer()
@@ -42,19 +52,30 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
         session.compare(wait=True)
         if flags.exposure is None:
             view.expose()
-        if flags.ui:
-            image = ui_image(view, flags.size)
+        walked = None
+        if path is None:
+            save_png(flags.output, _draw(view, flags))
         else:
-            image = picture(view, flags.size)
-        save_png(flags.output, image)
-        result = {"output": str(flags.output), **report(session)}
+            stopped = failure is not None or session.run.interrupted
+            walked = _walk(view, path.first_only if stopped else path, flags, console)
+            failure = failure or walked.failure
+        result = {"output": str(flags.output), **report(session), **(walked.report(session) if walked else {})}
         line = summary(session, result)
         view.release()
         session.release()
     if failure is not None:
         raise UserError(f"{failure}; {flags.output} shows it as it is")
-    console.result(result, f"{flags.output}: {line}")
+    console.result(result, f"{flags.output}: {f'{walked.summary}; ' if walked else ''}{line}")
     return 130 if result["interrupted"] else 0
+
+
+def _draw(view: View, flags: argparse.Namespace) -> np.ndarray:
+    return ui_image(view, flags.size) if flags.ui else picture(view, flags.size)
+
+
+def _walk(view: View, path: CameraPath, flags: argparse.Namespace, console: Console) -> Walk:
+    work = from_flags(WalkOptions, flags).work_per_frame
+    return save_walk(view, path, flags.output, lambda: _draw(view, flags), console, work=work)
 
 
 def _open_reference(session: Session, path: Path, console: Console) -> None:
@@ -74,16 +95,36 @@ def _choose_camera(view: View, name: str | None) -> None:
     view.look_through(cameras[name])
 
 
-def _check_file(path: Path) -> None:
+def _path(flags: argparse.Namespace) -> CameraPath | None:
+    """The walk that is asked for. Raises UserError, also for what goes with a walk only, or not with one."""
+    if flags.path is None:
+        if flags.work_per_frame is not None:
+            raise UserError(f"--work-per-frame {flags.work_per_frame}: needs a --path")
+        return None
+    if flags.camera is not None:
+        raise UserError(f"--camera {flags.camera}: not with --path, which has its own")
+    return load_path(flags.path)
+
+
+def _check_output(flags: argparse.Namespace, path: CameraPath | None) -> None:
     """Raise UserError now rather than after the work."""
-    if path.is_dir() or path.suffix.lower() != ".png":
-        raise UserError(f"-o {path}: must be a .png file")
+    output: Path = flags.output
+    if path is None:
+        if output.is_dir() or output.suffix.lower() != ".png":
+            raise UserError(f"-o {output}: must be a .png file")
+    else:
+        check_animation(output, len(path.cameras), path.frames_per_second, flags.size)
+    _check_writable(output)
+
+
+def _check_writable(path: Path) -> None:
+    """Raise UserError where no such file, or file in such a folder, can be made."""
     if not path.parent.is_dir():
         raise UserError(f"-o {path}: the folder {path.parent} does not exist")
     if path.exists() and not os.access(path, os.W_OK):
         raise UserError(f"-o {path}: cannot be written")
     try:
-        with tempfile.TemporaryFile(dir=path.parent):
+        with tempfile.TemporaryFile(dir=path if path.is_dir() else path.parent):
             pass
     except OSError as error:
         raise UserError(f"-o {path}: cannot be written: {error.strerror or error}") from None

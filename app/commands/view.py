@@ -30,7 +30,8 @@ def view_or_shot(flags: argparse.Namespace) -> int:
         if flags.frames is not None:
             raise UserError(f"--frames {flags.frames}: no window can be opened here ({reason}), so there are no frames")
         flags.output = Path(f"{Path(flags.scene).stem}.png")
-        flags.work = flags.time = flags.error = flags.error_rms = flags.camera = None
+        flags.work = flags.time = flags.error = flags.error_rms = None
+        flags.camera = flags.path = flags.work_per_frame = None
         flags.ui, flags.json = True, False
         return shot(flags, f"no window can be opened here ({reason}): rendering to {flags.output} instead")
     return view(flags)

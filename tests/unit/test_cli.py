@@ -34,6 +34,9 @@ FILES = {
     + "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n",
     "nothing.toml": "[scene]\n",
     "syntax.toml": "[[quad]\n",
+    "file": "",
+    "walk.toml": "seconds = 1\n[[key]]\nposition = [0, 0, 0]\ntarget = [0, 0, 1]\n",
+    "turned.toml": "seconds = 1\n[[key]]\nposition = [0, 0, 0]\ntarget = [0, 0, 0]\n",
     "typo.toml": "[[material]]\nname = 'a'\nalbedoo = 1\n",
 }
 
@@ -80,6 +83,24 @@ BAD = [
     ("shot cornell-box -o", "expected one argument"),
     ("bake cornell-box -o dark.obj", "dark.obj: cannot write here"),
     ("bake cornell-box -o dark.obj/out", "cannot write here"),
+    # walks
+    (SHOT + "--path", "expected one argument"),
+    (
+        SHOT + "--path nowhere.toml",
+        "--path nowhere.toml: cannot be read: No such file or directory; allowed are .toml files",
+    ),
+    (SHOT + "--path syntax.toml", "--path syntax.toml: not TOML"),
+    (SHOT + "--path typo.toml", "--path typo.toml: seconds: Field required"),
+    (SHOT + "--path turned.toml", "--path turned.toml: key.0: position and target must differ"),
+    (SHOT + "--path walk.toml --camera main", "--camera main: not with --path"),
+    (SHOT + "--path walk.toml --work-per-frame -1", "-1: must be 0 to 100000"),
+    (SHOT + "--path walk.toml --work-per-frame 1.5", "1.5: must be 0 to 100000"),
+    (SHOT + "--work-per-frame 3", "--work-per-frame 3: needs a --path"),
+    ("shot cornell-box --path walk.toml -o a.jpg", "must be a .webp, .gif or .png file, or a folder"),
+    ("shot cornell-box --path walk.toml -o file", "-o file: is no folder"),
+    ("shot cornell-box --path walk.toml -o nowhere/a", "the folder nowhere does not exist"),
+    ("shot cornell-box --path walk.toml -o /proc/a", "cannot be written"),
+    ("shot nowhere --path walk.toml -o a", "no such file or scene"),
     # pictures
     (SHOT + "--size 0x0", "0x0: must be WIDTHxHEIGHT, each 16 to 16384"),
     (SHOT + "--size 100", "must be WIDTHxHEIGHT"),
