@@ -75,6 +75,7 @@ class DirectLight:
                 gpu,
                 "direct_light/lamp_light",
                 defines={"CLOSED_FORM": closed, "PASS": PASS} | lightmap.defines("TILE"),
+                vertex="common/rects",
             )
             for closed in (True, False)
         }
@@ -169,6 +170,24 @@ class DirectLight:
                 self._shoot_at(lit, np.flatnonzero(more > nth), "add")
                 yield
 
+    def shoot_from(self, slots: NDArray[np.int64]) -> Generator[None, None, None]:
+        """One pass of shadow rays more from the texels of these slots to each set, in parts."""
+        for lit in self.sets:
+            fresh = slots[lit.passes[slots] == 0]
+            if len(fresh):
+                corners = self._lightmap.pool.corners(fresh)
+                self._look_unoccluded(lit, quads(corners, self._lightmap.pool.tile, corners))
+            self._shoot_at(lit, slots, "add")
+            yield
+
+    @property
+    def fewest(self) -> NDArray[np.int64]:
+        """(tiles,) shadow rays that the texels of each slot have had to the set that had fewest."""
+        counts = [PASS * lit.passes for lit in self.sets]
+        return (
+            np.asarray(np.min(counts, axis=0)) if counts else np.full(self._lightmap.pool.tiles, np.iinfo(np.int64).max)
+        )
+
     def _shoot_at(self, lit: Lit, slots: NDArray[np.int64], blend: str | None) -> None:
         """One pass of shadow rays from the texels of these slots to a set."""
         pool = self._lightmap.pool
@@ -246,20 +265,27 @@ class DirectLight:
                     self._shoot_at(lit, np.flatnonzero(self._lightmap.pool.slot_texels), "add")
                     yield
 
-    def sum(self, scene: Scene) -> None:
-        """Bring ``light`` up to date, with what the lamps emit now."""
-        self._target.clear()
-        for lit in self.sets:
-            exitance = lit.lamps.exitance_in(scene)
-            if lit.passes.any() and exitance.any():
-                closed = lit.lamps.closed_form
-                self._add[closed].draw(
-                    self._target,
-                    textures={"t_shadow_rays": lit.seen, "t_passes": lit.passes_table}
-                    | ({} if lit.unoccluded is None else {"t_unoccluded": lit.unoccluded}),
-                    uniforms={"u_exitance": tuple((exitance / self._lightmap.unit).tolist())},
-                    blend="add",
-                )
+    def sum(self, scene: Scene, slots: NDArray[np.int64] | None = None) -> None:
+        """Bring ``light`` up to date, with what the lamps emit now; in these slots alone where they are given."""
+        lit_now = [lit for lit in self.sets if lit.passes.any() and lit.lamps.exitance_in(scene).any()]
+        rects = self._everywhere
+        if slots is None or not lit_now:
+            self._target.clear()
+        else:
+            corners = self._lightmap.pool.corners(slots)
+            rects = quads(corners, self._lightmap.pool.tile, corners)
+        mesh = Mesh(self._gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)
+        for nth, lit in enumerate(lit_now):
+            exitance = lit.lamps.exitance_in(scene) / self._lightmap.unit
+            self._add[lit.lamps.closed_form].draw(
+                self._target,
+                textures={"t_shadow_rays": lit.seen, "t_passes": lit.passes_table}
+                | ({} if lit.unoccluded is None else {"t_unoccluded": lit.unoccluded}),
+                uniforms={"u_exitance": tuple(exitance.tolist()), "u_size": self._lightmap.size},
+                mesh=mesh,
+                blend="add" if nth else None,
+            )
+        self._gpu.release_all(mesh)
 
     def forget(self) -> None:
         """No set is known."""

@@ -43,6 +43,7 @@ LAYER_SHADERS = {
     "indirect": Layer("indirect", "t_irradiance", offered="direct"),
     "rays": Layer("count", measures="rays", offered="rays"),
     "expected-error": Layer("deviation", "t_irradiance", measures="expected error", offered="variance"),
+    "local": Layer("local_set", smooth=False, offered="local"),
 }
 assert tuple(LAYER_SHADERS) == LAYERS
 

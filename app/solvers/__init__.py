@@ -14,6 +14,9 @@ from app.solvers.gathering.inspectable import SEEN
 from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.solver import BATCH as RAYS
 from app.solvers.gathering.solver import Gathering
+from app.solvers.local.options import LocalOptions
+from app.solvers.local.solver import BATCH as UPDATES
+from app.solvers.local.solver import Local
 from app.solvers.pairs.options import PairsOptions
 from app.solvers.pairs.solver import Pairs
 from app.solvers.shooting.options import ShootingOptions
@@ -82,6 +85,19 @@ SOLVERS: dict[str, Family] = {
         pictures={HEMISPHERE: SEEN},
         distributes=False,
         per_error=0.25,
+        rays=True,
+    ),
+    "local": Family(
+        title="Local matrix",
+        help="what is around the observer is lit by a matrix of all reflections: for large worlds (Shcherbakov & Frolov 2019)",
+        options=LocalOptions,
+        make=Local,
+        unit="updates",
+        remains="missing",
+        batch=UPDATES,
+        threshold="missing",
+        layers=("direct", "local"),
+        distributes=False,
         rays=True,
     ),
     "pairs": Family(

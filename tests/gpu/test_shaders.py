@@ -33,6 +33,7 @@ OPTION = {spec.name: spec for spec in specs(ShootingOptions)}
 FLAG = (False, True)
 # What a host may set a define to: every choice, of a plain number its end. A define that no host sets is a constant.
 DEFINES: Mapping[str, tuple[object, ...]] = {
+    "VECTOR_ROWS": (16,),
     "RESOLUTION": (int(OPTION["resolution"].minimum),),
     "LEVEL": tuple(range(MAX_LEVEL + 1)),
     "HIGHEST": (MAX_LEVEL,),

@@ -1,0 +1,1 @@
+"""Large worlds: a matrix of all reflections among the patches around the observer [Shcherbakov19]."""

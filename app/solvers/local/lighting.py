@@ -1,0 +1,208 @@
+"""Lighting: from the direct light on texels, by one product with the matrix, to the indirect light of nodes, and back to texels.
+
+    H_i = x_i + Σ_j G_ij (e_j + ρ_j x_j),    e = mean of ρ H_direct over a node,    x_i = F_i,outside B_outside
+
+``iterate`` sums H = x + F (e + ρ H) a few times instead, from the light of the frame before. What a node shows when it enters is
+what was shown there before, and the difference fades, so that a border that moves is not seen.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.gpu import Framebuffer, Gpu, Mesh, Pass, ReadBack, Texture
+from app.gpu.shader import glsl_constant
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.textures import QUAD_FORMAT, quads, upload
+from app.scene.model import F64
+from app.solvers.local.matrix import ROW, LocalMatrix
+from app.solvers.local.patches import Patches
+from app.visibility.origins import Origins
+
+SWEEPS = 4  # bounces of ``iterate`` whenever it lights
+FADE = 0.8  # of the difference to what was shown before, that stays in each frame
+FADED = 32  # frames, after which less than a thousandth stays
+A_ROW = 1 << int(glsl_constant("direct_light/folded.glsl", "FOLD_BITS"))
+NODE_VECTORS = 3
+
+
+class Lighting:
+    """Of one local set of ``most`` slots. Whoever makes it releases it.
+
+    fading: frames until nothing fades any more. from_outside: share of the indirect light in the set that came from outside, as
+    of the last lighting but one.
+    """
+
+    def __init__(
+        self, gpu: Gpu, lightmap: Lightmap, origins: Origins, patches: Patches, places: Texture, most: int, edge: int
+    ) -> None:
+        """places: of each texel in the order; edge: of a patch [texels]."""
+        self._gpu, self._lightmap, self._origins, self.most, self._edge = gpu, lightmap, origins, most, edge
+        self._patches, self._places = patches, places
+        self._order = folded_u32(gpu, patches.order.astype(np.uint32))
+        self._slots = folded_u32(gpu, np.zeros(len(patches.order), np.uint32))
+        rows_of: dict[str, object] = {"VECTOR_ROWS": most // ROW}
+        reads = lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE") | rows_of
+        self._reflect = Pass(gpu, "solvers/local/reflect", defines=reads)
+        self._send = Pass(gpu, "solvers/local/send", defines=rows_of)
+        self._receive = Pass(gpu, "solvers/local/receive", defines=rows_of)
+        self._mean = Pass(gpu, "solvers/local/outside", defines=rows_of)
+        self._fade = Pass(gpu, "solvers/local/fade", defines=rows_of)
+        self._compose = Pass(
+            gpu,
+            "solvers/local/compose",
+            defines=lightmap.defines("TILE", "MATERIAL_BITS") | rows_of,
+            vertex="common/rects",
+        )
+        self._mark = Pass(gpu, "solvers/local/mark", defines=rows_of)
+        rows = most // ROW
+        self._nodes = gpu.texture((ROW, NODE_VECTORS * rows), 4, "f4")
+        self._reflected, self._sent, self.indirect = (gpu.texture((ROW, rows), 4, "f4") for _ in range(3))
+        self._shown, self._faded = ([gpu.texture((ROW, rows), 4, "f4") for _ in range(2)] for _ in range(2))
+        self._from = gpu.texture((ROW, rows), 1, "f4")
+        self._outside = gpu.texture((1, 1), 4, "f4")
+        self._targets: dict[Texture, Framebuffer] = {
+            t: gpu.target(t) for t in (self._reflected, self._sent, self.indirect, self._outside)
+        }
+        self._fade_targets = [gpu.target(*both) for both in zip(self._shown, self._faded, strict=True)]
+        self._marks: tuple[Texture, Framebuffer] | None = None
+        self._target: Framebuffer | None = None
+        self._of: Texture | None = None
+        self._reading: ReadBack | None = None
+        self.from_outside = 0.0
+        self.clear()
+
+    def clear(self) -> None:
+        """No light."""
+        for target in (*self._targets.values(), *self._fade_targets):
+            target.clear()
+        self.fading = 0
+
+    # -- what the set is -----------------------------------------------------------------------------------------------
+
+    def set_nodes(self, node: NDArray[np.int64], area: F64, albedo: F64, outside: F64, age: F64) -> None:
+        """What is in each slot: node (most,) or -1, area, albedo (most, 3), share of outside, age in frames."""
+        patches, there = self._patches, node >= 0
+        table = np.zeros((NODE_VECTORS, self.most, 4), np.float32)
+        table[0, :, :3], table[0, :, 3] = albedo, np.where(there, area, 0.0)
+        table[1, :, 0], table[1, :, 1] = patches.start[node], patches.end[node]
+        table[1, :, 2] = np.where(there, outside, 0.0)
+        table[1, :, 3] = self._edge * np.exp2(patches.level[node].astype(np.float64))
+        table[2, :, 0], table[2, :, 1] = patches.level[node], age
+        self._nodes.write(table.tobytes())
+
+    def set_slots(self, slot_at: NDArray[np.int32]) -> None:
+        """In which slot each texel in order is, -1 in none."""
+        rows = self._slots.height
+        table = np.zeros(rows * A_ROW, np.uint32)
+        table[: len(slot_at)] = slot_at + 1
+        self._slots.write(table.tobytes())
+
+    # -- light ---------------------------------------------------------------------------------------------------------
+
+    def light(self, matrix: LocalMatrix, direct: Texture, *, sweeps: int = SWEEPS) -> None:
+        """Bring ``indirect`` up to date with the direct light on texels."""
+        nodes = {"t_nodes": self._nodes}
+        known = self._lightmap.textures("t_position_area", "t_normal_ids", "t_materials", "t_albedo")
+        self._reflect.draw(
+            self._targets[self._reflected],
+            textures=nodes | known | {"t_order": self._order, "t_direct": direct},
+        )
+        read = nodes | {"t_reflected": self._reflected, "t_outside": self._outside, "t_indirect": self.indirect}
+        for _ in range(1 if matrix.coloured else sweeps):
+            self._send.draw(self._targets[self._sent], textures=read, uniforms={"u_anew": matrix.coloured})
+            product = matrix.multiply(self._sent)
+            self._receive.draw(
+                self._targets[self.indirect],
+                textures=nodes | {"t_product": product, "t_outside": self._outside},
+            )
+        self._mean.draw(
+            self._targets[self._outside],
+            textures=nodes | {"t_reflected": self._reflected, "t_indirect": self.indirect},
+            uniforms={"u_most": self.most},
+        )
+        if self._reading is not None:
+            self.from_outside = float(np.frombuffer(self._reading.take(), np.float32)[3])
+        self._reading = ReadBack(self._gpu, self._targets[self._outside])
+
+    def swapped(self, came_from: NDArray[np.int64]) -> None:
+        """Nodes have come and gone since light was last shown, and it is up to date: let it fade from what was shown. came_from
+        (most,): the slot in which what is shown there was before, -1 in none."""
+        self._from.write(came_from.astype(np.float32).tobytes())
+        self._show(1.0, swapped=True)
+        self.fading = FADED
+
+    def show(self) -> None:
+        """Let the light that is shown follow, a frame later."""
+        self.fading = max(self.fading - 1, 0)
+        self._show(FADE if self.fading else 0.0, swapped=False)
+
+    def _show(self, stays: float, *, swapped: bool) -> None:
+        (shown, faded), textures = (self._shown[0], self._faded[0]), {"t_indirect": self.indirect}
+        self._shown.reverse()
+        self._faded.reverse()
+        self._fade_targets.reverse()
+        self._fade.draw(
+            self._fade_targets[0],
+            textures=textures | {"t_shown": shown, "t_faded": faded, "t_from": self._from, "t_outside": self._outside},
+            uniforms={"u_stays": stays, "u_swapped": swapped},
+        )
+
+    def compose(self, direct: Texture, tiles: NDArray[np.int64]) -> None:
+        """Write H of the lightmap in the slots of these tiles, direct light and what is shown of indirect light."""
+        lightmap = self._lightmap
+        if (irradiance := lightmap.texture("t_irradiance")) is not self._of:
+            self._forget_target()
+            self._target, self._of = self._gpu.target(irradiance), irradiance
+        assert self._target is not None
+        pool = lightmap.pool
+        rects = quads(pool.corners(tiles), pool.tile, pool.corners(tiles))
+        mesh = Mesh(self._gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)
+        self._compose.draw(
+            self._target,
+            mesh=mesh,
+            textures=lightmap.textures("t_pages", "t_leaves")
+            | {
+                "t_origin_normal": self._origins.normals,
+                "t_direct": direct,
+                "t_places": self._places,
+                "t_slots": self._slots,
+                "t_nodes": self._nodes,
+                "t_shown": self._shown[0],
+                "t_outside": self._outside,
+            },
+            uniforms={"u_pages": (float(lightmap.columns), pool.pages_per_texel), "u_size": lightmap.size},
+        )
+        self._gpu.release_all(mesh)
+
+    def marks(self) -> Texture:
+        """What the local set is, on every texel, see mark.frag.glsl."""
+        if self._marks is None:
+            texture = self._gpu.texture(self._lightmap.size, 4, "f4")
+            self._marks = texture, self._gpu.target(texture)
+        texture, target = self._marks
+        self._mark.draw(target, textures={"t_places": self._places, "t_slots": self._slots, "t_nodes": self._nodes})
+        return texture
+
+    def _forget_target(self) -> None:
+        if self._target is not None:
+            self._gpu.release_all(self._target)
+        self._target = self._of = None
+
+    def release(self) -> None:
+        self._forget_target()
+        if self._reading is not None:
+            self._reading.take()
+        if self._marks is not None:
+            self._gpu.release_all(*self._marks)
+        self._gpu.release_all(*self._targets.values(), *self._targets, *self._fade_targets, *self._shown, *self._faded)
+        self._gpu.release_all(self._nodes, self._from, self._order, self._slots)
+
+
+def folded_u32(gpu: Gpu, values: NDArray[np.uint32]) -> Texture:
+    """A list (n,) in rows of a texture, see folded.glsl."""
+    rows = max(-(-len(values) // A_ROW), 1)
+    table = np.zeros((rows * A_ROW, 1), np.uint32)
+    table[: len(values), 0] = values
+    return upload(gpu, table.reshape(rows, A_ROW, 1))

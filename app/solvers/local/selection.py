@@ -1,0 +1,120 @@
+"""Which patches are in the local set: those nearest to the observer, and farther away, in a cascade, ever larger clusters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from app.scene.model import F64
+from app.solvers.local.patches import Patches
+
+I64 = NDArray[np.int64]
+STEPS = 8  # sizes of the cascade between one and twice as large
+FARTHEST, NEAREST = (
+    14,
+    -3,
+)  # octaves: from so many edges of a patch on, at most and at least, clusters take the place of patches
+GROWTH = 1.25  # times as far as clusters of one level, those of the next: with 2, few patches would be left near by
+CORNER = 0.87  # edges of a cluster's cube, from its middle to its corner
+
+
+class Selection:
+    """Of one scene's patches, for sets of at most ``most`` of them."""
+
+    def __init__(self, patches: Patches, most: int) -> None:
+        self._patches, self._most = patches, most
+        self._tree = cKDTree(patches.centre[: patches.count])
+        self._step = 0
+
+    def nearest(self, observer: F64) -> I64:
+        """The nearest patches, nearest first. observer (3,) [solver space]."""
+        count = min(self._most, self._patches.count)
+        return np.atleast_1d(self._tree.query(observer, k=count)[1]).astype(np.int64)
+
+    def cascade(self, observer: F64) -> I64:
+        """Patches near by, and beyond, up to the end of the world, clusters that are the larger the farther away, nearest first:
+        patches reach as far as the set has room for. The same wherever the observer came from."""
+        top, bottom = FARTHEST * STEPS, NEAREST * STEPS
+        while self._step < top and self._fits(observer, self._step + 1):
+            self._step += 1
+        while self._step > bottom and not self._fits(observer, self._step):
+            self._step -= 1
+        return self._cut(observer, self._step)[: self._most]
+
+    def _fits(self, observer: F64, step: int) -> bool:
+        return len(self._cut(observer, step)) <= self._most
+
+    def _cut(self, observer: F64, step: int) -> I64:
+        """Nodes, nearest first, of which no cluster of level n is nearer than 2^(step/STEPS) GROWTH^n edges of a patch."""
+        patches, found = self._patches, []
+        nodes, reach, count = patches.roots, patches.edge * 2.0 ** (step / STEPS), 0
+        while len(nodes):
+            edge = patches.edge * 2.0 ** patches.level[nodes]
+            away = np.linalg.norm(patches.centre[nodes] - observer, axis=1) - CORNER * edge
+            split = (patches.level[nodes] > 0) & (away < reach * GROWTH ** patches.level[nodes])
+            found.append(nodes[~split])
+            count += len(found[-1])
+            if count > self._most:
+                break
+            first, last = patches.children[nodes[split]].T
+            nodes = ranges(first, last)
+        whole = np.concatenate([*found, nodes]) if len(nodes) else np.concatenate(found)
+        return whole[np.argsort(distances(patches, whole, observer), kind="stable")]
+
+
+def ranges(first: I64, last: I64) -> I64:
+    """All numbers of the ranges from ``first`` (n,) to before ``last`` (n,)."""
+    size = last - first
+    return np.repeat(first - np.concatenate([[0], np.cumsum(size)[:-1]]), size) + np.arange(int(size.sum()))
+
+
+def distances(patches: Patches, nodes: I64, observer: F64) -> F64:
+    """(n,) from the observer to the middle of nodes [solver space]."""
+    return np.asarray(np.linalg.norm(patches.centre[nodes] - observer, axis=1))
+
+
+@dataclass(frozen=True)
+class Swap:
+    """Nodes that take the place of others, all at once: they cover the same surface, or one is nearer than the other."""
+
+    leave: tuple[int, ...]
+    enter: tuple[int, ...]
+
+
+def swaps(patches: Patches, inside: I64, wanted: I64, free: int, observer: F64) -> Iterator[Swap]:
+    """How nodes ``inside`` become those ``wanted``, with no more than ``free`` more of them at any time: what enters, nearest
+    first, each with all that it overlaps; where there is no room, first what leaves, farthest first."""
+    enter, leave = np.setdiff1d(wanted, inside), np.setdiff1d(inside, wanted)
+    nodes = np.concatenate([enter, leave])
+    if not len(nodes):
+        return
+    entering = np.arange(len(nodes)) < len(enter)
+    by_start = np.argsort(patches.start[nodes], kind="stable")
+    reach = np.maximum.accumulate(patches.end[nodes[by_start]])
+    begins = np.concatenate([[True], patches.start[nodes[by_start]][1:] >= reach[:-1]])
+    group = np.empty(len(nodes), np.int64)
+    group[by_start] = np.cumsum(begins) - 1
+    away = np.full(int(group.max()) + 1, np.inf)
+    np.minimum.at(away, group, distances(patches, nodes, observer))
+    net = np.bincount(group, np.where(entering, 1, -1)).astype(np.int64)
+    members = np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1])
+
+    def swap(g: int) -> Swap:
+        mine = members[g]
+        return Swap(tuple(nodes[mine[~entering[mine]]].tolist()), tuple(nodes[mine[entering[mine]]].tolist()))
+
+    growing = [g for g in np.argsort(away, kind="stable").tolist() if net[g] > 0]
+    shrinking = [g for g in np.argsort(-away, kind="stable").tolist() if net[g] <= 0]
+    while growing or shrinking:
+        if growing and net[growing[0]] <= free:
+            g = growing.pop(0)
+        elif shrinking:
+            g = shrinking.pop(0)
+        else:
+            return
+        free -= int(net[g])
+        yield swap(g)

@@ -1,0 +1,507 @@
+"""The local matrix lights what is around the observer, in a world too large to solve at once [Shcherbakov19].
+
+    H = direct + G ρ direct
+
+Direct light is found on all texels by shadow rays, nearest first; what it becomes by reflection is one product with the matrix of
+all reflections among the nodes of the local set (matrix.py, lighting.py). As the observer walks, nodes enter and leave
+(selection.py), a few in each piece of work, whose form factors come from rays that are traced once (rows.py, form_factors.py).
+Another lamp costs a product; another albedo lets nodes enter anew, one after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.direct_light.shadow_rays import DirectLight
+from app.errors import UserError
+from app.gpu import Gpu, Texture
+from app.lightmap.lightmap import Lightmap
+from app.scene.model import F64, Material
+from app.solvers.base import EnergyBalance, Inspection, Progress
+from app.solvers.local.form_factors import LocalSet
+from app.solvers.local.inspectable import facts_of, figures_of
+from app.solvers.local.lighting import Lighting
+from app.solvers.local.matrix import ROW, LocalMatrix
+from app.solvers.local.options import LocalOptions
+from app.solvers.local.patches import patch_count, patches_of
+from app.solvers.local.rows import Rows
+from app.solvers.local.selection import Selection, Swap, swaps
+from app.util.parts import is_running, run_to_end
+from app.visibility.origins import Origins
+from app.visibility.rays import RayScene
+
+I64 = NDArray[np.int64]
+SOFTWARE, HARDWARE = 1024, 4096  # patches of the set by default, where a CPU rasterises and where not
+A_PATCH = 64  # patches of the world for each of the set, from which on patches are larger
+HIGHEST = 4  # level of a patch: texels of one tile
+FILLING = 64  # nodes that enter at once before there is half of a set
+ROWS = 256  # made at once before that, and
+ROWS_WHILE_WALKING = 48  # while it goes on
+TILES_AT_ONCE = 64  # that shadow rays are sent from, between two pictures
+NEAR_TILES, TILES_IN_TURN = 128, 64  # whose light is shown anew in each picture, while the set changes
+DRIFT = 2e-3  # of a diagonal, beyond which its node enters anew
+BATCH = 64
+
+
+class Local:
+    """Lights one lightmap around the observer. Whoever makes it releases it.
+
+    issued: nodes that have entered the set so far. Raises UserError for a set that does not fit memory or the driver, and for
+    quadtrees.
+    """
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: LocalOptions) -> None:
+        if lightmap.refinement is not None:
+            raise UserError("the local matrix needs uniform texels: its patches are squares of them")
+        self.gpu, self.lightmap = gpu, lightmap
+        self.rays, self.origins = RayScene(gpu, lightmap.pool), Origins(gpu, lightmap)
+        self.direct = DirectLight(gpu, lightmap, self.rays, self.origins)
+        self._observer = lightmap.space.local_from_world(_first_eye(lightmap))
+        self._parts: list[Any] = []
+        self._under_way: Generator[None, None, int] | None = None
+        self._tile_centres = _tile_centres(lightmap)
+        self._stale: list[int] | None = None  # None: not looked for
+        self.issued = 0
+        try:
+            self._build(options)
+        except UserError:
+            self.release()
+            raise
+        self.reset()
+
+    def _build(self, options: LocalOptions) -> None:
+        """Patches, rows and matrix of these options."""
+        gpu, lightmap = self.gpu, self.lightmap
+        most = options.patches or default_patches(gpu, options)
+        level = options.patch_level
+        if level is None:
+            level = next((n for n in range(HIGHEST) if patch_count(lightmap.pool, n) <= A_PATCH * most), HIGHEST)
+        patches = patches_of(lightmap.pool, level)
+        most = -(-min(most, patches.count) // ROW) * ROW
+        components = 1 if options.bounces == "iterate" else 4
+        mebibytes = most**2 * components * options.bits / 8 / 2**20
+        if mebibytes > options.matrix_memory:
+            raise UserError(
+                f"--matrix-memory {options.matrix_memory}: the matrix of {most} patches takes {mebibytes:.0f} MiB"
+            )
+        matrix = LocalMatrix(gpu, most, options.bounces, options.bits)
+        self._release_parts()
+        self._parts.append(matrix)
+        rows = Rows(gpu, lightmap, self.rays, self.origins, patches, options.rays, options.row_memory, most)
+        self._parts.append(rows)
+        lighting = Lighting(gpu, lightmap, self.origins, patches, rows.places, most, 2**level)
+        self._parts.append(lighting)
+        self.options, self.patches, self.matrix, self.rows, self.lighting = options, patches, matrix, rows, lighting
+        self.level = level
+        self._selection = Selection(patches, most)
+        self.set = LocalSet(patches, rows, most)
+
+    # -- work ----------------------------------------------------------------------------------------------------------
+
+    def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
+        """What a frame has time for: nodes that enter and leave, at most as many as the options say, or shadow rays; and the
+        light of both. Returns how many nodes have entered."""
+        self._finish()
+        self._under_way = self._piece()
+        return self._under_way
+
+    def _piece(self) -> Generator[None, None, int]:
+        if self._edited:
+            yield from self._follow_edit()
+            return 0
+        entered, tiles = 0, self._next_tiles()
+        if self._is_dark_here:
+            yield from self._shoot(tiles)
+        else:
+            yield from self._make_rows()
+            if plan := self._plan():
+                entered = yield from self._swap(plan)
+            elif len(tiles):
+                yield from self._shoot(tiles)
+        self._relight()
+        self.lighting.show()
+        self._compose(all_=not entered and self.lighting.fading == 0)
+        return entered
+
+    def _shoot(self, tiles: I64) -> Generator[None, None, None]:
+        """One pass of shadow rays more from these tiles."""
+        yield from self.direct.shoot_from(tiles)
+        self.direct.sum(self.lightmap.scene, tiles)
+        self._lit = False
+
+    @property
+    def _is_dark_here(self) -> bool:
+        """Whether no shadow rays have been sent yet from some of what is nearest."""
+        if not self.direct.sets:
+            return False
+        away = np.where(self.lightmap.pool.slot_texels > 0, self._away(), np.inf)
+        nearest = np.argpartition(away, min(NEAR_TILES, len(away) - 1))[:NEAR_TILES]
+        return bool((self.direct.fewest[nearest[np.isfinite(away[nearest])]] == 0).any())
+
+    def _away(self) -> F64:
+        """(tiles,) from the observer to the middle of each tile."""
+        return np.asarray(np.linalg.norm(self._tile_centres - self._observer, axis=1))
+
+    def _compose(self, *, all_: bool) -> None:
+        """Write the light that is shown; if not all of it, that which is near, and some of the rest in turn."""
+        tiles = np.flatnonzero(self.lightmap.pool.used)
+        if not all_ and len(tiles) > NEAR_TILES + TILES_IN_TURN:
+            order = np.argpartition(self._away()[tiles], NEAR_TILES)
+            rest = np.sort(tiles[order[NEAR_TILES:]])
+            first = self._turn % len(rest)
+            tiles = np.concatenate([tiles[order[:NEAR_TILES]], np.roll(rest, -first)[:TILES_IN_TURN]])
+            self._turn += TILES_IN_TURN
+        self.lighting.compose(self.direct.light, tiles)
+
+    def _follow_edit(self) -> Generator[None, None, None]:
+        """The light of other lamps, in one piece of work."""
+        self._edited = False
+        self.direct.follow(self.lightmap.scene)
+        yield from self.direct.catch_up(self.options.shadow_rays)
+        self.direct.sum(self.lightmap.scene)
+        self._lit = False
+        self._relight()
+        self.lighting.show()
+        self._compose(all_=True)
+
+    def _relight(self) -> None:
+        """The indirect light of the set as it is, where it is not known yet."""
+        if not self._lit:
+            self._tell_nodes()
+            self.lighting.light(self.matrix, self.direct.light)
+            self._lit = True
+
+    def _tell_nodes(self) -> None:
+        held = self.set
+        albedo = np.where(held.node[:, None] >= 0, self._albedo[held.node], 0.0)
+        self.lighting.set_nodes(held.node, held.area, albedo, held.outside, self._frame - self._entered)
+
+    def _make_rows(self) -> Iterator[None]:
+        """Rows that nodes need which are to enter, nearest first."""
+        wanted = self._wanted
+        missing = wanted[~self.rows.has(wanted)]
+        at_once = ROWS if self._filling else ROWS_WHILE_WALKING
+        if len(missing):
+            yield from self.rows.make(missing[:at_once], np.concatenate([self.set.nodes, wanted]))
+
+    @property
+    def _filling(self) -> bool:
+        return 2 * (self.set.most - self.set.free) < len(self._wanted)
+
+    def _plan(self) -> list[Swap]:
+        """The next nodes that enter and leave, or enter anew."""
+        ready = self._wanted[self.rows.has(self._wanted)]
+        if len(ready) < len(self._wanted):
+            if self._filling:
+                return []
+            ready = np.union1d(ready, self.set.nodes)  # nothing leaves for what cannot enter yet
+        plan = list(swaps(self.patches, self.set.nodes, ready, self.set.free, self._observer))
+        if not plan and len(ready) == len(self._wanted):
+            plan = [Swap((node,), (node,)) for node in self._stale_nodes()]
+        return plan
+
+    def _stale_nodes(self) -> list[int]:
+        """Nodes that must enter anew: whose albedo is another, or whose diagonal has drifted; looked for once nothing moves."""
+        if self._stale is None:
+            held = self.set
+            drifted = np.abs(held.drift()) > DRIFT
+            weight = self._albedo[held.node] * held.area[:, None]
+            other = self.matrix.coloured and (np.abs(weight - self._weight) > 1e-6 * held.area[:, None]).any(1)
+            self._stale = [int(node) for node in held.node[(drifted | other) & (held.node >= 0)]]
+        return self._stale
+
+    def _swap(self, plan: list[Swap]) -> Generator[None, None, int]:
+        """Carry out as much of the plan as a piece of work may."""
+        at_once, diagonals = self.options.swaps, dict[int, float]()
+        if self._filling:
+            at_once = FILLING
+            diagonals = dict(zip(self._wanted.tolist(), self.set.diagonals(self._wanted).tolist(), strict=True))
+        self._relight()  # what was shown before, in the light that there is now
+        before = self.set.slot_at.copy()
+        entered: list[int] = []
+        for swap in plan:
+            if entered and len(entered) + len(swap.enter) > at_once:
+                break
+            yield
+            for node in swap.leave:
+                slot = self.set.leave(node)
+                self.matrix.leave(slot, self._weight[slot])
+            for node in swap.enter:
+                entered.append(self._enter(node, diagonals.get(node)))
+            if self._stale is not None and swap.leave == swap.enter:
+                self._stale.remove(swap.enter[0])
+            else:
+                self._stale = None
+        came_from = np.arange(self.set.most)
+        for slot in entered:
+            node = self.set.node[slot]
+            came_from[slot] = before[(self.patches.start[node] + self.patches.end[node]) // 2]
+        self.issued += len(entered)
+        self._frame += 1
+        self._entered[entered] = self._frame
+        self.lighting.set_slots(self.set.slot_at)
+        self._lit = False
+        self._relight()
+        self.lighting.swapped(came_from)
+        return len(entered)
+
+    def _enter(self, node: int, diagonal: float | None = None) -> int:
+        """The slot that a node has entered. diagonal: see ``LocalSet.enter``."""
+        held, slot = self.set, self.set.first_free()
+        kernel = held.enter(node, slot, diagonal)
+        weight = self._albedo[held.node] * np.where(held.node >= 0, held.area, 0.0)[:, None]
+        self._weight[slot] = weight[slot]
+        self._count += 1
+        known = (held.node >= 0) & (self._since < self._last.get(node, -1))
+        self.matrix.enter(slot, kernel, self._weight[slot], self._weight * (held.node >= 0)[:, None], known)
+        self._last[node] = self._since[slot] = self._count
+        return slot
+
+    def _next_tiles(self) -> I64:
+        """From which shadow rays are sent next: of those with fewest, the nearest."""
+        counts = np.where(self.lightmap.pool.slot_texels > 0, self.direct.fewest, np.iinfo(np.int64).max)
+        left = np.flatnonzero(counts < self.options.shadow_rays)
+        if not len(left):
+            return left
+        left = left[counts[left] == counts[left].min()]
+        return np.sort(left[np.argsort(self._away()[left], kind="stable")[:TILES_AT_ONCE]])
+
+    def _finish(self) -> None:
+        """End the work that is under way, if any; of its own parts this asks nothing."""
+        if self._under_way is not None and not is_running(self._under_way):
+            run_to_end(self._under_way)
+            self._under_way = None
+
+    # -- how far it is -------------------------------------------------------------------------------------------------
+
+    def poll(self, *, wait: bool = False) -> Progress:
+        """How much of the set and of the shadow rays is still to come."""
+        if wait:
+            self._finish()
+        emits = self.lightmap.scene.emits
+        inside = self.set.slot[self._wanted] >= 0
+        here = float(np.mean(~inside)) if len(inside) else 0.0
+        shadow = 0.0
+        if self.direct.sets:
+            some = self.lightmap.pool.slot_texels > 0
+            asked = self.options.shadow_rays
+            shadow = 1 - float(np.minimum(self.direct.fewest[some], asked).mean()) / asked
+        missing = max(here, shadow, float(bool(self._stale)) / max(len(inside), 1)) if emits else 0.0
+        known = self._stale is not None and not self._stale and self.lighting.fading == 0
+        done = not emits or (missing <= self.options.missing and known and not self._edited)
+        return Progress(self.issued, missing if self.issued or not emits else 1.0, self._escaped, converged=done)
+
+    def settle(self) -> Progress:
+        """End the work under way, and wait for the GPU."""
+        self.poll(wait=True)
+        self.gpu.ctx.finish()
+        return self.poll()
+
+    def energy(self) -> EnergyBalance:
+        """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
+        self._finish()
+        lightmap = self.lightmap
+        area = lightmap.pool.surfaces.area[..., None]
+        albedo, H = lightmap.albedo().astype(np.float64), lightmap.irradiance().astype(np.float64)
+        raw = np.frombuffer(self.direct.light.read(), np.float32).reshape(*lightmap.size[::-1], 4)
+        D = lightmap.pool.tiles_from_image(raw)[..., :3].astype(np.float64) * lightmap.unit
+        emitted, arrived = lightmap.emitted, (D * area).sum((0, 1, 2))
+        # light of lamps that no texel got, and of what nodes reflect, the share that their own rays lost
+        lost = 1.0 - self.set.received[self.set.node >= 0]
+        nodes = self.set.nodes
+        B = self.patches.mean(self._texels(albedo * H))[nodes] if len(nodes) else np.zeros((0, 3))
+        square = lightmap.space.scale**2
+        escaped = emitted - arrived + (lost * self.patches.area[nodes]) @ B * square
+        whole = float(area.sum())
+        begun = self.issued > 0 or not lightmap.scene.emits
+        self._escaped = escaped if begun else np.zeros(3)
+        return EnergyBalance(
+            emitted=emitted,
+            absorbed=((1 - albedo) * H * area).sum((0, 1, 2)),
+            escaped=self._escaped,
+            unshot=np.zeros(3) if begun else emitted,
+            reflectance=(albedo * area).sum((0, 1, 2)) / max(whole, 1e-300),
+            area=whole,
+        )
+
+    def _texels(self, tiles: F64) -> F64:
+        """(texels, 3) in order, of tiles (tiles, t, t, 3)."""
+        order, pool = self.patches.order, self.lightmap.pool
+        y, x = order >> 16, order & 0xFFFF
+        return np.asarray(tiles[y // pool.tile * pool.columns + x // pool.tile, y % pool.tile, x % pool.tile])
+
+    # -- beginning, and other options ----------------------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Forget all light, and let the set be filled anew. Rows stay: they follow from the scene alone."""
+        if self._under_way is not None:
+            self._under_way.close()
+            self._under_way = None
+        most = self.set.most
+        self.lightmap.clear()
+        self.set.clear()
+        self.matrix.clear()
+        self.lighting.clear()
+        self.lighting.set_slots(self.set.slot_at)
+        self.direct.forget()
+        self.direct.follow(self.lightmap.scene)
+        self._set_albedo()
+        self._weight = np.zeros((most, 3))  # ρA with which the node in each slot has entered
+        self._since, self._last = (
+            np.full(most, -1),
+            dict[int, int](),
+        )  # the count at which each slot, each node entered last
+        self._entered, self._frame, self._count, self._turn = np.zeros(most), 0, 0, 0
+        self._lit, self._edited, self._stale = False, False, None
+        self._escaped = np.zeros(3)
+        self.issued = 0
+        self._look()
+
+    def set_options(self, options: LocalOptions) -> None:
+        """Use other knobs: those that the matrix or its rows follow from begin again. Raises UserError, and keeps what it has."""
+        self._finish()
+        built = ("bounces", "patches", "patch_level", "rays", "bits", "matrix_memory")
+        if any(getattr(options, name) != getattr(self.options, name) for name in built):
+            self._build(options)
+            self.reset()
+        else:
+            self.rows.set_memory(options.row_memory, self.set.most)
+            self.options = options
+            self._look()
+
+    def set_materials(self, materials: tuple[Material, ...]) -> None:
+        """Other albedos and emissions: the light of other lamps with the next piece of work; of other albedos, while nodes enter
+        the set anew."""
+        self._finish()
+        self.lightmap.set_materials(materials)
+        if not self.issued:
+            self.reset()
+            return
+        self._set_albedo()
+        self._stale, self._edited = None, True
+
+    def _set_albedo(self) -> None:
+        lightmap = self.lightmap
+        materials = lightmap.scene.materials
+        self._albedo = self.patches.albedo(materials, lightmap.scene.material_ids, lightmap.charts.face_triangle)
+
+    def set_observer(self, position: F64) -> None:
+        """The eye is at ``position`` (3,) [m]: from the next piece of work on, what is near it is lit. Raises UserError for no
+        place at all."""
+        if not np.isfinite(position).all():
+            raise UserError(f"the observer is at {', '.join(f'{x:g}' for x in position)}: no place in the world")
+        observer = self.lightmap.space.local_from_world(np.asarray(position, np.float64))
+        if not np.array_equal(observer, self._observer):
+            self._observer = observer
+            self._look()
+
+    def _look(self) -> None:
+        """Which nodes are wanted in the set from here."""
+        choose = self._selection.cascade if self.options.outside == "cascade" else self._selection.nearest
+        before, self._wanted = getattr(self, "_wanted", None), choose(self._observer)
+        if before is None or not np.array_equal(before, self._wanted):
+            self._stale = None
+
+    # -- what there is to see ------------------------------------------------------------------------------------------
+
+    @property
+    def resolved(self) -> Mapping[str, Any]:
+        return {"patches": self.set.most, "patch_level": self.level}
+
+    @property
+    def layers(self) -> Mapping[str, Texture]:
+        return {"direct": self.direct.light, "local": self.lighting.marks()}
+
+    @property
+    def wanted(self) -> I64:
+        """The nodes that the set is to have, nearest first."""
+        return self._wanted
+
+    def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
+        """What the set, its rows and its matrix are; of a texel, the node that it is in."""
+        held, lightmap = self.set, self.lightmap
+        figures = figures_of(
+            held, self.patches, self.rows, self.matrix, self.lighting, self._observer, lightmap.space.scale
+        )
+        counts = {"Rays traced": self.rows.traced + self.direct.traced}
+        if texel is None or any(at >= size for at, size in zip(texel, lightmap.size, strict=True)):
+            return Inspection(figures=figures, counts=counts)
+        place = np.flatnonzero(self.patches.order == (texel[1] << 16 | texel[0]))
+        slot = int(held.slot_at[place[0]]) if len(place) else -1
+        age = float(self._frame - self._entered[slot])
+        facts = facts_of(int(held.node[slot]), slot, self.patches, age, float(held.outside[slot]))
+        return Inspection(figures=figures, counts=counts, texel_facts=facts)
+
+    def passes(self, amount: int) -> dict[str, Callable[[], None]]:
+        """Each part of a piece of work by itself, to be timed."""
+        tiles = np.arange(min(TILES_AT_ONCE, self.lightmap.pool.tiles))
+        node = int(self._wanted[0])
+        run_to_end(self.rows.make(self._wanted[:1][~self.rows.has(self._wanted[:1])], self._wanted))
+
+        def swap() -> None:
+            if self.set.slot[node] >= 0:
+                slot = self.set.leave(node)
+                self.matrix.leave(slot, self._weight[slot])
+            self._enter(node)
+            self.matrix.flush()
+
+        def rows() -> None:
+            run_to_end(self.rows.make(self._wanted[:0], self._wanted))
+
+        return {
+            "rows": rows,
+            "swap": swap,
+            "shadow rays": lambda: run_to_end(self.direct.shoot_from(tiles)),
+            "sum": lambda: self.direct.sum(self.lightmap.scene),
+            "light": self._light_anew,
+            "compose": lambda: self._compose(all_=True),
+        }
+
+    def _light_anew(self) -> None:
+        self._lit = False
+        self._relight()
+        self.lighting.show()
+
+    def warm_up(self) -> Iterator[None]:
+        """Every pass."""
+        for run in self.passes(1).values():
+            run()
+            self.gpu.ctx.finish()
+            yield
+
+    def _release_parts(self) -> None:
+        for part in self._parts:
+            part.release()
+        self._parts.clear()
+
+    def release(self) -> None:
+        if self._under_way is not None:
+            self._under_way.close()
+        self._release_parts()
+        for part in (self.direct, self.origins, self.rays):
+            part.release()
+
+
+def default_patches(gpu: Gpu, options: LocalOptions) -> int:
+    """As many as the driver and the memory for the matrix allow, up to what this kind of renderer keeps up with."""
+    most = min(SOFTWARE if gpu.software else HARDWARE, gpu.limits.max_texture)
+    components = 1 if options.bounces == "iterate" else 4
+    return min(most, int(np.sqrt(options.matrix_memory * 2**20 * 8 / (components * options.bits))))
+
+
+def _first_eye(lightmap: Lightmap) -> F64:
+    """Where the scene's first camera is (3,) [m]: the observer, until somebody says where."""
+    return np.asarray(np.asarray(lightmap.scene.cameras[0].world_from_camera, np.float64)[:3, 3])
+
+
+def _tile_centres(lightmap: Lightmap) -> F64:
+    """(tiles, 3) [solver space]; far away of empty slots."""
+    pool = lightmap.pool
+    there = pool.surfaces.face >= 0
+    at = np.where(there[..., None], pool.space.local_from_world(pool.surfaces.position), 0.0)
+    count = there.sum((1, 2))[:, None]
+    return np.asarray(np.where(count > 0, at.sum((1, 2)) / np.maximum(count, 1), np.inf))
