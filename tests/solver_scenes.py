@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from app.atlas.charts import DEFAULT_TILE
 from app.atlas.parametrize import parametrize
+from app.errors import UserError
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
@@ -22,6 +23,8 @@ from app.scene.model import F32, F64, Material, Scene
 from app.solvers import DEFAULT_SOLVER, SOLVERS, EnergyBalance, GatheringOptions, ShootingOptions
 from app.solvers.gathering.solver import BATCH as GATHERED
 from app.solvers.gathering.solver import Gathering
+from app.solvers.local.options import LocalOptions
+from app.solvers.local.solver import Local
 from app.solvers.shooting.audit import Audit
 from app.solvers.shooting.choose import ROOT_LEVEL
 from app.solvers.shooting.coarse_to_fine import LEVEL
@@ -96,7 +99,7 @@ EVERY_WAY = pytest.mark.parametrize(
         for adaptive, projection in itertools.product((False, True), PROJECTIONS)
     ],
 )
-FAST = tuple(name for name, family in SOLVERS.items() if not family.quadratic)
+FAST = tuple(name for name, family in SOLVERS.items() if not family.quadratic and family.everywhere)
 EVERY_SOLVER = pytest.mark.parametrize("solver", FAST)
 EVERY_LIGHTMAP = pytest.mark.parametrize("adaptive", [False, True], ids=["uniform", "adaptive"])
 
@@ -242,6 +245,10 @@ def begin(
     charts = parametrize(scene, texels=texels, density=density, tile=tile)
     held = {spec.name: options.pop(spec.name) for spec in specs(LightmapOptions) if spec.name in options}
     gathers = {spec.name: options.pop(spec.name) for spec in specs(GatheringOptions) if spec.name in options}
+    if solver == "local":
+        return Solution(
+            *_local(gpu, TilePool(scene, charts) if not adaptive else quadtree_pool(scene, charts), options)
+        )  # type: ignore[arg-type]
     shooting = ShootingOptions().replace(**options)
     pool = quadtree_pool(scene, charts) if adaptive else TilePool(scene, charts)
     if adaptive:
@@ -253,6 +260,16 @@ def begin(
         gathering = GatheringOptions(noise=NOISE).replace(**gathers)
         return Solution(lightmap, Gathering(gpu, lightmap, gathering))  # type: ignore[arg-type]
     return Solution(lightmap, Shooting(gpu, lightmap, shooting, audits=audits))
+
+
+def _local(gpu: Gpu, pool: TilePool, options: Mapping[str, object]) -> tuple[Lightmap, Local]:
+    """Raises UserError, and releases the lightmap."""
+    lightmap = Lightmap(gpu, pool)
+    try:
+        return lightmap, Local(gpu, lightmap, LocalOptions().replace(**options))
+    except UserError:
+        lightmap.release()
+        raise
 
 
 def solve(gpu: Gpu, scene: Scene, **options: object) -> Solution:

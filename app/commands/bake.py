@@ -18,6 +18,7 @@ from app.errors import UserError
 from app.gpu import gpu_context
 from app.lightmap.collapse import collapse
 from app.session.session import Session
+from app.solvers import SOLVERS
 from app.util.console import Console
 
 __all__ = ["bake"]
@@ -25,6 +26,10 @@ __all__ = ["bake"]
 
 def bake(flags: argparse.Namespace) -> int:
     """Solve and write scene.glb, irradiance.exr and report.json. Raises UserError."""
+    if not SOLVERS[flags.solver].everywhere:
+        raise UserError(
+            f"--solver {flags.solver}: it lights what is around an observer, and a bake is seen from everywhere"
+        )
     console = Console(quiet=flags.json)
     with _folder(flags.output), gpu_context() as gpu:
         session = Session(gpu, **session_options(flags))

@@ -37,6 +37,8 @@ class Family:
     distributes: whether what remains is light that is still to be distributed, in the energy balance; else it is an error.
     per_error: how little may remain where an expected error is asked for, as a share of that.
     rays: whether it looks along rays, and so needs a tree of the scene's triangles (visibility/rays.py) before it is made.
+    everywhere: whether it lights all surfaces alike, wherever they are seen from; else what is far is known roughly.
+    quadratic: whether its work grows with the square of the texels.
     """
 
     title: str
@@ -55,6 +57,7 @@ class Family:
     quadratic: bool = False
     per_error: float | None = None
     rays: bool = False
+    everywhere: bool = True
 
 
 SOLVERS: dict[str, Family] = {
@@ -99,6 +102,7 @@ SOLVERS: dict[str, Family] = {
         layers=("direct", "local"),
         distributes=False,
         rays=True,
+        everywhere=False,
     ),
     "pairs": Family(
         title="Texel pairs",

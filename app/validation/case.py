@@ -75,8 +75,8 @@ def projections_of(solver: str) -> tuple[str | None, ...]:
 
 
 def methods_of(solver: str) -> tuple[Method, ...]:
-    """Every lightmap by every projection; no quadtrees where texels are compared two by two."""
-    lightmaps = (False,) if SOLVERS[solver].quadratic else (False, True)
+    """Every lightmap by every projection; no quadtrees where texels are compared two by two, or patches are squares of them."""
+    lightmaps = (False,) if SOLVERS[solver].quadratic or not SOLVERS[solver].everywhere else (False, True)
     return tuple(Method(solver, adaptive, by) for adaptive in lightmaps for by in projections_of(solver))
 
 
@@ -204,8 +204,9 @@ class HardCase:
     methods: tuple[Method, ...] = METHODS
 
     def methods_by(self, solver: str | None) -> list[Method]:
-        """Those of one solver, or of all but those that take the square of the texels' time."""
-        return [m for m in self.methods if (not m.family.quadratic if solver is None else m.solver == solver)]
+        """Those of one solver, or of all but those that take the square of the texels' time, or light what is near alone."""
+        usual = {name for name, family in SOLVERS.items() if not family.quadratic and family.everywhere}
+        return [m for m in self.methods if (m.solver in usual if solver is None else m.solver == solver)]
 
     def run(self, gpu: Gpu, method: Method, size: str, controls: Controls) -> tuple[Solution, list[Check]]:
         """Solve it by this method; its light, and the checks of every case before its own. controls: solved so far, by cases that

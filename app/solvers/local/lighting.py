@@ -2,8 +2,8 @@
 
     H_i = x_i + Σ_j G_ij (e_j + ρ_j x_j),    e = mean of ρ H_direct over a node,    x_i = F_i,outside B_outside
 
-``iterate`` sums H = x + F (e + ρ H) a few times instead, from the light of the frame before. What a node shows when it enters is
-what was shown there before, and the difference fades, so that a border that moves is not seen.
+``iterate`` sums H = x + F (e + ρ H) a few times instead, from the light of the frame before. When nodes come and go, what is
+shown becomes what it is now by and by, so that a border that moves is not seen; when lamps change, at once.
 """
 
 from __future__ import annotations
@@ -21,8 +21,6 @@ from app.solvers.local.patches import Patches
 from app.visibility.origins import Origins
 
 SWEEPS = 4  # bounces of ``iterate`` whenever it lights
-FADE = 0.8  # of the difference to what was shown before, that stays in each frame
-FADED = 32  # frames, after which less than a thousandth stays
 A_ROW = 1 << int(glsl_constant("direct_light/folded.glsl", "FOLD_BITS"))
 NODE_VECTORS = 3
 
@@ -30,7 +28,8 @@ NODE_VECTORS = 3
 class Lighting:
     """Of one local set of ``most`` slots. Whoever makes it releases it.
 
-    fading: frames until nothing fades any more. from_outside: share of the indirect light in the set that came from outside, as
+    reflected, indirect: e and H_i of each slot [stored units]. outside: B_outside, and in its alpha its share of indirect light.
+    from_outside: share of the indirect light in the set that came from outside, as
     of the last lighting but one.
     """
 
@@ -48,7 +47,6 @@ class Lighting:
         self._send = Pass(gpu, "solvers/local/send", defines=rows_of)
         self._receive = Pass(gpu, "solvers/local/receive", defines=rows_of)
         self._mean = Pass(gpu, "solvers/local/outside", defines=rows_of)
-        self._fade = Pass(gpu, "solvers/local/fade", defines=rows_of)
         self._compose = Pass(
             gpu,
             "solvers/local/compose",
@@ -58,14 +56,11 @@ class Lighting:
         self._mark = Pass(gpu, "solvers/local/mark", defines=rows_of)
         rows = most // ROW
         self._nodes = gpu.texture((ROW, NODE_VECTORS * rows), 4, "f4")
-        self._reflected, self._sent, self.indirect = (gpu.texture((ROW, rows), 4, "f4") for _ in range(3))
-        self._shown, self._faded = ([gpu.texture((ROW, rows), 4, "f4") for _ in range(2)] for _ in range(2))
-        self._from = gpu.texture((ROW, rows), 1, "f4")
-        self._outside = gpu.texture((1, 1), 4, "f4")
+        self.reflected, self._sent, self.indirect = (gpu.texture((ROW, rows), 4, "f4") for _ in range(3))
+        self.outside = gpu.texture((1, 1), 4, "f4")
         self._targets: dict[Texture, Framebuffer] = {
-            t: gpu.target(t) for t in (self._reflected, self._sent, self.indirect, self._outside)
+            t: gpu.target(t) for t in (self.reflected, self._sent, self.indirect, self.outside)
         }
-        self._fade_targets = [gpu.target(*both) for both in zip(self._shown, self._faded, strict=True)]
         self._marks: tuple[Texture, Framebuffer] | None = None
         self._target: Framebuffer | None = None
         self._of: Texture | None = None
@@ -75,9 +70,8 @@ class Lighting:
 
     def clear(self) -> None:
         """No light."""
-        for target in (*self._targets.values(), *self._fade_targets):
+        for target in self._targets.values():
             target.clear()
-        self.fading = 0
 
     # -- what the set is -----------------------------------------------------------------------------------------------
 
@@ -106,55 +100,33 @@ class Lighting:
         nodes = {"t_nodes": self._nodes}
         known = self._lightmap.textures("t_position_area", "t_normal_ids", "t_materials", "t_albedo")
         self._reflect.draw(
-            self._targets[self._reflected],
+            self._targets[self.reflected],
             textures=nodes | known | {"t_order": self._order, "t_direct": direct},
         )
-        read = nodes | {"t_reflected": self._reflected, "t_outside": self._outside, "t_indirect": self.indirect}
+        read = nodes | {"t_reflected": self.reflected, "t_outside": self.outside, "t_indirect": self.indirect}
         for _ in range(1 if matrix.coloured else sweeps):
             self._send.draw(self._targets[self._sent], textures=read, uniforms={"u_anew": matrix.coloured})
             product = matrix.multiply(self._sent)
             self._receive.draw(
                 self._targets[self.indirect],
-                textures=nodes | {"t_product": product, "t_outside": self._outside},
+                textures=nodes | {"t_product": product, "t_outside": self.outside},
             )
         self._mean.draw(
-            self._targets[self._outside],
-            textures=nodes | {"t_reflected": self._reflected, "t_indirect": self.indirect},
+            self._targets[self.outside],
+            textures=nodes | {"t_reflected": self.reflected, "t_indirect": self.indirect},
             uniforms={"u_most": self.most},
         )
         if self._reading is not None:
             self.from_outside = float(np.frombuffer(self._reading.take(), np.float32)[3])
-        self._reading = ReadBack(self._gpu, self._targets[self._outside])
+        self._reading = ReadBack(self._gpu, self._targets[self.outside])
 
-    def swapped(self, came_from: NDArray[np.int64]) -> None:
-        """Nodes have come and gone since light was last shown, and it is up to date: let it fade from what was shown. came_from
-        (most,): the slot in which what is shown there was before, -1 in none."""
-        self._from.write(came_from.astype(np.float32).tobytes())
-        self._show(1.0, swapped=True)
-        self.fading = FADED
-
-    def show(self) -> None:
-        """Let the light that is shown follow, a frame later."""
-        self.fading = max(self.fading - 1, 0)
-        self._show(FADE if self.fading else 0.0, swapped=False)
-
-    def _show(self, stays: float, *, swapped: bool) -> None:
-        (shown, faded), textures = (self._shown[0], self._faded[0]), {"t_indirect": self.indirect}
-        self._shown.reverse()
-        self._faded.reverse()
-        self._fade_targets.reverse()
-        self._fade.draw(
-            self._fade_targets[0],
-            textures=textures | {"t_shown": shown, "t_faded": faded, "t_from": self._from, "t_outside": self._outside},
-            uniforms={"u_stays": stays, "u_swapped": swapped},
-        )
-
-    def compose(self, direct: Texture, tiles: NDArray[np.int64]) -> None:
-        """Write H of the lightmap in the slots of these tiles, direct light and what is shown of indirect light."""
+    def compose(self, direct: Texture, tiles: NDArray[np.int64], *, stays: float = 0.0) -> None:
+        """Write H of the lightmap in the slots of these tiles, direct and indirect light; a share of what was there stays."""
         lightmap = self._lightmap
         if (irradiance := lightmap.texture("t_irradiance")) is not self._of:
             self._forget_target()
             self._target, self._of = self._gpu.target(irradiance), irradiance
+            self._target.color_mask = (True, True, True, False)  # of alpha, which says what stays
         assert self._target is not None
         pool = lightmap.pool
         rects = quads(pool.corners(tiles), pool.tile, pool.corners(tiles))
@@ -169,10 +141,15 @@ class Lighting:
                 "t_places": self._places,
                 "t_slots": self._slots,
                 "t_nodes": self._nodes,
-                "t_shown": self._shown[0],
-                "t_outside": self._outside,
+                "t_indirect": self.indirect,
+                "t_outside": self.outside,
             },
-            uniforms={"u_pages": (float(lightmap.columns), pool.pages_per_texel), "u_size": lightmap.size},
+            uniforms={
+                "u_pages": (float(lightmap.columns), pool.pages_per_texel),
+                "u_size": lightmap.size,
+                "u_stays": stays,
+            },
+            blend="keep",
         )
         self._gpu.release_all(mesh)
 
@@ -196,8 +173,8 @@ class Lighting:
             self._reading.take()
         if self._marks is not None:
             self._gpu.release_all(*self._marks)
-        self._gpu.release_all(*self._targets.values(), *self._targets, *self._fade_targets, *self._shown, *self._faded)
-        self._gpu.release_all(self._nodes, self._from, self._order, self._slots)
+        self._gpu.release_all(*self._targets.values(), *self._targets)
+        self._gpu.release_all(self._nodes, self._order, self._slots)
 
 
 def folded_u32(gpu: Gpu, values: NDArray[np.uint32]) -> Texture:

@@ -11,7 +11,7 @@ w = ρ_n A_n and all vectors and products among the nodes that are there, by
 
 the bordered inverse, and equations 1 to 5 of the paper. It leaves by K -= w/(1 + w K_nn) k kᵀ with k its column, which undoes
 the first exactly; the paper only clears row and column, and paths through the node stay in the others. They would be counted
-twice when it comes again: pairs that were both there when it last entered are left out then. ``iterate`` keeps F / A alone, and
+twice when it comes again: pairs that were both there when it left are left out then. ``iterate`` keeps F / A alone, and
 light is reflected in it a few times whenever it is asked for.
 
 Updates wait as vectors, a few of them, until one pass over the matrix adds them all: reading and writing it is what costs.
@@ -81,7 +81,7 @@ class LocalMatrix:
 
     def enter(self, slot: int, kernel: F64, weight: F64, others: F64, seen: NDArray[np.bool_]) -> None:
         """A node enters a free slot. kernel (most,): f, with each slot, F_ij / A_j; weight (3,): w = ρA of it; others (most, 3):
-        Aρ of each slot; seen (most,): whether the node has entered before, and this slot was there then."""
+        Aρ of each slot; seen (most,): whether what is in a slot was there when the node left last."""
         first = np.ones(3)
         listed = np.flatnonzero((kernel != 0) & (np.arange(self.most) != slot))
         if self.bounces == "series":

@@ -24,7 +24,7 @@ from app.scene.model import F64, Material
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.local.form_factors import LocalSet
 from app.solvers.local.inspectable import facts_of, figures_of
-from app.solvers.local.lighting import Lighting
+from app.solvers.local.lighting import SWEEPS, Lighting
 from app.solvers.local.matrix import ROW, LocalMatrix
 from app.solvers.local.options import LocalOptions
 from app.solvers.local.patches import patch_count, patches_of
@@ -43,15 +43,18 @@ ROWS = 256  # made at once before that, and
 ROWS_WHILE_WALKING = 48  # while it goes on
 TILES_AT_ONCE = 64  # that shadow rays are sent from, between two pictures
 NEAR_TILES, TILES_IN_TURN = 128, 64  # whose light is shown anew in each picture, while the set changes
-DRIFT = 2e-3  # of a diagonal, beyond which its node enters anew
+LEFT, MOST_REFLECTED = 1e-4, 0.99  # of light, that bounces may leave; mean albedo that their number allows for
+OUTSIDE_BOUNCES = 8  # between the set and what is outside of it
+FADE, FADED = 0.75, 16  # share of what was shown that stays in each picture after nodes came and went, and for how many
+DRIFT = 1e-3  # of a diagonal, beyond which its node enters anew
 BATCH = 64
 
 
 class Local:
     """Lights one lightmap around the observer. Whoever makes it releases it.
 
-    issued: nodes that have entered the set so far. Raises UserError for a set that does not fit memory or the driver, and for
-    quadtrees.
+    issued: nodes that have entered the set so far. albedo (nodes, 3): of each patch and cluster. Raises UserError for a set that
+    does not fit memory or the driver, and for quadtrees.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: LocalOptions) -> None:
@@ -65,6 +68,7 @@ class Local:
         self._under_way: Generator[None, None, int] | None = None
         self._tile_centres = _tile_centres(lightmap)
         self._stale: list[int] | None = None  # None: not looked for
+        self._fading = 0
         self.issued = 0
         try:
             self._build(options)
@@ -123,8 +127,8 @@ class Local:
             elif len(tiles):
                 yield from self._shoot(tiles)
         self._relight()
-        self.lighting.show()
-        self._compose(all_=not entered and self.lighting.fading == 0)
+        self._fading = FADED if entered else max(self._fading - 1, 0)
+        self._compose(all_=self._fading == 0, stays=FADE if self._fading else 0.0)
         return entered
 
     def _shoot(self, tiles: I64) -> Generator[None, None, None]:
@@ -146,8 +150,9 @@ class Local:
         """(tiles,) from the observer to the middle of each tile."""
         return np.asarray(np.linalg.norm(self._tile_centres - self._observer, axis=1))
 
-    def _compose(self, *, all_: bool) -> None:
-        """Write the light that is shown; if not all of it, that which is near, and some of the rest in turn."""
+    def _compose(self, *, all_: bool, stays: float = 0.0) -> None:
+        """Write the light that is shown; if not all of it, that which is near, and some of the rest in turn. stays: share of what
+        was shown before."""
         tiles = np.flatnonzero(self.lightmap.pool.used)
         if not all_ and len(tiles) > NEAR_TILES + TILES_IN_TURN:
             order = np.argpartition(self._away()[tiles], NEAR_TILES)
@@ -155,7 +160,7 @@ class Local:
             first = self._turn % len(rest)
             tiles = np.concatenate([tiles[order[:NEAR_TILES]], np.roll(rest, -first)[:TILES_IN_TURN]])
             self._turn += TILES_IN_TURN
-        self.lighting.compose(self.direct.light, tiles)
+        self.lighting.compose(self.direct.light, tiles, stays=stays)
 
     def _follow_edit(self) -> Generator[None, None, None]:
         """The light of other lamps, in one piece of work."""
@@ -165,19 +170,32 @@ class Local:
         self.direct.sum(self.lightmap.scene)
         self._lit = False
         self._relight()
-        self.lighting.show()
         self._compose(all_=True)
 
     def _relight(self) -> None:
-        """The indirect light of the set as it is, where it is not known yet."""
+        """The indirect light of the set as it is, where it is not known yet: bounces that are done one after the other, and light
+        from outside that follows from that inside, go on in the next pieces of work."""
         if not self._lit:
             self._tell_nodes()
-            self.lighting.light(self.matrix, self.direct.light)
-            self._lit = True
+            self._bounces_left = self._bounces
+        elif not self._bounces_left:
+            return
+        self.lighting.light(self.matrix, self.direct.light)
+        self._lit, self._bounces_left = True, max(self._bounces_left - 1, 0)
+
+    @property
+    def _bounces(self) -> int:
+        """How often light is found until no more than LEFT of it is missing."""
+        if self.matrix.coloured:
+            return OUTSIDE_BOUNCES if np.abs(self.set.outside).max() > DRIFT else 0
+        held = self.set
+        mean = (held.area[:, None] * np.where(held.node[:, None] >= 0, self.albedo[held.node], 0.0)).sum(0)
+        reflected = min(float((mean / max(held.area.sum(), 1e-300)).max()), MOST_REFLECTED)
+        return int(np.ceil(np.log(LEFT) / np.log(reflected) / SWEEPS)) if reflected > 0 else 0
 
     def _tell_nodes(self) -> None:
         held = self.set
-        albedo = np.where(held.node[:, None] >= 0, self._albedo[held.node], 0.0)
+        albedo = np.where(held.node[:, None] >= 0, self.albedo[held.node], 0.0)
         self.lighting.set_nodes(held.node, held.area, albedo, held.outside, self._frame - self._entered)
 
     def _make_rows(self) -> Iterator[None]:
@@ -209,7 +227,7 @@ class Local:
         if self._stale is None:
             held = self.set
             drifted = np.abs(held.drift()) > DRIFT
-            weight = self._albedo[held.node] * held.area[:, None]
+            weight = self.albedo[held.node] * held.area[:, None]
             other = self.matrix.coloured and (np.abs(weight - self._weight) > 1e-6 * held.area[:, None]).any(1)
             self._stale = [int(node) for node in held.node[(drifted | other) & (held.node >= 0)]]
         return self._stale
@@ -220,45 +238,41 @@ class Local:
         if self._filling:
             at_once = FILLING
             diagonals = dict(zip(self._wanted.tolist(), self.set.diagonals(self._wanted).tolist(), strict=True))
-        self._relight()  # what was shown before, in the light that there is now
-        before = self.set.slot_at.copy()
         entered: list[int] = []
         for swap in plan:
             if entered and len(entered) + len(swap.enter) > at_once:
                 break
             yield
             for node in swap.leave:
-                slot = self.set.leave(node)
-                self.matrix.leave(slot, self._weight[slot])
+                self._leave(node)
             for node in swap.enter:
                 entered.append(self._enter(node, diagonals.get(node)))
             if self._stale is not None and swap.leave == swap.enter:
                 self._stale.remove(swap.enter[0])
             else:
                 self._stale = None
-        came_from = np.arange(self.set.most)
-        for slot in entered:
-            node = self.set.node[slot]
-            came_from[slot] = before[(self.patches.start[node] + self.patches.end[node]) // 2]
         self.issued += len(entered)
         self._frame += 1
         self._entered[entered] = self._frame
         self.lighting.set_slots(self.set.slot_at)
         self._lit = False
-        self._relight()
-        self.lighting.swapped(came_from)
         return len(entered)
+
+    def _leave(self, node: int) -> None:
+        slot = self.set.leave(node)
+        self.matrix.leave(slot, self._weight[slot])
+        self._left[node] = self._count
 
     def _enter(self, node: int, diagonal: float | None = None) -> int:
         """The slot that a node has entered. diagonal: see ``LocalSet.enter``."""
         held, slot = self.set, self.set.first_free()
         kernel = held.enter(node, slot, diagonal)
-        weight = self._albedo[held.node] * np.where(held.node >= 0, held.area, 0.0)[:, None]
+        weight = self.albedo[held.node] * np.where(held.node >= 0, held.area, 0.0)[:, None]
         self._weight[slot] = weight[slot]
         self._count += 1
-        known = (held.node >= 0) & (self._since < self._last.get(node, -1))
+        known = (held.node >= 0) & (self._since <= self._left.get(node, -1))
         self.matrix.enter(slot, kernel, self._weight[slot], self._weight * (held.node >= 0)[:, None], known)
-        self._last[node] = self._since[slot] = self._count
+        self._since[slot] = self._count
         return slot
 
     def _next_tiles(self) -> I64:
@@ -291,7 +305,7 @@ class Local:
             asked = self.options.shadow_rays
             shadow = 1 - float(np.minimum(self.direct.fewest[some], asked).mean()) / asked
         missing = max(here, shadow, float(bool(self._stale)) / max(len(inside), 1)) if emits else 0.0
-        known = self._stale is not None and not self._stale and self.lighting.fading == 0
+        known = self._stale is not None and not self._stale and self._fading == self._bounces_left == 0
         done = not emits or (missing <= self.options.missing and known and not self._edited)
         return Progress(self.issued, missing if self.issued or not emits else 1.0, self._escaped, converged=done)
 
@@ -351,12 +365,11 @@ class Local:
         self.direct.follow(self.lightmap.scene)
         self._set_albedo()
         self._weight = np.zeros((most, 3))  # ρA with which the node in each slot has entered
-        self._since, self._last = (
-            np.full(most, -1),
-            dict[int, int](),
-        )  # the count at which each slot, each node entered last
+        self._since = np.full(most, -1)  # the count at which what is in each slot entered
+        self._left = dict[int, int]()  # and each node left
         self._entered, self._frame, self._count, self._turn = np.zeros(most), 0, 0, 0
         self._lit, self._edited, self._stale = False, False, None
+        self._bounces_left = self._fading = 0
         self._escaped = np.zeros(3)
         self.issued = 0
         self._look()
@@ -387,7 +400,7 @@ class Local:
     def _set_albedo(self) -> None:
         lightmap = self.lightmap
         materials = lightmap.scene.materials
-        self._albedo = self.patches.albedo(materials, lightmap.scene.material_ids, lightmap.charts.face_triangle)
+        self.albedo = self.patches.albedo(materials, lightmap.scene.material_ids, lightmap.charts.face_triangle)
 
     def set_observer(self, position: F64) -> None:
         """The eye is at ``position`` (3,) [m]: from the next piece of work on, what is near it is lit. Raises UserError for no
@@ -444,8 +457,7 @@ class Local:
 
         def swap() -> None:
             if self.set.slot[node] >= 0:
-                slot = self.set.leave(node)
-                self.matrix.leave(slot, self._weight[slot])
+                self._leave(node)
             self._enter(node)
             self.matrix.flush()
 
@@ -464,7 +476,6 @@ class Local:
     def _light_anew(self) -> None:
         self._lit = False
         self._relight()
-        self.lighting.show()
 
     def warm_up(self) -> Iterator[None]:
         """Every pass."""
@@ -494,8 +505,11 @@ def default_patches(gpu: Gpu, options: LocalOptions) -> int:
 
 
 def _first_eye(lightmap: Lightmap) -> F64:
-    """Where the scene's first camera is (3,) [m]: the observer, until somebody says where."""
-    return np.asarray(np.asarray(lightmap.scene.cameras[0].world_from_camera, np.float64)[:3, 3])
+    """Where the scene's first camera is (3,) [m]: the observer, until somebody says where. The middle of a scene without any."""
+    cameras = lightmap.scene.cameras
+    if not cameras:
+        return lightmap.space.centre
+    return np.asarray(np.asarray(cameras[0].world_from_camera, np.float64)[:3, 3])
 
 
 def _tile_centres(lightmap: Lightmap) -> F64:

@@ -1,4 +1,4 @@
-// The light that is shown, H = direct + indirect. The indirect light of patches of many texels, and of clusters, is smoothed over one
+// The light that is shown, H = direct + indirect, and how much of what was shown stays. Blended. The indirect light of patches of many texels, and of clusters, is smoothed over one
 // of them, which interpolates it: within a chart.
 #include "common/atlas.glsl"
 #include "common/texel_at.glsl"
@@ -9,10 +9,11 @@ uniform usampler2D t_origin_normal;  // and the chart
 uniform sampler2D t_direct;
 uniform usampler2D t_places;  // of each texel in order
 uniform usampler2D t_slots;   // of each texel in order, from 1, folded
-uniform sampler2D t_shown;
+uniform sampler2D t_indirect;
 uniform sampler2D t_outside;
+uniform float u_stays;
 
-layout(location = 0) out vec4 out_irradiance;  // a: direct light, the mean of RGB
+layout(location = 0) out vec4 out_irradiance;
 
 const uint NO_PLACE = 0xFFFFFFFFu;
 const int MOST_STEPS = 4;
@@ -22,12 +23,12 @@ int slot_of(ivec2 px) {
     return place == NO_PLACE ? -1 : int(texelFetch(t_slots, folded(int(place)), 0).x) - 1;
 }
 
-vec3 shown(int slot) { return slot < 0 ? texelFetch(t_outside, ivec2(0), 0).rgb : texelFetch(t_shown, at_slot(slot), 0).rgb; }
+vec3 light_of(int slot) { return slot < 0 ? texelFetch(t_outside, ivec2(0), 0).rgb : texelFetch(t_indirect, at_slot(slot), 0).rgb; }
 
 vec3 indirect_at(ivec2 px) {
     int own = slot_of(px);
     float edge = own < 0 ? 1.0 : texelFetch(t_nodes, at_slot(own, 1), 0).w;
-    if (edge <= 1.0) return shown(own);
+    if (edge <= 1.0) return light_of(own);
     vec3 leaf = texelFetch(t_leaves, px / TILE, 0).xyz;
     vec2 middle = (leaf.xy * float(TILE) + vec2(px % TILE) + 0.5) * leaf.z;
     uint chart = texelFetch(t_origin_normal, px, 0).y;
@@ -39,16 +40,16 @@ vec3 indirect_at(ivec2 px) {
         vec2 way = ((vec2(n % steps, n / steps) + 0.5) / float(steps) - 0.5) * edge;
         ivec2 at = texel_px_at(middle + way);
         if (at.y < 0 || texelFetch(t_origin_normal, at, 0).y != chart) continue;
-        sum += shown(slot_of(at));
+        sum += light_of(slot_of(at));
         count += 1.0;
     }
-    return count > 0.0 ? sum / count : shown(own);
+    return count > 0.0 ? sum / count : light_of(own);
 }
 
 void main() {
     ivec2 px = ivec2(gl_FragCoord.xy);
     out_irradiance = vec4(0.0);
     if (texelFetch(t_places, px, 0).x == NO_PLACE) return;
-    vec3 direct = texelFetch(t_direct, px, 0).rgb;
-    out_irradiance = vec4(direct + indirect_at(px), dot(direct, vec3(1.0 / 3.0)));
+    vec3 H = texelFetch(t_direct, px, 0).rgb + max(indirect_at(px), 0.0);
+    out_irradiance = vec4((1.0 - u_stays) * H, u_stays);
 }

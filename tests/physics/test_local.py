@@ -1,0 +1,240 @@
+"""The local matrix: a whole scene is solved exactly, a part of it makes no light, and how it came about plays no part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+from solver_scenes import Solution, begin, table_room
+
+from app.errors import UserError
+from app.gpu import Gpu, Texture
+from app.reference.dense import irradiance_at, solve_dense
+from app.scene.model import F64, Scene
+from app.solvers.local.options import BOUNCES, OUTSIDE
+from app.solvers.local.solver import Local
+from app.util.parts import run_to_end
+from app.validation.scenes import furnace
+
+PIECES = 3000  # of work: a set that is not there then never will be
+LAMP, RED = 2, 1
+# the series of the paper counts short closed paths more than once, see tests/gpu/test_local_matrix.py
+EXACT = pytest.mark.parametrize("bounces", [b for b in BOUNCES if b != "series"])
+
+
+def lit_by(gpu: Gpu, scene: Scene, density: float = 3, **options: object) -> Solution:
+    """Settled, seen from the middle of the scene. 32 bits and, unless given, the whole scene in the set."""
+    known: dict[str, object] = {
+        "patches": 1024,
+        "patch_level": 0,
+        "bits": 32,
+        "rays": 256,
+        "shadow_rays": 32,
+        "missing": 0.0,
+    }
+    solution = begin(gpu, scene, density=density, solver="local", **(known | options))  # type: ignore[arg-type]
+    settle(solution)
+    return solution
+
+
+def matrix_of(solution: Solution) -> Local:
+    assert isinstance(solution.solver, Local)
+    return solution.solver
+
+
+def settle(solution: Solution) -> None:
+    for _ in range(PIECES):
+        if solution.solver.poll().converged:
+            solution.solver.settle()
+            return
+        run_to_end(solution.solver.work(1))
+    raise AssertionError("did not settle")
+
+
+def walk(solution: Solution, *eyes: ArrayLike) -> None:
+    """To each of these places, and settle there."""
+    for eye in eyes:
+        matrix_of(solution).set_observer(np.asarray(eye, np.float64))
+        settle(solution)
+
+
+def vector(solution: Solution, texture: Texture) -> F64:
+    """(nodes, 3) of a vector with a number for each slot, of the nodes in the set [W/m²]."""
+    there = matrix_of(solution).set.node >= 0
+    values = np.frombuffer(texture.read(), np.float32).reshape(-1, 4)[:, :3].astype(np.float64)
+    return np.asarray(values[there] * solution.lightmap.unit)
+
+
+# -- the whole scene in the set ----------------------------------------------------------------------------------------
+
+
+@EXACT
+def test_the_whole_scene_is_what_the_dense_matrix_and_gathering_say(gpu: Gpu, bounces: str) -> None:
+    """Object by object, within 1 %: what is left is the noise of rays, of which each has some 10⁵."""
+    scene = table_room()
+    lit = lit_by(gpu, scene, bounces=bounces, rays=1024, shadow_rays=128)
+    assert np.abs(matrix_of(lit).set.outside).max() < 1e-3, "all of the scene is inside"
+    dense = solve_dense(scene, max_patches=600)
+    other = begin(gpu, scene, density=3, solver="gathering", noise=1e-3, smooth=False)
+    other.gather(512)
+    by_dense = irradiance_at(dense, scene, lit.position, lit.normal.astype(np.float64))
+    for what, H in (("dense", by_dense), ("gathering", other.H)):
+        mean = np.abs(lit.means(lit.H - H)).mean() / lit.H.mean()
+        total = np.average(lit.H.mean(1), weights=lit.area) / np.average(H.mean(1), weights=lit.area)
+        assert mean < 0.01 and total == pytest.approx(1, abs=0.01), what
+    lit.release()
+    other.release()
+
+
+@EXACT
+@pytest.mark.parametrize("albedo", [0.5, 0.9])
+def test_a_closed_room_that_glows_has_the_light_of_a_furnace(gpu: Gpu, bounces: str, albedo: float) -> None:
+    """H = E / (1 - ρ) on every texel, since rows sum to 1: but for shadow rays, 0.1 %."""
+    lit = lit_by(gpu, furnace(albedo), density=8, bounces=bounces)
+    indirect = vector(lit, matrix_of(lit).lighting.indirect)
+    np.testing.assert_allclose(indirect, albedo / (1 - albedo), rtol=2e-3)
+    lit.release()
+
+
+# -- rows --------------------------------------------------------------------------------------------------------------
+
+
+def test_rows_sum_to_what_does_not_escape_and_pairs_are_reciprocal(gpu: Gpu) -> None:
+    """Of patches and clusters."""
+    lit = lit_by(gpu, table_room(), patches=128, outside="cascade")
+    held = matrix_of(lit).set
+    there = held.node >= 0
+    factors = held.matrix().toarray()
+    area = held.area[there]
+    np.testing.assert_allclose(factors * area[:, None], (factors * area[:, None]).T, atol=1e-12)
+    np.testing.assert_allclose(factors.sum(1), held.received[there], atol=1e-3)
+    assert len(set(matrix_of(lit).patches.level[held.nodes].tolist())) > 1, "clusters must be there"
+    assert lit.book.imbalance_share == pytest.approx(0, abs=0.02)  # clusters are coarse beside a table
+    lit.release()
+
+
+@EXACT
+@pytest.mark.parametrize("outside", OUTSIDE)
+def test_no_more_light_is_reflected_than_arrives(gpu: Gpu, bounces: str, outside: str) -> None:
+    """What the set receives is what lamps and the outside send it, and what it sends itself, which is less than it reflects."""
+    lit = lit_by(gpu, table_room(), patches=128, bounces=bounces, outside=outside)
+    solver = matrix_of(lit)
+    held, there = solver.set, solver.set.node >= 0
+    indirect = vector(lit, solver.lighting.indirect)
+    outside_light = np.frombuffer(solver.lighting.outside.read(), np.float32)[:3] * lit.lightmap.unit
+    reflected = vector(lit, solver.lighting.reflected)  # direct light
+    area, albedo = held.area[there][:, None], solver.albedo[held.nodes]
+    came = (area * held.outside[there][:, None] * outside_light).sum()
+    sent = (area * (reflected + albedo * indirect)).sum()
+    assert (area * indirect).sum() <= (came + sent) * (1 + 1e-4)
+    assert (area * indirect).sum() > 0.1 * sent
+    lit.release()
+
+
+# -- how it came about -------------------------------------------------------------------------------------------------
+
+HERE, THERE, ELSEWHERE = (0.6, 1.2, 0.6), (3.3, 2.0, 3.5), (3.4, 0.4, 0.5)
+
+
+@EXACT
+@pytest.mark.parametrize("outside", OUTSIDE)
+def test_the_light_is_the_same_whichever_way_the_observer_came(gpu: Gpu, bounces: str, outside: str) -> None:
+    """Within 0.5 %, as the mean over the set."""
+    straight = lit_by(gpu, table_room(), patches=192, bounces=bounces, outside=outside)
+    walk(straight, HERE)
+    other = lit_by(gpu, table_room(), patches=192, bounces=bounces, outside=outside)
+    walk(other, THERE)
+    assert np.abs(other.H - straight.H).mean() > 0.01 * straight.H.mean(), "the walk must change something"
+    walk(other, ELSEWHERE, THERE, HERE)
+    assert set(matrix_of(straight).set.nodes.tolist()) == set(matrix_of(other).set.nodes.tolist())
+    assert np.abs(other.H - straight.H).mean() < 0.005 * straight.H.mean()
+    straight.release()
+    other.release()
+
+
+def test_what_is_shown_does_not_jump_when_patches_come_and_go(gpu: Gpu) -> None:
+    """In each picture a quarter of what is missing comes."""
+    lit = lit_by(gpu, table_room(), patches=128, swaps=64, outside="constant")  # clusters are smoothed by their size
+    before = lit.H
+    matrix_of(lit).set_observer(np.array(THERE))
+    run_to_end(lit.solver.work(1))
+    solver = matrix_of(lit)
+    assert solver.issued > 128, "nodes must have entered"
+    first = np.abs(lit.H - before).mean()
+    settle(lit)
+    assert np.abs(lit.H - before).mean() > 3 * first
+    lit.release()
+
+
+# -- edits -------------------------------------------------------------------------------------------------------------
+
+
+@EXACT
+def test_another_lamp_is_lit_in_one_piece_of_work_and_costs_no_ray(gpu: Gpu, bounces: str) -> None:
+    """Light is linear in it: but for light from outside, a row's thousandth, that follows a bounce later, and what the first
+    bounces of ``iterate`` leave."""
+    lit = lit_by(gpu, table_room(), bounces=bounces)
+    solver = matrix_of(lit)
+    before, traced = lit.H, solver.rows.traced + solver.direct.traced
+    materials = list(lit.lightmap.scene.materials)
+    materials[LAMP] = replace(materials[LAMP], emission=tuple(2 * e for e in materials[LAMP].emission))
+    solver.set_materials(tuple(materials))
+    run_to_end(solver.work(1))
+    assert solver.rows.traced + solver.direct.traced == traced
+    left = 1e-4 if bounces == "inverse" else 0.05
+    assert np.abs(lit.H - 2 * before).mean() < left * before.mean()
+    lit.release()
+
+
+@EXACT
+def test_another_albedo_ends_where_a_fresh_solve_ends(gpu: Gpu, bounces: str) -> None:
+    lit = lit_by(gpu, table_room(), bounces=bounces)
+    before = lit.H
+    materials = list(lit.lightmap.scene.materials)
+    materials[RED] = replace(materials[RED], albedo=(0.1, 0.7, 0.2))
+    matrix_of(lit).set_materials(tuple(materials))
+    run_to_end(lit.solver.work(1))
+    settle(lit)
+    fresh = lit_by(gpu, lit.lightmap.scene, bounces=bounces)
+    assert np.abs(before - fresh.H).mean() > 0.02 * fresh.H.mean(), "the edit must change something"
+    assert np.abs(lit.H - fresh.H).mean() < 1e-4 * fresh.H.mean()
+    lit.release()
+    fresh.release()
+
+
+# -- bad input ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "what"),
+    [
+        ({"patches": 16384, "matrix_memory": 65536}, ""),
+        ({"patches": 1024, "matrix_memory": 1}, "--matrix-memory 1: the matrix of"),
+        ({"row_memory": 1, "rays": 1024}, "--row-memory 1:"),
+    ],
+)
+def test_what_does_not_fit_says_so(gpu: Gpu, options: dict[str, object], what: str) -> None:
+    """A set of more patches than the scene has is the scene."""
+    if not what:
+        lit = lit_by(gpu, furnace(0.5), density=4, **options)
+        assert matrix_of(lit).set.most == 128 and matrix_of(lit).set.free == 32
+        lit.release()
+        return
+    with pytest.raises(UserError, match=what):
+        begin(gpu, table_room(), density=6, solver="local", patch_level=0, **options)
+
+
+def test_an_observer_who_is_nowhere_says_so_and_one_far_away_sees_the_scene(gpu: Gpu) -> None:
+    lit = lit_by(gpu, table_room(), patches=128)
+    with pytest.raises(UserError, match="nan"):
+        matrix_of(lit).set_observer(np.array([0.0, np.nan, 0.0]))
+    walk(lit, (1e6, 0.0, 0.0))
+    assert matrix_of(lit).set.nodes.size and np.isfinite(lit.H).all()
+    lit.release()
+
+
+def test_quadtrees_are_refused(gpu: Gpu) -> None:
+    with pytest.raises(UserError, match="uniform texels"):
+        begin(gpu, table_room(), density=4, solver="local", adaptive=True)
