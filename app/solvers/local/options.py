@@ -41,8 +41,8 @@ class LocalOptions(Options):
     )
     patch_level: int | None = option(
         None,
-        "patches are squares of 2^n texels along each edge; left out, the finest that gives no more than 64 patches in the world "
-        "for each of the local set",
+        "patches are squares of 2^n texels along each edge; left out, the finest up to 3 with which the whole scene is in the "
+        "local set, else 0",
         minimum=0,
         maximum=4,
     )

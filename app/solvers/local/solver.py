@@ -36,8 +36,7 @@ from app.visibility.rays import RayScene
 
 I64 = NDArray[np.int64]
 SOFTWARE, HARDWARE = 1024, 4096  # patches of the set by default, where a CPU rasterises and where not
-A_PATCH = 64  # patches of the world for each of the set, from which on patches are larger
-HIGHEST = 4  # level of a patch: texels of one tile
+WHOLE = 3  # highest level of patches that are large so that a whole scene is in the set
 FILLING = 64  # nodes that enter at once before there is half of a set
 ROWS = 256  # made at once before that, and
 ROWS_WHILE_WALKING = 48  # while it goes on
@@ -83,7 +82,7 @@ class Local:
         most = options.patches or default_patches(gpu, options)
         level = options.patch_level
         if level is None:
-            level = next((n for n in range(HIGHEST) if patch_count(lightmap.pool, n) <= A_PATCH * most), HIGHEST)
+            level = next((n for n in range(WHOLE + 1) if patch_count(lightmap.pool, n) <= most), 0)
         patches = patches_of(lightmap.pool, level)
         most = -(-min(most, patches.count) // ROW) * ROW
         components = 1 if options.bounces == "iterate" else 4
