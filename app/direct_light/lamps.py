@@ -9,10 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
+from app.gpu import glsl_constant
 from app.lightmap.tile_pool import TilePool
 from app.scene.model import F32, F64, Scene
 from app.visibility.rays import places_of
@@ -20,7 +23,13 @@ from app.visibility.rays import places_of
 ALONE = 8  # materials that are a set of their own, the strongest ones
 CLOSED_FORM = 256  # triangles of a set, up to which all of them are summed up in closed form
 PLAIN, PICTURE = 4, 7  # texels of a lamp, and of one with an image
-CHANCES = 1 << 24  # of lamps in tiles: beyond, they are the same in all tiles
+CELL = int(
+    glsl_constant("direct_light/shadow_rays.frag.glsl", "CELL")
+)  # texels along the edge of a cell: charts start at these
+NEAR = int(glsl_constant("direct_light/shadow_rays.frag.glsl", "NEAR"))  # lamps that each cell knows
+CANDIDATES = 3 * NEAR  # nearest lamps, of which those are chosen
+LEAST, MOST = 0.2, 0.95  # shares of shadow rays that choose among them, where there are others
+CELLS_AT_ONCE = 1 << 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,40 +114,64 @@ def _means(pool: TilePool, triangles: NDArray[np.int64]) -> F64:
     return np.asarray(np.where(whole[triangles, None] > 0, means[triangles], 1.0))
 
 
-def chances(pool: TilePool, lamps: LampSet) -> F32:
-    """(slots, n) f32, summed up along lamps, the last 1: the probability with which the shadow rays of a tile choose each lamp.
+@dataclass(frozen=True, eq=False)
+class Chances:
+    """With which probability shadow rays choose each lamp of a set, cell by cell.
 
-    Half of them in proportion to a bound of what it may give to any texel of the tile: its power, times the largest cosine at the
-    lamp, over the least squared distance, which is not taken as less than the lamp's own area. The other half by its mean squared
-    distance instead: many small lamps that are near to one texel each would leave few rays to a large one that all texels see.
-    One row, by power, where there are too many.
+    near (slots, cells, NEAR, 2) f32: of each cell the lamps that may give it most, in rows: their chances summed up, to 1 where
+    they are all, and their numbers, which rise. far (n,) f32: chances of all lamps by power, summed up: the other lamps are found
+    by these.
     """
-    area = lamps.rows[:, 0, 3].astype(np.float64)
+
+    near: F32
+    far: F32
+
+
+def chances(pool: TilePool, lamps: LampSet, slots: NDArray[np.int64] | None = None) -> Chances:
+    """The chances of a set, in these slots, or in all. Charts start at multiples of a cell, so that all of it is of one chart.
+
+    Half of the chances are in proportion to a bound of what a lamp may give to any texel of the cell: its power, times the
+    largest cosine at the lamp, over the least squared distance, which is not taken as less than the lamp's own area. The other
+    half go by power to all that face the cell: lamps that are near but hidden would leave few rays to what all texels see.
+    """
+    area, count = lamps.rows[:, 0, 3].astype(np.float64), len(lamps.rows)
     weight = np.maximum(area * lamps.strength, 1e-300)
-    if pool.tiles * len(area) > CHANCES:
-        return _summed_up(weight[None])
-    centre, radius = _spheres(pool)
+    centre, radius = _spheres(pool, np.arange(pool.tiles) if slots is None else slots)
     corner, u, v = (lamps.rows[:, row, :3].astype(np.float64) for row in range(3))
     middle = corner + (u + v) / 3
     normal = np.cross(u, v) / (2 * area[:, None])
     extent = np.sqrt(np.maximum((u**2).sum(1), (v**2).sum(1)))
-    out = np.empty((pool.tiles, len(area)), np.float32)
-    step = max(1, (1 << 20) // len(area))
-    for first in range(0, pool.tiles, step):
-        part = slice(first, first + step)
-        way = centre[part, None] - middle
+    known, shape = min(count, NEAR), centre.shape[:2]
+    there = np.flatnonzero(radius.reshape(-1) > 0)  # cells that hold anything
+    at, round_ = centre.reshape(-1, 3)[there], radius.reshape(-1, 1)[there]
+    near, tree = np.ones((shape[0] * shape[1], NEAR, 2), np.float32), cKDTree(middle)
+    for first in range(0, len(there), CELLS_AT_ONCE):
+        some = slice(first, first + CELLS_AT_ONCE)
+        which = np.tile(np.arange(count), (len(at[some]), 1))
+        if count > CANDIDATES:
+            which = np.asarray(tree.query(at[some], k=CANDIDATES)[1])
+        way = at[some, None] - middle[which]
         distance = np.linalg.norm(way, axis=2)
-        reach = radius[part, None] + extent
-        height = np.einsum("tlk,lk->tl", way, normal)
-        height = np.where(lamps.rows[:, 1, 3] > 0, np.abs(height), height) + reach
-        near = np.maximum(distance - reach, 0.0)
+        reach = round_[some] + extent[which]
+        height = np.einsum("clk,clk->cl", way, normal[which])
+        height = np.where(lamps.rows[which, 1, 3] > 0, np.abs(height), height) + reach
         cosine = np.clip(height / np.maximum(distance, 1e-30), 0.0, 1.0)
-        most = weight * cosine / np.maximum(near**2, area)
-        mean = weight * cosine / (distance**2 + radius[part, None] ** 2 + area)
-        behind = ~(most.sum(1) > 0)  # all lamps: no light comes, whatever is chosen
-        most[behind] = mean[behind] = weight
-        out[part] = (_summed_up(most) + _summed_up(mean)) / 2
-    return out
+        most = weight[which] * cosine / np.maximum(np.maximum(distance - reach, 0.0) ** 2, area[which])
+        facing = weight[which] * (cosine > 0)
+        behind = ~(most.sum(1) > 0)  # all of them: no light comes, whatever is chosen
+        most[behind] = facing[behind] = weight[which[behind]]
+        chance = most / most.sum(1, keepdims=True) + facing / facing.sum(1, keepdims=True)
+        share = np.ones((len(chance), 1))
+        if known < count:
+            best = np.argpartition(-chance, known, axis=1)[:, :known]
+            beyond = weight.sum() - weight[which].sum(1)  # of lamps that are farther than all of these
+            rest = most.sum(1) - np.take_along_axis(most, best, 1).sum(1) + beyond / distance.max(1) ** 2
+            share = np.clip(1 - rest / (most.sum(1) + beyond / distance.max(1) ** 2), LEAST, MOST)[:, None]
+            chance, which = (np.take_along_axis(values, best, 1) for values in (chance, which))
+        by_number = np.argsort(which, axis=1)
+        near[there[some], :known, 0] = share * _summed_up(np.take_along_axis(chance, by_number, 1))
+        near[there[some], :known, 1] = np.take_along_axis(which, by_number, 1)
+    return Chances(near.reshape(*shape, NEAR, 2), _summed_up(weight[None])[0])
 
 
 def _summed_up(bound: F64) -> F32:
@@ -148,13 +181,19 @@ def _summed_up(bound: F64) -> F32:
     return out
 
 
-def _spheres(pool: TilePool) -> tuple[F64, NDArray[np.float64]]:
-    """Around the texels of each slot: centres (slots, 3) and radii, solver space."""
-    covered = pool.surfaces.face >= 0
-    at = np.where(covered[..., None], pool.space.local_from_world(pool.surfaces.position), np.nan)
-    at = at.reshape(pool.tiles, -1, 3)
-    empty = ~covered.reshape(pool.tiles, -1).any(1)
-    at[empty] = 0.0
-    low, high = np.nanmin(at, axis=1), np.nanmax(at, axis=1)
-    texel = np.sqrt(pool.surfaces.area.reshape(pool.tiles, -1).max(1)) / pool.space.scale
-    return (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2 + texel
+def _spheres(pool: TilePool, slots: NDArray[np.int64]) -> tuple[F64, F64]:
+    """Around the texels of each cell of these slots: centres (slots, cells, 3) and radii (slots, cells),
+    solver space, 0 of cells that hold nothing."""
+    edge = pool.tile // CELL
+    covered = pool.surfaces.face[slots] >= 0
+    at = np.where(covered[..., None], pool.space.local_from_world(pool.surfaces.position[slots]), np.nan)
+
+    def by_cell(values: NDArray[Any]) -> NDArray[Any]:
+        cells = values.reshape(len(slots), edge, CELL, edge, CELL, -1).swapaxes(2, 3)
+        return cells.reshape(len(slots), edge * edge, CELL * CELL, -1)
+
+    at, there = by_cell(at), by_cell(covered)[..., 0].any(2)
+    at[~there] = 0.0
+    low, high = np.nanmin(at, axis=2), np.nanmax(at, axis=2)
+    texel = np.sqrt(by_cell(pool.surfaces.area[slots])[..., 0].max(2)) / pool.space.scale
+    return (low + high) / 2, np.where(there, np.linalg.norm(high - low, axis=2) / 2 + texel, 0.0)

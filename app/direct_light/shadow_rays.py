@@ -32,13 +32,13 @@ STREAM = 1  # of random numbers, of the first set
 
 @dataclass
 class Lit:
-    """What is known of the light of one set. count: shadow rays of each texel, in passes of PASS. alike: whether chances are the
-    same in all tiles."""
+    """What is known of the light of one set. near, far: see Chances, folded. passes: of each slot, of PASS
+    shadow rays from each texel."""
 
     lamps: LampSet
     table: Texture
-    chances: Texture
-    alike: bool
+    near: Texture
+    far: Texture
     seen: Texture
     target: Framebuffer
     unoccluded: Texture | None
@@ -89,19 +89,17 @@ class DirectLight:
     def add(self, lamps: LampSet) -> None:
         """Another set, none of whose light is known yet."""
         gpu, size = self._gpu, self._lightmap.size
-        chance = chances(self._lightmap.pool, lamps)
+        known = chances(self._lightmap.pool, lamps)
         seen = gpu.texture(size, 4, "f4")
         target = gpu.target(seen)
         target.clear()
         unoccluded = gpu.texture(size, 1, "f4") if lamps.closed_form else None
         self._streams += 1
-        table, folded_chance = folded(gpu, lamps.rows.reshape(-1, 4)), folded(gpu, chance.reshape(-1, 1))
+        table, near = folded(gpu, lamps.rows.reshape(-1, 4)), folded(gpu, known.near.reshape(-1, 2))
+        far = folded(gpu, known.far.reshape(-1, 1))
         stream = STREAM + self._streams
         passes, passes_table = np.zeros(self._lightmap.pool.tiles, np.int64), self._passes_table()
-        alike = len(chance) == 1
-        self.sets.append(
-            Lit(lamps, table, folded_chance, alike, seen, target, unoccluded, stream, passes, passes_table)
-        )
+        self.sets.append(Lit(lamps, table, near, far, seen, target, unoccluded, stream, passes, passes_table))
 
     def _passes_table(self) -> Texture:
         return self._gpu.texture((self._lightmap.columns, self._lightmap.rows), 1, "f4")
@@ -155,7 +153,7 @@ class DirectLight:
         """Forget a set."""
         self.sets.remove(lit)
         optional = [] if lit.unoccluded is None else [lit.unoccluded]
-        self._gpu.release_all(lit.target, lit.seen, lit.table, lit.chances, lit.passes_table, *optional)
+        self._gpu.release_all(lit.target, lit.seen, lit.table, lit.near, lit.far, lit.passes_table, *optional)
 
     def shoot(self, count: int, gain: F64 | None = None) -> Generator[None, None, None]:
         """So many shadow rays more from each texel to each set, whole passes of them, in parts; with ``gain`` (slots,) that many
@@ -191,9 +189,9 @@ class DirectLight:
     def _shoot_at(self, lit: Lit, slots: NDArray[np.int64], blend: str | None) -> None:
         """One pass of shadow rays from the texels of these slots to a set."""
         pool = self._lightmap.pool
-        textures = {"t_lamps": lit.table, "t_chances": lit.chances, "t_passes": lit.passes_table}
+        textures = {"t_lamps": lit.table, "t_near": lit.near, "t_far": lit.far, "t_passes": lit.passes_table}
         textures |= {name: texture for name, texture in self._rays.textures.items() if name != "t_bvh_uv"}
-        uniforms: dict[str, Any] = {"u_stream": lit.stream, "u_lamps": len(lit.lamps.rows), "u_alike": lit.alike}
+        uniforms: dict[str, Any] = {"u_stream": lit.stream, "u_lamps": len(lit.lamps.rows)}
         if lit.lamps.picture:
             textures |= self._lightmap.textures("t_pages", "t_emission")
             uniforms["u_pages"] = float(self._lightmap.columns), pool.pages_per_texel
@@ -217,9 +215,7 @@ class DirectLight:
         others = np.setdiff1d(np.flatnonzero(pool.used), slots)
         for lit in self.sets:
             self._look_unoccluded(lit, rects)
-            table = chances(pool, lit.lamps)
-            self._gpu.release_all(lit.chances)
-            lit.chances, lit.alike = folded(self._gpu, table.reshape(-1, 1)), len(table) == 1
+            self._know_near(lit, slots)
             known = lit.passes[others] if len(others) else lit.passes[slots]
             wanted = max(int(np.rint(known.mean())), 1)
             lit.passes[slots] = 0
@@ -228,11 +224,19 @@ class DirectLight:
                 self._shoot_at(lit, slots, "add" if nth else None)
                 yield
 
+    def _know_near(self, lit: Lit, slots: NDArray[np.int64]) -> None:
+        """Other leaves are in these slots: which lamps are near to them."""
+        for slot, near in zip(slots.tolist(), chances(self._lightmap.pool, lit.lamps, slots).near, strict=True):
+            y, x = divmod(slot * near.shape[0] * near.shape[1], A_ROW)
+            lit.near.write(near.tobytes(), viewport=(x, y, near.shape[0] * near.shape[1], 1))
+
     def resized(self, moves: Moves) -> None:
         """The tile pool has got another number of slots."""
         for lit in self.sets:
             self._gpu.release_all(lit.target)
             lit.seen = self._lightmap.moved(lit.seen, moves)
+            self._gpu.release_all(lit.near)
+            lit.near = folded(self._gpu, chances(self._lightmap.pool, lit.lamps).near.reshape(-1, 2))
             lit.target = self._gpu.target(lit.seen)
             self._gpu.release_all(lit.passes_table)
             lit.passes, lit.passes_table = moves.array(lit.passes, 0), self._passes_table()
