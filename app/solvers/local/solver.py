@@ -67,7 +67,9 @@ class Local:
         self._under_way: Generator[None, None, int] | None = None
         self._tile_centres = _tile_centres(lightmap)
         self._stale: list[int] | None = None  # None: not looked for
-        self._fading = 0
+        self._fading = self._turn = 0
+        self._edited = self._editing = False
+        self._all_known = True
         self.issued = 0
         try:
             self._build(options)
@@ -116,6 +118,10 @@ class Local:
         if self._edited:
             yield from self._follow_edit()
             return 0
+        if self._editing and not self._all_known:
+            self.direct.sum(self.lightmap.scene)
+            self._lit = False
+        self._editing, self._all_known = False, True
         entered, tiles = 0, self._next_tiles()
         if self._is_dark_here:
             yield from self._shoot(tiles)
@@ -152,24 +158,35 @@ class Local:
     def _compose(self, *, all_: bool, stays: float = 0.0) -> None:
         """Write the light that is shown; if not all of it, that which is near, and some of the rest in turn. stays: share of what
         was shown before."""
-        tiles = np.flatnonzero(self.lightmap.pool.used)
-        if not all_ and len(tiles) > NEAR_TILES + TILES_IN_TURN:
-            order = np.argpartition(self._away()[tiles], NEAR_TILES)
-            rest = np.sort(tiles[order[NEAR_TILES:]])
-            first = self._turn % len(rest)
-            tiles = np.concatenate([tiles[order[:NEAR_TILES]], np.roll(rest, -first)[:TILES_IN_TURN]])
-            self._turn += TILES_IN_TURN
-        self.lighting.compose(self.direct.light, tiles, stays=stays)
+        self.lighting.compose(self.direct.light, self._tiles if all_ else self._tiles_in_turn(), stays=stays)
+
+    @property
+    def _tiles(self) -> I64:
+        """All that hold anything."""
+        return np.flatnonzero(self.lightmap.pool.used)
+
+    def _tiles_in_turn(self) -> I64:
+        """Those that are near, and some of the others, each in turn; all where there are few."""
+        tiles = self._tiles
+        if len(tiles) <= NEAR_TILES + TILES_IN_TURN:
+            return tiles
+        order = np.argpartition(self._away()[tiles], NEAR_TILES)
+        rest = np.sort(tiles[order[NEAR_TILES:]])
+        first, self._turn = self._turn % len(rest), self._turn + TILES_IN_TURN
+        return np.concatenate([tiles[order[:NEAR_TILES]], np.roll(rest, -first)[:TILES_IN_TURN]])
 
     def _follow_edit(self) -> Generator[None, None, None]:
-        """The light of other lamps, in one piece of work."""
-        self._edited = False
+        """The light of other lamps, in one piece of work; of lamps that change in every picture, what is near, and some of the
+        rest in turn, until they stay as they are."""
+        goes_on, self._edited = self._editing, False
+        self._editing = True
         self.direct.follow(self.lightmap.scene)
         yield from self.direct.catch_up(self.options.shadow_rays)
-        self.direct.sum(self.lightmap.scene)
-        self._lit = False
+        tiles = self._tiles_in_turn() if goes_on else self._tiles
+        self.direct.sum(self.lightmap.scene, tiles)
+        self._lit, self._all_known = False, not goes_on
         self._relight()
-        self._compose(all_=True)
+        self.lighting.compose(self.direct.light, tiles)
 
     def _relight(self) -> None:
         """The indirect light of the set as it is, where it is not known yet: bounces that are done one after the other, and light
@@ -305,7 +322,7 @@ class Local:
             shadow = 1 - float(np.minimum(self.direct.fewest[some], asked).mean()) / asked
         missing = max(here, shadow, float(bool(self._stale)) / max(len(inside), 1)) if emits else 0.0
         known = self._stale is not None and not self._stale and self._fading == self._bounces_left == 0
-        done = not emits or (missing <= self.options.missing and known and not self._edited)
+        done = not emits or (missing <= self.options.missing and known and not self._edited and self._all_known)
         return Progress(self.issued, missing if self.issued or not emits else 1.0, self._escaped, converged=done)
 
     def settle(self) -> Progress:
@@ -386,6 +403,10 @@ class Local:
         self._entered, self._frame, self._count, self._turn = np.zeros(most), 0, 0, 0
         self._lit, self._edited, self._stale = False, False, None
         self._bounces_left = self._fading = 0
+        self._editing, self._all_known = (
+            False,
+            True,
+        )  # whether lamps change in every piece, and direct light is that of all now
         self._escaped, self._loss = np.zeros(3), 0.0
         self.issued = 0
         self._look()
@@ -406,12 +427,15 @@ class Local:
         """Other albedos and emissions: the light of other lamps with the next piece of work; of other albedos, while nodes enter
         the set anew."""
         self._finish()
+        before = [m.albedo for m in self.lightmap.scene.materials]
         self.lightmap.set_materials(materials)
         if not self.issued:
             self.reset()
             return
-        self._set_albedo()
-        self._stale, self._edited = None, True
+        self._edited = True
+        if [m.albedo for m in materials] != before:
+            self._set_albedo()
+            self._stale = None
 
     def _set_albedo(self) -> None:
         lightmap = self.lightmap
