@@ -36,6 +36,7 @@ class Family:
     shows: options that change the light that is shown without any work. layers: names of what its solvers know of every texel.
     distributes: whether what remains is light that is still to be distributed, in the energy balance; else it is an error.
     per_error: how little may remain where an expected error is asked for, as a share of that.
+    relights: whether its next piece of work shows all light of other lamps, so that they may flicker from frame to frame.
     rays: whether it looks along rays, and so needs a tree of the scene's triangles (visibility/rays.py) before it is made.
     """
 
@@ -54,6 +55,7 @@ class Family:
     distributes: bool = True
     quadratic: bool = False
     per_error: float | None = None
+    relights: bool = False
     rays: bool = False
 
 
@@ -85,6 +87,7 @@ SOLVERS: dict[str, Family] = {
         pictures={HEMISPHERE: SEEN},
         distributes=False,
         per_error=0.25,
+        relights=True,
         rays=True,
     ),
     "local": Family(
@@ -98,6 +101,7 @@ SOLVERS: dict[str, Family] = {
         threshold="missing",
         layers=("direct", "local"),
         distributes=False,
+        relights=True,
         rays=True,
     ),
     "pairs": Family(

@@ -28,6 +28,7 @@ from app.render.camera_path import load_path
 from app.session.pacing import Turns
 from app.session.session import Session
 from app.session.view import View
+from app.solvers.local.solver import Local
 from app.ui.app import Ui
 from app.ui.state import Pace
 from app.util.console import Console
@@ -158,12 +159,13 @@ def _measure_walk(viewer: _Viewer, source: str, tell: Callable[[str, float], Non
     while not session.run.converged and time.perf_counter() - start < STANDING:
         tell("lighting the beginning", (time.perf_counter() - start) / STANDING)
         viewer.frame()
-    rows, missing = [], []
+    rows, to_come = [], []
     for nth, camera in enumerate(cameras):
         tell("walking", nth / len(cameras))
         rows.append(viewer.frame(camera=camera))
-        missing.append(session.run.progress.remaining)
-    return _summary(rows) | {"remains": session.family.remains, "remaining": float(np.mean(missing))}
+        local = session.solver
+        to_come.append(local.to_come if isinstance(local, Local) else 0)
+    return _summary(rows) | {"nodes_to_come": float(np.mean(to_come))}
 
 
 def _summary(rows: list[list[float]]) -> dict[str, Any]:
@@ -205,7 +207,8 @@ def _walk_table(values: dict[str, Any]) -> str:
         "",
         f"a walk of {values['frames']} frames: median {values['median_ms']:.1f} ms, 99 % below {values['p99_ms']:.1f} ms, "
         f"worst {values['worst_ms']:.1f} ms, {values['frames_per_second']:.1f} frames/s, CPU {values['cpu_ms']:.1f} ms",
-        f"{values['slow_frames']} frames above {SLOW:.0f} ms; {values['remaining']:.2%} {values['remains']} on average",
+        f"{values['slow_frames']} frames above {SLOW:.0f} ms; {values['nodes_to_come']:.0f} nodes of a local set still to come, on "
+        "average",
         *_parts(values["parts_ms"]),
     ]
     return "\n".join(lines)

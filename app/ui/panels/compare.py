@@ -146,7 +146,7 @@ def _solve(view: View, state: State) -> None:
             state.reference, starts={"texels": view.session.compared.reference_texels}
         )
         if imgui.button("Solve in the background", imgui.ImVec2(-1, 0)):
-            state.act(lambda: view.session.compared.solve(state.reference))
+            state.act(lambda: view.session.compared.solve(state.reference, view.session.edited_scene))
         widgets.tooltip(FINER)
         return
     imgui.progress_bar(fetching.fraction, imgui.ImVec2(-1, 0), "")
