@@ -30,7 +30,7 @@ class Family:
 
     title: what the viewer calls it. options: the class of its options, each a flag and a widget. make: makes one for a lightmap,
     or raises UserError before it has touched the light there. unit: of its work, in the plural, as in ``--shots``. remains: what
-    is left of what it has to do, as in "0.1 % unshot". batch: work that it does at once when nothing waits for it. keeps_light:
+    is left of what it has to do, as in "0.1 % unshot"; part_of: of what that is a share. batch: work that it does at once when nothing waits for it. keeps_light:
     whether it can begin with light that another solver has left in the lightmap; else it begins anew. threshold: the option that
     says how little may remain when it has converged. pictures: captions of the images of its Inspection, and what they show.
     shows: options that change the light that is shown without any work. layers: names of what its solvers know of every texel.
@@ -54,6 +54,7 @@ class Family:
     layers: tuple[str, ...] = ()
     distributes: bool = True
     quadratic: bool = False
+    part_of: str = "mean"
     per_error: float | None = None
     relights: bool = False
     rays: bool = False
@@ -99,6 +100,7 @@ SOLVERS: dict[str, Family] = {
         remains="missing",
         batch=UPDATES,
         threshold="missing",
+        part_of="all",
         layers=("direct", "local"),
         distributes=False,
         relights=True,

@@ -28,7 +28,7 @@ from app.solvers.local.lighting import Lighting
 from app.solvers.local.matrix import ROW, LocalMatrix
 from app.solvers.local.options import LocalOptions
 from app.solvers.local.patches import patch_count, patches_of
-from app.solvers.local.rows import Rows
+from app.solvers.local.rows import Rows, rows_in
 from app.solvers.local.selection import Selection, Swap, swaps
 from app.util.parts import is_running, run_to_end
 from app.visibility.origins import Origins
@@ -89,6 +89,7 @@ class Local:
             raise UserError(
                 f"--matrix-memory {options.matrix_memory}: the matrix of {most} patches takes {mebibytes:.0f} MiB"
             )
+        rows_in(options.row_memory, options.rays, most)  # before anything is released
         matrix = LocalMatrix(gpu, most, options.bounces, options.bits)
         self._release_parts()
         self._parts.append(matrix)

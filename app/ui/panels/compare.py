@@ -93,7 +93,7 @@ def _expected(view: View) -> None:
     elif view.session.estimate.share > 0:
         imgui.progress_bar(view.session.estimate.share, imgui.ImVec2(-1, 0), "")
     else:
-        widgets.dim("known when shooting pauses or ends")
+        widgets.dim("known when solving pauses or ends")
     widgets.tooltip(EXPECTED)
 
 
