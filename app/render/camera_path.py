@@ -113,11 +113,15 @@ class CameraPath:
         return CameraPath(self.cameras[:1], self.frames_per_second)
 
 
-def load_path(source: str) -> CameraPath:
-    """A path by its file, or by its name if it comes along. Raises UserError, which names the file, the key and the reason."""
+def load_path(source: str, *, frames_per_second: float | None = None) -> CameraPath:
+    """A path by its file, or by its name if it comes along. frames_per_second: instead of those in the file. Raises UserError,
+    which names the file, the key and the reason."""
     shown = one_line(source)[:200]
     try:
-        table = PathFile.model_validate(tomllib.loads(path_file(source).read_text("utf-8")))
+        values = tomllib.loads(path_file(source).read_text("utf-8"))
+        if frames_per_second is not None:
+            values["frames_per_second"] = frames_per_second
+        table = PathFile.model_validate(values)
         return CameraPath(_cameras(table), table.frames_per_second)
     except OSError as error:
         raise UserError(f"--path {shown}: cannot be read: {error.strerror}; {_allowed()}") from error

@@ -68,9 +68,10 @@ class Compared:
         light = bake_light(path, self._unedited, lambda stage, share: None)
         self._compare_with(prepare_reference(light, self._lightmap.pool))
 
-    def solve(self, options: ReferenceOptions) -> None:
-        """Solve the scene as it is now in the background, with closed forms and full storage. Raises UserError."""
-        scene = self._lightmap.scene
+    def solve(self, options: ReferenceOptions, scene: Scene | None = None) -> None:
+        """Solve the scene as it is now in the background, with closed forms and full storage; or ``scene``, the same with other
+        materials. Raises UserError."""
+        scene = scene or self._lightmap.scene
         if not scene.emits:
             raise UserError(f"{scene.name}: {NO_LIGHT}")
         texels = options.texels or self.reference_texels

@@ -14,6 +14,7 @@ from app.solvers import EnergyBalance, Solver
 BALANCE_SECONDS = 0.5  # between two measurements while solving, at least: each reads every texel
 BALANCE_SHARE = 0.05  # of the time may go into them
 SLOW_BALANCE, RARE_SECONDS = 0.03, 3.0  # one that takes longer than this is felt, and waits at least so long
+UNFELT = 0.005  # s: one that takes no longer is measured while a hand is at the controls, too
 EDIT_SECONDS = 0.2  # without another edit, until it is measured: a slider that is dragged edits every frame
 
 
@@ -25,7 +26,7 @@ class EnergyWatch:
 
     def __init__(self) -> None:
         self.balance: EnergyBalance
-        self._due = self._idle_after = 0.0
+        self._due = self._idle_after = self._cost = 0.0
 
     def begin(self, balance: EnergyBalance) -> None:
         """balance: with no light distributed yet."""
@@ -42,22 +43,22 @@ class EnergyWatch:
         start = time.perf_counter()
         self.balance = solver.energy()
         now = time.perf_counter()
-        cost = now - start
+        cost = self._cost = now - start
         self._due = now + max(BALANCE_SECONDS if cost < SLOW_BALANCE else RARE_SECONDS, cost / BALANCE_SHARE)
 
     def edited(self) -> None:
         """The balance is wrong from now on; the next is measured when no more edits follow."""
         self._due, self._idle_after = 0.0, time.perf_counter() + EDIT_SECONDS
 
-    @property
-    def idle(self) -> bool:
-        """Whether the last edit is a while ago."""
-        return time.perf_counter() >= self._idle_after
+    def may_measure(self, *, interactive: bool) -> bool:
+        """Whether the last edit is a while ago, and it would not be felt by a hand at the controls. interactive: there is one."""
+        felt = interactive and self._cost > UNFELT
+        return not felt and time.perf_counter() >= self._idle_after
 
     @property
     def due(self) -> bool:
         """Whether it is time for another one while solving."""
-        return self.idle and time.perf_counter() >= self._due
+        return time.perf_counter() >= self._due
 
 
 class Effort:

@@ -17,13 +17,14 @@ class History(Rows):
         """Append a row; what neither remains nor escaped was absorbed."""
         self.append(work, seconds, remaining, 1.0 - remaining - escaped, escaped)
 
-    @property
-    def work_per_second(self) -> float:
-        """Over the last second of solving and what began before it, or all of it."""
+    def work_per_second(self, until: float = 0.0) -> float:
+        """Over the last second of solving and what began before it, or all of it. until: seconds of solving by now, where no
+        progress was heard of for a while."""
         rows = self._rows[: self._count]
         if len(rows) < 2:
             return 0.0
-        older = rows[rows[:, 1] <= rows[-1, 1] - 1.0]
+        end, before = max(float(rows[-1, 1]), until), rows[:-1]
+        older = before[before[:, 1] <= end - 1.0]
         first = older[-1] if len(older) else rows[0]
-        span = rows[-1, 1] - first[1]
+        span = end - first[1]
         return float((rows[-1, 0] - first[0]) / span) if span > 0 else 0.0

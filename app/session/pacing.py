@@ -13,7 +13,9 @@ from app.util.parts import run_to_end
 
 LONG_FRAME = 0.07  # seconds from one advance to the next: a frame of 100 ms would be felt as a halt
 INTERACTIVE_FRAME = 1 / 30  # s, while a hand is at the controls: what it does is seen at once
-INTERACTIVE_BUDGET = 4.0  # ms of such a frame, after which no further part of a piece of work starts
+INTERACTIVE_BUDGET = 4.0  # ms of such a frame, that solving gets also where all else takes too long already
+PART_STAYS = 0.9  # share of the longest part of late, and
+REST_STAYS = 0.8  # of what else a frame takes, that goes into the next guess
 MOST_BANDS = 16
 OVER = object()  # no part is left
 SLOW_FRAME, FAST_FRAME = 0.08, 0.05  # s for solving and drawing, beyond which they take turns, and below which not
@@ -45,6 +47,7 @@ class Pacer:
     def begin(self) -> None:
         """Forget how fast the last solve was."""
         self._last = self._start = 0.0
+        self._unit = self._so_far = self._part = self._rest = self._solved = 0.0  # ms: see _advance_some, _left
         self._batch = self._bands = 1
         self._parts: Generator[None, None, int] | None = None  # of one unit of work, over several frames
 
@@ -56,17 +59,42 @@ class Pacer:
         """Do up to ``amount`` of work within ``budget_ms``, or a part of one unit; how much is whole. interactive: a hand is at
         the controls, which frames keep up with."""
         start = time.perf_counter()
-        if self._pieces(start, INTERACTIVE_FRAME if interactive else LONG_FRAME) > 1 and (interactive or amount == 1):
-            return self._advance_some(solver, start, min(budget_ms, INTERACTIVE_BUDGET) if interactive else budget_ms)
+        self._look_back(start)
+        pieces = self._pieces(start, INTERACTIVE_FRAME if interactive else LONG_FRAME) > 1
+        budget = min(budget_ms, self._left) if interactive else budget_ms
+        if (interactive and (pieces or self._unit > budget)) or (pieces and amount == 1):
+            made = self._advance_some(solver, start, budget)
+        else:
+            made = self._advance_whole(solver, start, budget_ms, amount)
+        self._solved = (time.perf_counter() - start) * 1e3
+        return made
+
+    def _look_back(self, now: float) -> None:
+        """Learn from the last frame what one takes beside solving."""
+        if self._start:
+            rest = (now - self._start) * 1e3 - self._solved
+            self._rest = REST_STAYS * self._rest + (1 - REST_STAYS) * rest if self._rest else rest
+
+    @property
+    def _left(self) -> float:
+        """ms after which no further part starts, so that an interactive frame ends in time."""
+        return max(INTERACTIVE_FRAME * 1e3 - self._rest - self._part, INTERACTIVE_BUDGET)
+
+    def _advance_whole(self, solver: Solver[Any], start: float, budget_ms: float, amount: int) -> int:
+        """Whole units of work, what was begun as well."""
         made, self._parts = 0, None
         while made < amount:
-            made += run_to_end(solver.work(min(amount - made, self._batch)))
+            more = run_to_end(solver.work(min(amount - made, self._batch)))
+            made += more
+            if not more and solver.poll().converged:
+                break  # nothing is left to do but what an edit asked for
             if made < amount:
                 self._gpu.ctx.finish()
                 spent = (time.perf_counter() - start) * 1e3
                 self._batch = max(1, int((budget_ms - spent) / (spent / max(made, 1))))
                 if spent >= budget_ms:
                     break
+        self._unit = (time.perf_counter() - start) * 1e3 / max(made, 1)
         return made
 
     def lap(self) -> float:
@@ -89,12 +117,19 @@ class Pacer:
         return self._bands
 
     def _advance_some(self, solver: Solver[Any], start: float, budget_ms: float) -> int:
-        """Parts of one unit of work, as many as the budget allows."""
-        while (time.perf_counter() - start) * 1e3 < budget_ms:
-            self._parts = self._parts or solver.work(1, self._bands)
+        """Parts of work, as many as the budget allows, with no more than one unit begun."""
+        begun, made, anew = start, 0, False
+        while (begun - start) * 1e3 < budget_ms:
+            if self._parts is None:
+                if anew:
+                    break
+                self._parts, self._so_far, anew = solver.work(1, self._bands), 0.0, True
             if next(self._parts, OVER) is OVER:
                 self._parts = None
             self._gpu.ctx.finish()
+            now = time.perf_counter()
+            part, begun = (now - begun) * 1e3, now
+            self._part, self._so_far = max(PART_STAYS * self._part, part), self._so_far + part
             if self._parts is None:
-                return 1
-        return 0
+                self._unit, made = self._so_far, made + 1
+        return made

@@ -111,6 +111,14 @@ class Run:
         self._energy.edited()
         self.settled = False
 
+    def flicker(self, materials: tuple[Material, ...]) -> None:
+        """Other emissions for this frame, of lamps that flicker: no edit that history and effort are told of, and the energy
+        balance waits for the last."""
+        self.solver.set_materials(materials)
+        self.progress = self.solver.poll()
+        self._energy.edited()
+        self.settled = False
+
     # -- where it stands -----------------------------------------------------------------------------------------------
 
     @property
@@ -156,20 +164,21 @@ class Run:
         self.settled = False
         return run_to_end(self.solver.work(amount))
 
-    def poll(self, *, energy: bool = True) -> bool:
-        """Take in what the solver reports; the energy balance now and then, and once when solving has stopped. Whether that took
-        long. Raises NotFiniteError and pauses."""
+    def poll(self, *, energy: bool = True, interactive: bool = False) -> bool:
+        """Take in what the solver reports; the energy balance now and then, and once when solving has stopped. interactive: a
+        hand is at the controls, what can wait does. Whether that took long. Raises NotFiniteError and pauses."""
         before, slow = self.progress.done, False
+        wanted = energy and self._energy.may_measure(interactive=interactive)
         self.progress = self.solver.poll()
         if self.running and not np.isfinite(self.progress.remaining):
             self.running = False
             raise self._not_finite()
         if not self.goes_on:
             self._pace.pause()
-            if energy and self._energy.idle and not self.settled:
+            if wanted and not self.settled:
                 slow = True
                 self.settle()
-        elif energy and self._energy.due:
+        elif wanted and self._energy.due:
             slow = True
             self._energy.measure(self.solver)
         if self.converged:

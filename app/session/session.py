@@ -22,6 +22,7 @@ from app.options import Options
 from app.scene.model import F64, Material, Scene
 from app.session.compared import Compared
 from app.session.error_estimate import SECONDS, RunningEstimate
+from app.session.flicker import flickering
 from app.session.loading import Loading, load
 from app.session.opening import Opened, Opening, Prepare, Ready
 from app.session.run import Run, Stop
@@ -65,6 +66,7 @@ class Session:
         self._opening = Opening(gpu)
         self._on_open: Opened | None = None
         self._opened = self._busy = False
+        self._steady: Scene | None = None  # as it was edited, while its lamps flicker
         self._then_reference: Path | None = None
 
     def follow(self, prepare: Prepare, opened: Opened) -> None:
@@ -102,7 +104,8 @@ class Session:
             self._busy = True
             self._open_part(self.loading)
         elif self._opened:
-            self._busy = self.run.poll()
+            self._busy = self.run.poll(interactive=interactive)
+            self._flicker()
         if self._choice.has_arrived:
             self._busy = True
             self._end_switching()
@@ -137,8 +140,9 @@ class Session:
             lightmap.release()
             raise
         same_scene = self._opened and scene is self.unedited
+        flickers = same_scene and self.flickers
         if same_scene and self.scene is not scene:
-            lightmap.set_materials(self.scene.materials)
+            lightmap.set_materials(self.materials)
             solver.reset()
         self.close()
         self.lightmap, self.solver, self.unedited = lightmap, solver, scene
@@ -155,6 +159,7 @@ class Session:
         if self._then_reference is not None:
             self.compared.open(self._then_reference)
             self._then_reference = None
+        self.set_flicker(flickers)
         self.set_solver(chosen)
 
     def close(self) -> None:
@@ -164,7 +169,7 @@ class Session:
             self.estimate.release()
             self.solver.release()
             self.lightmap.release()
-            self._opened = False
+            self._opened, self._steady = False, None
 
     def release(self) -> None:
         self._opening.stop()
@@ -290,6 +295,8 @@ class Session:
 
     def _switch(self, name: str) -> None:
         if self._opened:
+            if not SOLVERS[name].relights:
+                self.set_flicker(False)
             solver = SOLVERS[name].make(self.gpu, self.lightmap, self._choice.options[name])
             self.solver.release()  # only now: the other one might not have been had
             self.solver = solver
@@ -320,13 +327,49 @@ class Session:
             else:
                 self.run.options_changed()
 
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """Of ``edited_scene``."""
+        return self.edited_scene.materials
+
+    @property
+    def edited_scene(self) -> Scene:
+        """The open scene as it was edited; that of the lightmap may flicker."""
+        return self._steady or self.scene
+
     def set_material(self, index: int, material: Material) -> None:
         """Another albedo or emission: charts and texels stay, and the light where the solver can solve for the difference."""
-        materials = list(self.scene.materials)
+        materials = list(self.materials)
         materials[index] = material
-        self.run.set_materials(tuple(materials))
+        self.set_materials(tuple(materials))
+
+    def set_materials(self, materials: tuple[Material, ...]) -> None:
+        """The same for all of them at once."""
+        if self._steady is not None:
+            self._steady = self._steady.with_materials(materials)
+        self.run.set_materials(materials)
         if self.solver.issued == 0:
             self._light_begins()
+
+    @property
+    def flickers(self) -> bool:
+        """Whether lamps flicker."""
+        return self._steady is not None
+
+    def set_flicker(self, on: bool) -> None:
+        """Let all lamps flicker from frame to frame, where the solver at work follows within one; or let them be as they were
+        edited again."""
+        if on and not self.flickers and self.family.relights:
+            self._steady = self.scene
+        elif not on and self._steady is not None:
+            steady, self._steady = self._steady, None
+            self.run.flicker(steady.materials)
+
+    def _flicker(self) -> None:
+        """Once per frame: lamps as bright as they are now, once there is light."""
+        if self._steady is not None and self.run.running and self.solver.issued > 0:
+            self.estimate.changed()
+            self.run.flicker(flickering(self._steady.materials, time.perf_counter()))
 
     def _begin(self) -> None:
         """With a solver that has done no work."""
@@ -374,7 +417,7 @@ class Session:
     def _state(self) -> object:
         """All that the light depends on: another one where the light is another."""
         shown = tuple(getattr(self.solver.options, name) for name in self.family.shows)
-        return self.solver.issued, self.lightmap.version, self.lightmap.scene, shown
+        return self.solver.issued, self.lightmap.version, self.edited_scene, shown
 
     # -- what is known -------------------------------------------------------------------------------------------------
 

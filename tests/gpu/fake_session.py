@@ -112,6 +112,7 @@ class FakeSession:
             "imgui": 1.4,
         }
         self.image = None
+        self.flickers = False
         self.picked = None
         self.insets: list[tuple[tuple[int, int], bool]] = []
 
@@ -133,6 +134,18 @@ class FakeSession:
         self.compared.comparison = SimpleNamespace(
             light=light, error=error, lit=4001, errors=FakeErrors(), notes=lambda lightmap: ["a note"]
         )
+
+    @property
+    def edited_scene(self) -> SimpleNamespace:
+        return self.scene
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        return self.scene.materials
+
+    def set_flicker(self, on: bool) -> None:
+        self.flickers = on
+        self.calls.append(("set_flicker", on))
 
     @property
     def chosen_solver(self) -> str:

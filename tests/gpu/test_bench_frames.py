@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -40,3 +41,26 @@ def test_drags_are_measured(monkeypatch: pytest.MonkeyPatch, capfd: pytest.Captu
         assert 0 <= row["slow_frames"] <= row["frames"]
     text = frames._drag_table(values)
     assert "dragging gradient, 16 frames" in text and "dragging depth, 16 frames" in text
+
+
+WALK = """
+seconds = 0.3
+[[key]]
+position = [0.2, 0.2, 0.2]
+target = [0.3, 0.3, -0.5]
+[[key]]
+position = [0.35, 0.2, 0.1]
+target = [0.3, 0.3, -0.5]
+"""
+
+
+def test_a_walk_is_measured(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "walk.toml"
+    path.write_text(WALK)
+    command = ["bench", "frames", "cornell-box", "--texels", "1500", "--solver", "local", "--patches", "128"]
+    assert run([*command, "--walk", str(path), "--json"]) == 0
+    values = json.loads(capfd.readouterr().out)
+    assert values["frames"] == 9, "a thirtieth of a second each, whatever the path says"
+    assert 0 < values["median_ms"] <= values["p99_ms"] <= values["worst_ms"]
+    assert 0 <= values["nodes_to_come"] <= 128
+    assert "a walk of 9 frames" in frames._walk_table(values)

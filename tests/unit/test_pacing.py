@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from app.session import pacing
@@ -88,4 +89,47 @@ def test_work_per_second_is_that_of_late(seconds: float) -> None:
     for nth in range(10):
         history.add(16 * nth, seconds * nth, 0.5, 0.0)
     history.add(16 * 9, seconds * 9 + 1e-4, 0.4, 0.0)
-    assert history.work_per_second == pytest.approx(16 / seconds, rel=0.05)
+    assert history.work_per_second() == pytest.approx(16 / seconds, rel=0.05)
+    later = [history.work_per_second(9 * seconds + wait) for wait in (0.0, 20.0, 200.0)]
+    assert later[0] >= later[1] >= later[2] and later[2] < 0.1 * later[0], "nothing was heard of since"
+
+
+class Long:
+    """A solver of which each unit is ten parts. parts: how many of them in this frame."""
+
+    def __init__(self, clock: Clockwork) -> None:
+        self.clock, self.parts = clock, 0
+
+    def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
+        for _ in range(10):
+            self.clock.now += PART * 1e-3
+            self.parts += 1
+            yield
+        return amount
+
+
+def held_frames(clock: Clockwork, rest: float, count: int) -> list[tuple[int, int]]:
+    """Parts and units of each frame while a hand is at the controls, of which drawing takes so long [s]."""
+    pace, solver, found = pacer(), Long(clock), []
+    for _ in range(count):
+        solver.parts = 0
+        made = pace.advance(solver, 30.0, 1, interactive=True)  # type: ignore[arg-type]
+        found.append((solver.parts, made))
+        clock.now += rest
+    return found
+
+
+@pytest.mark.parametrize(("rest", "fits"), [(0.010, 7), (0.020, 4), (0.040, 2)])
+def test_a_frame_with_a_hand_gets_what_drawing_leaves(clockwork: Clockwork, rest: float, fits: int) -> None:
+    """The first two may take too long: nothing is known of units and parts."""
+    parts = [parts for parts, _ in held_frames(clockwork, rest, 40)][2:]
+    assert max(parts) <= fits, "a frame ends in time"
+    assert np.mean(parts[5:]) > fits - 2, "and is used"
+
+
+def test_a_frame_goes_on_with_the_next_unit(clockwork: Clockwork) -> None:
+    """With one at most that it begins itself."""
+    frames = held_frames(clockwork, 0.010, 40)[5:]
+    short = [parts for parts, made in frames if made]
+    assert len(short) > 5 and min(short) >= 5
+    assert all(made <= 1 for _, made in frames)

@@ -5,7 +5,8 @@ solve, build the interface and draw it with the view, wait until the GPU has don
 time is its own. CPU time is that of the whole process over all cores: on a software rasteriser it includes the GPU's work, and
 other programs on the machine do not change it.
 
-With ``--drag`` a hand moves the sliders of the quadtrees meanwhile, a little in each frame: see slider_drag.py.
+With ``--drag`` a hand moves the sliders of the quadtrees meanwhile, a little in each frame: see slider_drag.py. With ``--walk``
+the eye walks along a path, a thirtieth of a second of it in each frame, once what is around its beginning is lit.
 """
 
 from __future__ import annotations
@@ -22,9 +23,12 @@ from app.commands.steps import session_options
 from app.errors import UserError
 from app.gpu import Gpu, gpu_context
 from app.lightmap.options import LightmapOptions
+from app.render.camera import CameraView
+from app.render.camera_path import load_path
 from app.session.pacing import Turns
 from app.session.session import Session
 from app.session.view import View
+from app.solvers.local.solver import Local
 from app.ui.app import Ui
 from app.ui.state import Pace
 from app.util.console import Console
@@ -34,7 +38,9 @@ SIZE = (1280, 720)
 PARTS = ("poll", "solve", "draw")
 WARM_UP = 30  # frames: shaders are compiled, the panels stand
 FRAMES = 300
-SLOW = 1e3 / 30  # ms
+FRAMES_PER_SECOND = 30.0  # of a walk
+SLOW = 1e3 / FRAMES_PER_SECOND  # ms
+STANDING = 60.0  # s at most, in which what is around the beginning of a walk is lit
 GROWTH = 1.0  # s from opening on, in which a tree has grown visibly
 
 
@@ -50,13 +56,17 @@ def bench_frames(flags: argparse.Namespace) -> int:
         session.open(flags.scene)
         viewer = _Viewer(gpu, view)
         try:
-            times = _measure_drags(viewer, tell) if flags.drag else _measure(viewer)
+            if flags.walk:
+                times = _measure_walk(viewer, flags.walk, tell)
+            else:
+                times = _measure_drags(viewer, tell) if flags.drag else _measure(viewer)
         finally:
             viewer.release()
         values = {"scene": session.name, "renderer": gpu.limits.renderer, "texels": session.stats.texels, **times}
         view.release()
         session.release()
-    console.result(values, _drag_table(values) if flags.drag else _table(values))
+    table = _drag_table if flags.drag else _walk_table if flags.walk else _table
+    console.result(values, table(values))
     return 0
 
 
@@ -81,11 +91,14 @@ class _Viewer:
             raise UserError(self.session.message or f"{self.session.name}: did not open")
         return rows
 
-    def frame(self, light: LightmapOptions | None = None) -> list[float]:
-        """One frame: milliseconds by part, and of CPU time. light: the options that a hand at a slider asks for."""
-        session, held = self.session, light is not None
+    def frame(self, light: LightmapOptions | None = None, camera: CameraView | None = None) -> list[float]:
+        """One frame: milliseconds by part, and of CPU time. light: the options that a hand at a slider asks for; camera: where it
+        leads the eye."""
+        session, held = self.session, light is not None or camera is not None
+        if camera is not None:
+            self._view.camera = camera
         cpu, clock = time.process_time(), [time.perf_counter()]
-        session.poll()
+        session.poll(interactive=held)
         self._view.tell_observer()
         clock.append(time.perf_counter())
         solve, look = self._turns.next(self._seconds) if session.solving else (False, True)
@@ -137,6 +150,24 @@ def _measure_drags(viewer: _Viewer, tell: Callable[[str, float], None]) -> dict[
     return {"leaves_opened": opened, "leaves_after_1_s": grown, "drags": drags}
 
 
+def _measure_walk(viewer: _Viewer, source: str, tell: Callable[[str, float], None]) -> dict[str, Any]:
+    """Frames along a path, once the light at its beginning stands."""
+    cameras = load_path(source, frames_per_second=FRAMES_PER_SECOND).cameras
+    viewer.open()
+    session, start = viewer.session, time.perf_counter()
+    viewer.frame(camera=cameras[0])
+    while not session.run.converged and time.perf_counter() - start < STANDING:
+        tell("lighting the beginning", (time.perf_counter() - start) / STANDING)
+        viewer.frame()
+    rows, to_come = [], []
+    for nth, camera in enumerate(cameras):
+        tell("walking", nth / len(cameras))
+        rows.append(viewer.frame(camera=camera))
+        local = session.solver
+        to_come.append(local.to_come if isinstance(local, Local) else 0)
+    return _summary(rows) | {"nodes_to_come": float(np.mean(to_come))}
+
+
 def _summary(rows: list[list[float]]) -> dict[str, Any]:
     """Of frames as ``_Viewer.frame`` returns them."""
     parts, cpu = np.array(rows)[:, :-1], np.array(rows)[:, -1]
@@ -165,6 +196,19 @@ def _table(values: dict[str, Any]) -> str:
         f"median {values['median_ms']:.1f} ms ({1e3 / values['median_ms']:.0f} frames/s), "
         f"99 % below {values['p99_ms']:.1f} ms, worst {values['worst_ms']:.1f} ms, CPU {values['cpu_ms']:.1f} ms",
         f"while the scene opens, and the first {WARM_UP} frames after: worst {values['opening_worst_ms']:.1f} ms",
+        *_parts(values["parts_ms"]),
+    ]
+    return "\n".join(lines)
+
+
+def _walk_table(values: dict[str, Any]) -> str:
+    lines = [
+        _title(values),
+        "",
+        f"a walk of {values['frames']} frames: median {values['median_ms']:.1f} ms, 99 % below {values['p99_ms']:.1f} ms, "
+        f"worst {values['worst_ms']:.1f} ms, {values['frames_per_second']:.1f} frames/s, CPU {values['cpu_ms']:.1f} ms",
+        f"{values['slow_frames']} frames above {SLOW:.0f} ms; {values['nodes_to_come']:.0f} nodes of a local set still to come, "
+        "on average",
         *_parts(values["parts_ms"]),
     ]
     return "\n".join(lines)

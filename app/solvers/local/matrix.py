@@ -19,6 +19,8 @@ Updates wait as vectors, a few of them, until one pass over the matrix adds them
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator, Sized
 from typing import Any
 
 import numpy as np
@@ -180,6 +182,10 @@ class LocalMatrix:
                 viewport=viewport,
             )
 
+    def has_room(self, leave: Sized, enter: Sized) -> bool:
+        """Whether so many nodes can leave and enter with no pass over the matrix between."""
+        return not self.coloured or self._pending + len(leave) + 2 * len(enter) <= PENDING
+
     def _make_room(self, vectors: int) -> None:
         """Let so many more vectors wait."""
         if self._pending + vectors > PENDING:
@@ -187,14 +193,24 @@ class LocalMatrix:
 
     def flush(self) -> None:
         """Add all updates that wait."""
-        if self._pending:
+        for _ in self.flush_in(1):
+            pass
+
+    def flush_in(self, bands: int) -> Iterator[None]:
+        """Add all updates that wait, in so many parts: the matrix is to be left alone until the last."""
+        if not self._pending:
+            return
+        edges = (self.most * np.sqrt(np.linspace(0.0, 1.0, bands + 1))).astype(int).tolist()  # parts of the half alike
+        for first, last in itertools.pairwise(edges):
             self._flush.draw(
                 self._targets[self._matrix],
                 textures={"t_waiting": self._waiting},
                 uniforms={"u_pending": self._pending, "u_scale": self._scale, "u_texel": 1 / self.most},
+                scissor=(0, first, self.most, last - first),
                 blend="add",
             )
-            self._pending = 0
+            yield
+        self._pending = 0
 
     # -- light ---------------------------------------------------------------------------------------------------------
 

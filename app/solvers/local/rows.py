@@ -72,13 +72,7 @@ class Rows:
 
     def set_memory(self, mebibytes: int, least: int) -> None:
         """Keep so many at most. Raises UserError."""
-        most = mebibytes * 2**20 // (self.rays * BYTES)
-        if most < 2 * least:
-            raise UserError(
-                f"--row-memory {mebibytes}: {2 * least} rows of {self.rays} rays take "
-                f"{-(-2 * least * self.rays * BYTES // 2**20)} MiB"
-            )
-        self._most = most
+        self._most = rows_in(mebibytes, self.rays, least)
 
     def _digest(self) -> str:
         """Of all that rows follow from."""
@@ -207,3 +201,14 @@ class Rows:
     def release(self) -> None:
         self.save()
         self._gpu.release_all(self.places)
+
+
+def rows_in(mebibytes: int, rays: int, least: int) -> int:
+    """How many rows of so many rays are in that memory. Raises UserError where a local set of ``least`` nodes needs more."""
+    most = mebibytes * 2**20 // (rays * BYTES)
+    if most < 2 * least:
+        raise UserError(
+            f"--row-memory {mebibytes}: {2 * least} rows of {rays} rays take "
+            f"{-(-2 * least * rays * BYTES // 2**20)} MiB"
+        )
+    return most

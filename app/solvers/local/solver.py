@@ -28,7 +28,7 @@ from app.solvers.local.lighting import SWEEPS, Lighting
 from app.solvers.local.matrix import ROW, LocalMatrix
 from app.solvers.local.options import LocalOptions
 from app.solvers.local.patches import patch_count, patches_of
-from app.solvers.local.rows import Rows
+from app.solvers.local.rows import Rows, rows_in
 from app.solvers.local.selection import Selection, Swap, swaps
 from app.util.parts import is_running, run_to_end
 from app.visibility.origins import Origins
@@ -45,6 +45,7 @@ NEAR_TILES, TILES_IN_TURN = 128, 64  # whose light is shown anew in each picture
 LEFT, MOST_REFLECTED = 1e-4, 0.99  # of light, that bounces may leave; mean albedo that their number allows for
 OUTSIDE_BOUNCES = 8  # between the set and what is outside of it
 FADE, FADED = 0.75, 16  # share of what was shown that stays in each picture after nodes came and went, and for how many
+FLUSH_PARTS = 3  # of the pass over the matrix that all updates wait for: whole, it takes a third of a frame
 DRIFT = 1e-3  # of a diagonal, beyond which its node enters anew
 BATCH = 64
 
@@ -93,6 +94,7 @@ class Local:
             raise UserError(
                 f"--matrix-memory {options.matrix_memory}: the matrix of {most} patches takes {mebibytes:.0f} MiB"
             )
+        rows_in(options.row_memory, options.rays, most)  # before anything is released
         matrix = LocalMatrix(gpu, most, options.bounces, options.bits)
         self._release_parts()
         self._parts.append(matrix)
@@ -111,10 +113,10 @@ class Local:
         """What a frame has time for: nodes that enter and leave, at most as many as the options say, or shadow rays; and the
         light of both. Returns how many nodes have entered."""
         self._finish()
-        self._under_way = self._piece()
+        self._under_way = self._piece(bands)
         return self._under_way
 
-    def _piece(self) -> Generator[None, None, int]:
+    def _piece(self, bands: int) -> Generator[None, None, int]:
         if self._edited:
             yield from self._follow_edit()
             return 0
@@ -124,21 +126,26 @@ class Local:
         self._editing, self._all_known = False, True
         entered, tiles = 0, self._next_tiles()
         if self._is_dark_here:
-            yield from self._shoot(tiles)
+            yield from self._shoot(tiles, bands)
         else:
             yield from self._make_rows()
             if plan := self._plan():
-                entered = yield from self._swap(plan)
+                entered = yield from self._swap(plan, bands)
             elif len(tiles):
-                yield from self._shoot(tiles)
+                yield from self._shoot(tiles, bands)
+        if self._edited:
+            yield from self._follow_edit()
+            return entered
         self._relight()
+        yield
         self._fading = FADED if entered else max(self._fading - 1, 0)
         self._compose(all_=self._fading == 0, stays=FADE if self._fading else 0.0)
         return entered
 
-    def _shoot(self, tiles: I64) -> Generator[None, None, None]:
+    def _shoot(self, tiles: I64, bands: int) -> Generator[None, None, None]:
         """One pass of shadow rays more from these tiles."""
-        yield from self.direct.shoot_from(tiles)
+        for some in np.array_split(tiles, min(bands, len(tiles))):
+            yield from self.direct.shoot_from(some)
         self.direct.sum(self.lightmap.scene, tiles)
         self._lit = False
 
@@ -248,15 +255,16 @@ class Local:
             self._stale = [int(node) for node in held.node[(drifted | other) & (held.node >= 0)]]
         return self._stale
 
-    def _swap(self, plan: list[Swap]) -> Generator[None, None, int]:
-        """Carry out as much of the plan as a piece of work may."""
+    def _swap(self, plan: list[Swap], bands: int) -> Generator[None, None, int]:
+        """Carry out as much of the plan as a piece of work may; less where an edit waits for it to end."""
         at_once, diagonals = self.options.swaps, dict[int, float]()
         if self._filling:
             at_once = FILLING
             diagonals = dict(zip(self._wanted.tolist(), self.set.diagonals(self._wanted).tolist(), strict=True))
         entered: list[int] = []
         for swap in plan:
-            if entered and len(entered) + len(swap.enter) > at_once:
+            full = len(entered) + len(swap.enter) > at_once or not self.matrix.has_room(swap.leave, swap.enter)
+            if entered and (full or self._edited):
                 break
             yield
             for node in swap.leave:
@@ -270,6 +278,7 @@ class Local:
         self.issued += len(entered)
         self._frame += 1
         self._entered[entered] = self._frame
+        yield from self.matrix.flush_in(FLUSH_PARTS * bands)
         self.lighting.set_slots(self.set.slot_at)
         self._lit = False
         return len(entered)
@@ -313,14 +322,14 @@ class Local:
         if wait:
             self._finish()
         emits = self.lightmap.scene.emits
-        inside = self.set.slot[self._wanted] >= 0
-        here = float(np.mean(~inside)) if len(inside) else 0.0
+        wanted = max(len(self._wanted), 1)
+        here = self.to_come / wanted
         shadow = 0.0
         if self.direct.sets:
             some = self.lightmap.pool.slot_texels > 0
             asked = self.options.shadow_rays
             shadow = 1 - float(np.minimum(self.direct.fewest[some], asked).mean()) / asked
-        missing = max(here, shadow, float(bool(self._stale)) / max(len(inside), 1)) if emits else 0.0
+        missing = max(here, shadow, float(bool(self._stale)) / wanted) if emits else 0.0
         known = self._stale is not None and not self._stale and self._fading == self._bounces_left == 0
         done = not emits or (missing <= self.options.missing and known and not self._edited and self._all_known)
         return Progress(self.issued, missing if self.issued or not emits else 1.0, self._escaped, converged=done)
@@ -426,16 +435,16 @@ class Local:
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light of other lamps with the next piece of work; of other albedos, while nodes enter
         the set anew."""
-        self._finish()
         before = [m.albedo for m in self.lightmap.scene.materials]
         self.lightmap.set_materials(materials)
         if not self.issued:
             self.reset()
             return
         self._edited = True
+        self._finish()  # soon, and with the light of the edit
         if [m.albedo for m in materials] != before:
             self._set_albedo()
-            self._stale = None
+            self._stale, self._edited = None, True
 
     def _set_albedo(self) -> None:
         lightmap = self.lightmap
@@ -473,6 +482,11 @@ class Local:
     def wanted(self) -> I64:
         """The nodes that the set is to have, nearest first."""
         return self._wanted
+
+    @property
+    def to_come(self) -> int:
+        """How many of the nodes that are wanted are not in the set yet."""
+        return int((self.set.slot[self._wanted] < 0).sum())
 
     def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
         """What the set, its rows and its matrix are; of a texel, the node that it is in."""

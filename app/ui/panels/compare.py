@@ -93,7 +93,7 @@ def _expected(view: View) -> None:
     elif view.session.estimate.share > 0:
         imgui.progress_bar(view.session.estimate.share, imgui.ImVec2(-1, 0), "")
     else:
-        widgets.dim("known when shooting pauses or ends")
+        widgets.dim("known when solving pauses or ends")
     widgets.tooltip(EXPECTED)
 
 
@@ -146,7 +146,7 @@ def _solve(view: View, state: State) -> None:
             state.reference, starts={"texels": view.session.compared.reference_texels}
         )
         if imgui.button("Solve in the background", imgui.ImVec2(-1, 0)):
-            state.act(lambda: view.session.compared.solve(state.reference))
+            state.act(lambda: view.session.compared.solve(state.reference, view.session.edited_scene))
         widgets.tooltip(FINER)
         return
     imgui.progress_bar(fetching.fraction, imgui.ImVec2(-1, 0), "")

@@ -101,7 +101,7 @@ def _shares(
     if not _begin("residual", size, label):
         return
     family = view.session.family
-    name, of = ("residual", "emitted") if family.distributes else (family.remains, "mean")
+    name, of = ("residual", "emitted") if family.distributes else (family.remains, family.part_of)
     curves: dict[str, Curve] = {f"{name} / {of}": (x, residual, theme.AMBER)}
     if view.session.compared.comparison is not None:
         curves = {name: (x, residual, theme.AMBER)}  # all three names fit above the plot

@@ -29,8 +29,10 @@ def draw(view: View, state: State) -> None:
     _statistics(view, state)
     widgets.section("Materials")
     _list(view, state)
-    if state.material < len(view.session.scene.materials):
-        _editor(view, state, view.session.scene.materials[state.material])
+    if state.material < len(view.session.materials):
+        _editor(view, state, view.session.materials[state.material])
+    if view.session.family.relights:
+        _flicker(view, state)
     if widgets.fold("Texels", opened=has_room()):
         _atlas(view, state)
 
@@ -86,7 +88,7 @@ def _atlas(view: View, state: State) -> None:
 
 
 def _list(view: View, state: State) -> None:
-    materials = view.session.scene.materials
+    materials = view.session.materials
     height = min(len(materials), ROWS_SHOWN) * imgui.get_text_line_height_with_spacing()
     imgui.begin_child("materials", imgui.ImVec2(0, height))
     clipper = imgui.ListClipper()
@@ -121,6 +123,15 @@ def _editor(view: View, state: State, material: Any) -> None:
         notes.append("both sides")
     if notes:
         widgets.dim(", ".join(notes))
+
+
+def _flicker(view: View, state: State) -> None:
+    """Whether all lamps change from frame to frame."""
+    widgets.labelled("Lamps flicker")
+    changed, on = imgui.checkbox("##flicker", view.session.flickers)
+    widgets.tooltip("Each lamp gives a quarter more or less, a few times a second; off, all are as they were edited")
+    if changed:
+        state.act(lambda: view.session.set_flicker(on))
 
 
 def _albedo(material: Any) -> RGB:
