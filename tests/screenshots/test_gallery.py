@@ -49,7 +49,8 @@ class Picture:
 
 @dataclass(frozen=True)
 class Reel:
-    """Pictures of one solve of one scene, in the order in which the light gets there; coarse enough to be quick."""
+    """Pictures of one solve of one scene, in the order in which the light gets there; coarse enough to be quick. texels: 0 where
+    a density [1/m] is given."""
 
     scene: str
     texels: int
@@ -58,9 +59,11 @@ class Reel:
     size: tuple[int, int] = WIDE
     adaptive: bool = False
     solver: str = "shooting"
+    density: float | None = None
 
 
 GATHERING = SOLVERS["gathering"].options()
+NIGHT_EV = -0.5  # lamps are far brighter than what they light
 CORNELL_EV = 1.8  # automatic when solved; one for the whole series, so that it shows the light coming in
 REELS = (
     Reel(
@@ -122,6 +125,17 @@ REELS = (
     ),
     Reel("museum", 40_000, GATHERING, (Picture("museum-gathering", 512),), solver="gathering"),
     Reel("textured-room", 60_000, GATHERING, (Picture("textured-room-gathering", 128),), solver="gathering"),
+    Reel(
+        "village",
+        0,
+        SOLVERS["local"].options(shadow_rays=32),
+        (
+            Picture("village", camera=3, exposure=NIGHT_EV),
+            Picture("layer-local", camera=0, display={"layer": "local"}, exposure=NIGHT_EV),
+        ),
+        solver="local",
+        density=1.0,
+    ),
 )
 
 
@@ -129,7 +143,7 @@ REELS = (
 def test_the_gallery_looks_as_it_did(gpu: Gpu, reel: Reel, request: pytest.FixtureRequest) -> None:
     regenerate = request.config.getoption("--regenerate-screenshots")
     light = LightmapOptions(adaptive=reel.adaptive)
-    atlas = AtlasOptions(texels=reel.texels)
+    atlas = AtlasOptions(texels=reel.texels) if reel.density is None else AtlasOptions(density=reel.density)
     session = Session(gpu, solver=reel.solver, options=reel.options, atlas=atlas, light=light)
     view = View(session)
     try:
@@ -154,8 +168,9 @@ def test_the_gallery_looks_as_it_did(gpu: Gpu, reel: Reel, request: pytest.Fixtu
 
 
 def _taken(view: View, taken: Picture, size: tuple[int, int]) -> np.ndarray[Any, Any]:
-    view.session.solve(Stop(work=taken.work))
     view.look_through(view.session.scene.cameras[taken.camera])
+    view.tell_observer()
+    view.session.solve(Stop(work=taken.work))
     view.display = DisplayOptions(**taken.display)
     if taken.exposure is None:
         view.expose()
