@@ -186,7 +186,11 @@ def _frames_flags(frames: Parser, family: Family) -> None:
     hands = frames.add_mutually_exclusive_group()
     hands.add_argument("--drag", action="store_true", help="drag the sliders of the quadtrees (with --adaptive)")
     hands.add_argument(
-        "--walk", nargs="?", const="village", metavar="PATH", help="walk along a path: its name or .toml (default village)"
+        "--walk",
+        nargs="?",
+        const="village",
+        metavar="PATH",
+        help="walk along a path: its name or .toml (default village)",
     )
     json_flag(frames)
     solver_flags(frames, family)

@@ -20,7 +20,8 @@ def flicker(seconds: float, lamp: int) -> float:
 def flickering(materials: tuple[Material, ...], seconds: float) -> tuple[Material, ...]:
     """These materials with each lamp among them as bright as it is at that time."""
     return tuple(
-        _times(material, flicker(seconds, nth)) if material.emits else material for nth, material in enumerate(materials)
+        _times(material, flicker(seconds, nth)) if material.emits else material
+        for nth, material in enumerate(materials)
     )
 
 

@@ -58,7 +58,9 @@ def stats_of(run: Run, lightmap: Lightmap) -> Stats:
         escaped=float(balance.escaped.sum()),
         unshot=float(balance.unshot.sum()),
         imbalance=balance.imbalance_share,
-        per_second=progress.done / run.seconds if done and run.seconds > 0 else run.history.work_per_second(run.seconds),
+        per_second=progress.done / run.seconds
+        if done and run.seconds > 0
+        else run.history.work_per_second(run.seconds),
         converged=done,
         refining=progress.refining,
         note=progress.note,

@@ -62,12 +62,12 @@ def test_an_edit_in_the_middle_of_a_piece_of_work_is_shown_by_its_end(session: S
     work, before, to_come = local.work(1), local.issued, local.to_come
     while local.to_come == to_come > 0:
         next(work)
-    doubled = tuple(
-        type(m)(m.name, m.albedo, emission=tuple(2.0 * e for e in m.emission)) for m in session.materials
-    )
+    doubled = tuple(type(m)(m.name, m.albedo, emission=tuple(2.0 * e for e in m.emission)) for m in session.materials)
     direct = light_of_lamps(local)
     local.set_materials(doubled)
-    assert next(work, "over") == "over" and 0 < local.issued - before < local.options.swaps, "what was begun ended early"
+    assert next(work, "over") == "over" and 0 < local.issued - before < local.options.swaps, (
+        "what was begun ended early"
+    )
     np.testing.assert_allclose(light_of_lamps(local), 2 * direct, rtol=1e-5)
 
 
