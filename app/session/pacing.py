@@ -47,7 +47,10 @@ class Pacer:
     def begin(self) -> None:
         """Forget how fast the last solve was."""
         self._last = self._start = 0.0
-        self._unit = self._so_far = self._part = self._rest = self._solved = 0.0  # ms: see _advance_some, _left
+        self._unit = self._so_far = 0.0  # ms that the last unit of work took, and the one under way so far
+        self._part = self._solved = self._rest = (
+            0.0  # ms: the longest part of late; of the last frame, solving; all else
+        )
         self._batch = self._bands = 1
         self._parts: Generator[None, None, int] | None = None  # of one unit of work, over several frames
 

@@ -76,7 +76,7 @@ class FakeCompared:
     def open(self, path: Path) -> None:
         self._calls.append(("open_reference", str(path)))
 
-    def solve(self, options: object) -> None:
+    def solve(self, options: object, scene: object) -> None:
         self._calls.append(("solve_reference", options))
 
     def stop_fetching(self) -> None:

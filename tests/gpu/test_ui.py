@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,7 +19,7 @@ from app.errors import UserError
 from app.gpu import Gpu, ShaderError
 from app.options import Options, specs
 from app.render.options import DisplayOptions
-from app.solvers import ShootingOptions
+from app.solvers import SOLVERS, ShootingOptions
 from app.ui import overlays, widgets
 from app.ui.app import Ui
 from app.ui.file_dialog import readable
@@ -205,6 +206,14 @@ def test_a_lamp_that_was_switched_off_keeps_its_colour(desk: Desk, monkeypatch: 
         monkeypatch.setattr(imgui, "slider_float", lambda label, *_, s=strength: (label == "##strength", s))
         desk.frames()
     np.testing.assert_allclose(desk.session.scene.materials[3].emission, (5.0, 5 * 12 / 17, 5 * 4 / 17), rtol=1e-12)
+
+
+@pytest.mark.parametrize("solver", list(SOLVERS))
+def test_lamps_flicker_where_the_solver_can_follow(desk: Desk, monkeypatch: pytest.MonkeyPatch, solver: str) -> None:
+    desk.session.family = replace(desk.session.family, relights=SOLVERS[solver].relights)
+    monkeypatch.setattr(imgui, "checkbox", lambda label, on: (label == "##flicker", True))
+    desk.frames(1)
+    assert (("set_flicker", True) in desk.session.calls) == (solver in ("gathering", "local"))
 
 
 # -- the rest ----------------------------------------------------------------------------------------------------------

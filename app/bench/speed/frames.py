@@ -207,8 +207,7 @@ def _walk_table(values: dict[str, Any]) -> str:
         "",
         f"a walk of {values['frames']} frames: median {values['median_ms']:.1f} ms, 99 % below {values['p99_ms']:.1f} ms, "
         f"worst {values['worst_ms']:.1f} ms, {values['frames_per_second']:.1f} frames/s, CPU {values['cpu_ms']:.1f} ms",
-        f"{values['slow_frames']} frames above {SLOW:.0f} ms; {values['nodes_to_come']:.0f} nodes of a local set still to come, "
-        "on average",
+        f"{values['slow_frames']} frames above {SLOW:.0f} ms; nodes of a local set still to come: {values['nodes_to_come']:.0f}",
         *_parts(values["parts_ms"]),
     ]
     return "\n".join(lines)
