@@ -225,7 +225,7 @@ def _tables_flags(tables: Parser, family: Family) -> None:
         "--only",
         type=_table_names,
         metavar="A,B",
-        help="coombe1, equal, wallner1, scaling, convergence, wallner2, kahl (default all)",
+        help="coombe1, equal, wallner1, scaling, convergence, wallner2, kahl, shcherbakov (default all)",
     )
     tables.add_argument(
         "--seconds",
