@@ -59,6 +59,7 @@ class LocalWalk:
     foreseen: float | None = None
     indirect: Differences = field(default_factory=Differences)
     indirect_near: Differences = field(default_factory=Differences)
+    indirect_inside: Differences = field(default_factory=Differences)
     total: Differences = field(default_factory=Differences)
     total_near: Differences = field(default_factory=Differences)
     pictures: list[float] = field(default_factory=list)
@@ -114,6 +115,9 @@ def _compare(done: LocalWalk, made: Local, whole: WholeSolution, camera: CameraV
     indirect = shown - whole.direct
     done.total.add(shown, whole.total)
     done.indirect.add(indirect, whole.indirect)
+    inside = made.set.slot[: patches.count] >= 0  # patches themselves, not in a cluster
+    if inside.any():
+        done.indirect_inside.add(indirect[inside], whole.indirect[inside])
     if near.any():
         done.total_near.add(shown[near], whole.total[near])
         done.indirect_near.add(indirect[near], whole.indirect[near])

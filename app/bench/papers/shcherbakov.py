@@ -114,6 +114,8 @@ def differences(walked: LocalWalk) -> Row:
     return {
         "step_ms": statistics.median(walked.step_ms),
         "swaps": walked.swapped / len(walked.step_ms),
+        "indirect_inside": walked.indirect_inside.mean,
+        "indirect_inside_p99": walked.indirect_inside.p99,
         "indirect_near": walked.indirect_near.mean,
         "indirect_near_p99": walked.indirect_near.p99,
         "indirect": walked.indirect.mean,
@@ -175,7 +177,8 @@ TABLE = Table(
         "lamp, in all bounces. As theirs (figure 4): iterate is plain radiosity, "
         f"{PLAIN_SWEEPS} multiplications from nothing; frame: that, or the product, and one swap.",
         f"Walk: a piece of work for each of {STEPS} steps, every {EVERY}th compared with the whole solution, of all patches, the "
-        f"same rays and the same direct light: mean of |ΔH|, and what 99 % of texels are below, over the mean of H; near: within "
+        "same rays and the same direct light: mean of |ΔH|, and what 99 % of texels are below, over the mean of H; in the set: "
+        "of patches that are not in a cluster; near: within "
         f"{NEAR:g} m. Pixels: mean |Δ| of pictures of {PICTURE[0]}×{PICTURE[1]} as displayed, in [0, 1], all pixels. Left out: "
         f"what would take more than {LONGEST} times as long as another measurement, as the first {FORESEEN} steps foresee.",
         "Update: what waits of one leaving and one entering node, added to the half of the matrix that is kept; copy: as many "
@@ -194,6 +197,8 @@ TABLE = Table(
         Column("frame_ms", "and a swap", ".2f"),
         Column("step_ms", "step of the walk ms", ".1f"),
         Column("swaps", "swaps in it", ".1f"),
+        Column("indirect_inside", "indirect, in the set", ".2%"),
+        Column("indirect_inside_p99", "99 %", ".1%"),
         Column("indirect_near", "indirect, near", ".2%"),
         Column("indirect_near_p99", "99 %", ".1%"),
         Column("indirect", "indirect, all", ".2%"),

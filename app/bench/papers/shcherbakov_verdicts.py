@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from app.bench.papers.kahl_verdicts import find, holds
+from app.bench.papers.kahl_verdicts import ALIKE, find, holds
 from app.bench.papers.published import SHCHERBAKOV_LOCAL
 from app.bench.speed.rank_one import PAIR
 from app.util.tables import Row
 
 SEVERAL = ("inverse", "series")  # the ways that keep a matrix of several reflections
-HALF = 0.5  # of the bandwidth of a copy
-FRAGMENTS = 0.75  # of an update's milliseconds, from which on its fragments are what bounds it
+NOTHING = "and nothing that was measured bounds it"
+HALF = 0.5  # of the bandwidth of a copy; less of it is not what bounds
 
 
 def verdicts(rows: list[Row]) -> list[str]:
@@ -20,22 +20,18 @@ def verdicts(rows: list[Row]) -> list[str]:
 
 
 def outperforms(rows: list[Row], key: str, when: str) -> str | None:
-    """At each size, each way to keep several reflections beside plain radiosity."""
-    better, worse, listed = list[str](), list[str](), list[str]()
+    """At each size each way to keep several reflections stands beside plain radiosity."""
+    found: dict[str, list[str]] = {"holds": [], "is undecided": [], "does not hold": []}
     for plain in find_sized(rows, "iterate"):
         for bounces in SEVERAL:
             for row in find(find_sized(rows, bounces), size=plain["size"]):
-                name = f"{row['size']:,} {bounces}"
-                (better if row[key] < plain[key] else worse).append(name)
-                listed.append(f"{name} {row[key]:.2f} ms for {plain[key]:.2f}")
-    if not listed:
-        return None
+                mine, theirs = row[key], plain[key]
+                right = ALIKE * mine <= theirs
+                verdict = "holds" if right else "does not hold" if mine >= ALIKE * theirs else "is undecided"
+                found[verdict].append(f"{row['size']:,} {bounces} {mine:.2f} ms for {theirs:.2f}")
     claim = f"The matrix of several reflections outperforms plain radiosity on the local set{when}"
-    if better and worse:
-        return (
-            f"{claim}: holds here at {', '.join(better)}, does not hold here at {', '.join(worse)}: {'; '.join(listed)}"
-        )
-    return holds(claim, not worse, "; ".join(listed))
+    judged = [f"{verdict} here, because {'; '.join(listed)}" for verdict, listed in found.items() if listed]
+    return f"{claim}: {'. It '.join(judged)}" if judged else None
 
 
 def find_sized(rows: list[Row], bounces: str) -> list[Row]:
@@ -55,23 +51,35 @@ def differs(rows: list[Row]) -> str | None:
 
 
 def updates(rows: list[Row]) -> str | None:
-    """At each size an update of rank one against a copy of as many bytes, and against its fragments: a constant colour, and what
-    two vectors add where more of them wait."""
+    """At each size an update of rank one is bound by memory, or by its fragments."""
     measured = [row for row in rows if row.get("update_ms") is not None]
     if not measured:
         return None
-    good, listed = True, list[str]()
-    for row in measured:
-        copy = row["copy_ms"] / row["update_ms"]
-        fragments = (row["constant_ms"] + PAIR * row["vector_ms"]) / row["update_ms"]
-        bound = "memory" if copy >= HALF else "fragments" if fragments >= FRAGMENTS else "neither"
-        good = good and bound != "neither"
-        listed.append(
-            f"{row['size']:,}: {copy:.0%} of the bandwidth of a copy, a constant colour and two vectors are {fragments:.0%} of "
-            f"its time, so {bound} bound{'s' if bound != 'fragments' else ''} it"
-        )
+    bounds = [bound(row) for row in measured]
+    listed = "; ".join(
+        f"{row['size']:,}: {row['copy_ms'] / row['update_ms']:.0%} of the bandwidth of a copy, {text}"
+        for row, text in zip(measured, bounds, strict=True)
+    )
     claim = f"Updates of rank one run at {HALF:.0%} of the bandwidth of a copy, or fragments bound them"
-    return holds(claim, good, "; ".join(listed))
+    return holds(claim, NOTHING not in bounds, listed)
+
+
+def bound(row: Row) -> str:
+    """An update is bound by memory if a copy of as many bytes takes half as long or more. If not, a constant colour blended over
+    the same triangle has the same bytes: where it is fast, the rest is what fragments compute; where it is slow beside a copy,
+    fragments are slow whatever they compute."""
+    update, constant = row["update_ms"], row["constant_ms"]
+    if row["copy_ms"] >= HALF * update:
+        return "which bounds it"
+    if constant < HALF * update:
+        vectors = PAIR * row["vector_ms"] / update
+        return (
+            f"but what its fragments compute bounds it: the same bytes in a constant colour take {constant / update:.0%} of its "
+            f"time, to read two vectors {vectors:.0%}"
+        )
+    if row["copy_ms"] < HALF * constant:
+        return f"but fragments bound it: a constant colour takes {constant / update:.0%} of its time"
+    return NOTHING
 
 
 def pays(rows: list[Row]) -> str | None:
