@@ -95,8 +95,8 @@ WALLNER_FIGURE_6 = {"hemicube": 3514, "stereographic": 4106}  # shootings until 
 
 @dataclass(frozen=True)
 class MatrixRow:
-    """Patches of a matrix of several reflections, its milliseconds and megabytes, and by how much pictures differ at most, on
-    average."""
+    """A matrix of several reflections has so many patches, and takes milliseconds and megabytes. difference: of pixels of its
+    picture is below this on average."""
 
     patches: int
     ms: float

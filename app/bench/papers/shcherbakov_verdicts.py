@@ -13,7 +13,7 @@ HALF = 0.5  # of the bandwidth of a copy; less of it is not what bounds
 
 
 def verdicts(rows: list[Row]) -> list[str]:
-    """A line for each claim that the rows can judge."""
+    """Each claim that the rows can judge has a line."""
     judged = [outperforms(rows, "lit_ms", ""), outperforms(rows, "frame_ms", ", with a swap in each frame")]
     judged += [differs(rows), updates(rows), pays(rows)]
     return [line for line in judged if line is not None]
@@ -35,12 +35,12 @@ def outperforms(rows: list[Row], key: str, when: str) -> str | None:
 
 
 def find_sized(rows: list[Row], bounces: str) -> list[Row]:
-    """Rows of local sets that bounce so."""
+    """The rows of local sets that bounce so are found."""
     return [row for row in rows if row.get("size") is not None and row["bounces"] == bounces]
 
 
 def differs(rows: list[Row]) -> str | None:
-    """The mean difference of pixels of all that walked."""
+    """The mean difference of pixels is judged in all rows that walked."""
     limit = SHCHERBAKOV_LOCAL.difference
     walked = [row for row in rows if row.get("picture") is not None]
     if not walked or limit is None:
@@ -83,8 +83,8 @@ def bound(row: Row) -> str:
 
 
 def pays(rows: list[Row]) -> str | None:
-    """From how many patches of the world on it is faster to light a local set than all patches, if that takes a time in
-    proportion to them."""
+    """A line says from how many patches of the world on it is faster to light a local set than all patches, if that takes a time
+    in proportion to them."""
     whole = [row for row in rows if row.get("size") is None and row.get("light_ms") is not None]
     sized = [row for bounces in (*SEVERAL, "iterate") for row in find_sized(rows, bounces)]
     if not whole or not sized:
