@@ -55,7 +55,7 @@ def test_a_row_is_measured(gpu: Gpu, small: Scene, bounces: str) -> None:
     assert row["frame_ms"] == pytest.approx(row["lit_ms"] + row["swap_ms"])
     assert all(row[key] > 0 for key in ("swap_ms", "light_ms", "lit_ms", "step_ms"))
     assert 0 < row["total"] < row["indirect"] < 2, "64 patches do not light a village, but add little to direct light"
-    assert row["indirect_inside"] < row["indirect"], "patches of the set are lit better than the world on average"
+    assert row["indirect_inside"] is None, "a set this small has clusters alone"
     assert row["indirect"] < row["indirect_p99"] and 0 < row["picture"] < 0.3
     assert (row.get("update_ms", 0) > 0) == (bounces == "inverse")
 
