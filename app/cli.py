@@ -233,14 +233,14 @@ def _tables_flags(tables: Parser, family: Family) -> None:
         "--only",
         type=_table_names,
         metavar="A,B",
-        help="coombe1, equal, wallner1, scaling, convergence, wallner2, kahl (default all)",
+        help="coombe1, equal, wallner1, scaling, convergence, wallner2, kahl, shcherbakov (default all)",
     )
     tables.add_argument(
         "--seconds",
         type=positive(float),
         default=2.0,
         metavar="S",
-        help="of each measurement, of a solve ten times as long; loading comes on top (default 2)",
+        help="of each measurement, of a solve ten times as long, of a walk thirty; loading comes on top (default 2)",
     )
     tables.add_argument("--plots", action="store_true", help="draw PNGs too (needs matplotlib)")
     json_flag(tables)

@@ -42,5 +42,6 @@ def lines(plot: Plot, rows: list[Row]) -> Iterator[tuple[str, int, int, list[tup
                 yield name, colour, style, group[0]["curve"]
             else:
                 label = y.replace("_", " ")
-                points = [(row[plot.x], row[y]) for row in group]
-                yield (f"{name}: {label}" if name else label), colour, style, points
+                points = [(row[plot.x], row[y]) for row in group if None not in (row.get(plot.x), row.get(y))]
+                if points:
+                    yield (f"{name}: {label}" if name else label), colour, style, points

@@ -1,4 +1,5 @@
-"""``glowtree bench tables``: the tables of [Coombe03], [Wallner10] and [Kahl22], ours beside theirs, on one machine in one run.
+"""``glowtree bench tables``: the tables of [Coombe03], [Wallner10], [Kahl22] and [Shcherbakov19], ours beside theirs, on one
+machine in one run.
 
 Theirs are published numbers of other scenes on other hardware: they show proportions. A table is a file of its own and a line of
 ``all_tables``. Its rows are measured one by one; what is finished is written when the rest is stopped.
@@ -14,7 +15,16 @@ from typing import Any
 
 from app.bake import prepare_directory
 from app.bench.machine import load, machine
-from app.bench.papers import convergence, coombe_subdivision, equal_error, kahl, scaling, wallner_rms, wallner_time
+from app.bench.papers import (
+    convergence,
+    coombe_subdivision,
+    equal_error,
+    kahl,
+    scaling,
+    shcherbakov,
+    wallner_rms,
+    wallner_time,
+)
 from app.bench.papers.table import Table
 from app.errors import UserError
 from app.gpu import Gpu, gpu_context
@@ -24,7 +34,7 @@ from app.util.tables import Row, csv_text, markdown_table, missing
 
 
 def all_tables() -> tuple[Table, ...]:
-    tables = coombe_subdivision, equal_error, wallner_time, scaling, convergence, wallner_rms, kahl
+    tables = coombe_subdivision, equal_error, wallner_time, scaling, convergence, wallner_rms, kahl, shcherbakov
     return tuple(module.TABLE for module in tables)
 
 

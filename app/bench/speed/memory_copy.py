@@ -6,14 +6,15 @@ from app.gpu import Gpu
 
 
 class MemoryCopy:
-    """An RGBA32F texture of ``size`` copied to another. moved: bytes that a run reads and writes."""
+    """An RGBA texture of ``size`` copied to another, of 32 bits a number unless ``dtype`` is f2. moved: bytes that a run reads
+    and writes."""
 
-    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+    def __init__(self, gpu: Gpu, size: tuple[int, int], dtype: str = "f4") -> None:
         self._gpu = gpu
-        self._textures = [gpu.texture(size, 4, "f4") for _ in range(2)]
+        self._textures = [gpu.texture(size, 4, dtype) for _ in range(2)]
         self._source, self._sink = (gpu.target(texture) for texture in self._textures)
         self._source.clear()
-        self.moved = 2 * 16 * size[0] * size[1]
+        self.moved = 2 * 4 * int(dtype[1]) * size[0] * size[1]
 
     def run(self) -> None:
         self._gpu.ctx.copy_framebuffer(self._sink, self._source)

@@ -112,16 +112,16 @@ class LocalSet:
 
     def diagonals(self, nodes: I64) -> F64:
         """(n,) F_ii of each of these nodes, in a set of all of them."""
-        factors, hit = self._counted(nodes)
+        factors, hit = self.among(nodes)
         return np.asarray(hit - factors.sum(1))
 
     def matrix(self) -> csr_array[np.float64]:
         """F (n, n) of ``nodes``, as the matrix on the GPU has it."""
-        factors, _ = self._counted(self.nodes)
+        factors, _ = self.among(self.nodes)
         diagonal = self.diagonal[self.node >= 0]
         return csr_array(factors + coo_array((diagonal, (np.arange(len(diagonal)),) * 2), shape=factors.shape))
 
-    def _counted(self, nodes: I64) -> tuple[csr_array[np.float64], F64]:
+    def among(self, nodes: I64) -> tuple[csr_array[np.float64], F64]:
         """F (n, n) among these nodes without its diagonal, and the share of each one's rays that hit one of them."""
         patches, rays, hits = self._patches, self._rows.rays, self._rows.of(nodes)
         place = np.full(len(patches.order) + 1, -1, np.int64)  # in ``nodes``, of each texel in order
