@@ -28,17 +28,19 @@ from app.solvers.shooting.solver import PICTURES, Shooting
 class Family:
     """A row of the table of solvers.
 
-    title: what the viewer calls it. options: the class of its options, each a flag and a widget. make: makes one for a lightmap,
-    or raises UserError before it has touched the light there. unit: of its work, in the plural, as in ``--shots``. remains: what
-    is left of what it has to do, as in "0.1 % unshot"; part_of: of what that is a share. batch: work that it does at once when
-    nothing waits for it. keeps_light: whether it can begin with light that another solver has left in the lightmap; else it
-    begins anew. threshold: the option that says how little may remain when it has converged. pictures: captions of the images of
-    its Inspection, and what they show.
+    title: what the viewer calls it. options: the class of its options, each a flag and a widget. make: makes one for a
+    lightmap, or raises UserError before it has touched the light there. unit: of its work, in the plural, as in ``--shots``.
+    remains: what is left of what it has to do, as in "0.1 % unshot"; part_of: of what that is a share. batch: work that it does
+    at once when nothing waits for it. keeps_light: whether it can begin with light that another solver has left in the
+    lightmap; else it begins anew. threshold: the option that says how little may remain when it has converged. pictures:
+    captions of the images of its Inspection, and what they show.
     shows: options that change the light that is shown without any work. layers: names of what its solvers know of every texel.
     distributes: whether what remains is light that is still to be distributed, in the energy balance; else it is an error.
     per_error: how little may remain where an expected error is asked for, as a share of that.
     relights: whether its next piece of work shows all light of other lamps, so that they may flicker from frame to frame.
     rays: whether it looks along rays, and so needs a tree of the scene's triangles (visibility/rays.py) before it is made.
+    everywhere: whether it lights all surfaces alike, wherever they are seen from; else what is far is known roughly.
+    quadratic: whether its work grows with the square of the texels.
     """
 
     title: str
@@ -59,6 +61,7 @@ class Family:
     per_error: float | None = None
     relights: bool = False
     rays: bool = False
+    everywhere: bool = True
 
 
 SOLVERS: dict[str, Family] = {
@@ -106,6 +109,7 @@ SOLVERS: dict[str, Family] = {
         distributes=False,
         relights=True,
         rays=True,
+        everywhere=False,
     ),
     "pairs": Family(
         title="Texel pairs",
