@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 CLICK_PX = 4.0  # a press that moved less is a click
 TURN_PER_VIEW = math.pi  # orbit angle for a drag over the view's height [rad]
 DOLLY_PER_NOTCH = 0.88  # factor on the distance for one notch of the wheel
-FLY_SPEED = 0.4  # scene radii per second
+FLY_SPEED = 0.4  # scene radii per second, but
+FASTEST = 5.0  # m/s at most: one walks through a large world
 FAST, SLOW = 4.0, 0.25  # with Shift, with Ctrl
 FOCUS_SHARE = 0.15  # of the scene's radius fills the view after a focus on a point
 FOCUS_SECONDS = 0.35
@@ -69,7 +70,8 @@ def _fly(view: View, state: State, io: Any, seconds: float) -> bool:
     step = [float(imgui.is_key_down(plus)) - float(imgui.is_key_down(minus)) for plus, minus in FLY]
     if any(step):
         state.flight = None
-        pace = FLY_SPEED * view.session.lightmap.space.scale * (FAST if io.key_shift else SLOW if io.key_ctrl else 1.0)
+        pace = min(FLY_SPEED * view.session.lightmap.space.scale, FASTEST)
+        pace *= FAST if io.key_shift else SLOW if io.key_ctrl else 1.0
         view.camera.fly(*(s * pace * seconds for s in step))
     return any(step)
 

@@ -154,6 +154,19 @@ def test_a_key_of_flight_holds_the_view(desk: Desk) -> None:
     assert not desk.ui.held and not desk.ui.moving
 
 
+@pytest.mark.parametrize(("scale", "speed"), [(1.0, 0.4), (100.0, 5.0)])
+def test_one_walks_through_a_large_world(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch, scale: float, speed: float
+) -> None:
+    monkeypatch.setattr(desk.session.lightmap.space, "scale", scale, raising=False)
+    desk.ui.io.add_key_event(imgui.Key.w, True)
+    desk.frames(1)
+    start = desk.session.camera.eye.copy()
+    desk.frames(10, seconds=0.1)
+    desk.ui.io.add_key_event(imgui.Key.w, False)
+    assert np.linalg.norm(desk.session.camera.eye - start) == pytest.approx(speed, rel=1e-3), "in a second"
+
+
 def test_an_error_becomes_a_toast(gpu: Gpu, where: dict[str, tuple[float, float]]) -> None:
     desk = Desk(gpu, FakeSession(), (1920, 1080))
 
