@@ -40,6 +40,7 @@ SIZES = (512, 1024, 2048, 4096)
 SHADOW_RAYS = 16
 PLAIN_SWEEPS = 3  # multiplications of plain radiosity, at least [Shcherbakov19, 3]
 FILLING = 64  # swaps in a piece of work, until the set is full
+FORETOLD = 8  # part of a set that has entered when it is known how long the rest will take
 LONGEST = 30  # times as long as another measurement that a set may take to be filled, and the walk again
 RAYS = 64  # of each texel, of which all hits are kept
 EDITS = 5  # that a median is of
@@ -81,13 +82,16 @@ def measure_row(
 
 def fill(gpu: Gpu, made: Local, seconds: float) -> None:
     """All nodes that are wanted enter the set. Raises UserError where that would take more than so many seconds."""
-    start, wanted = time.perf_counter(), len(made.wanted)
+    start, begun, wanted = time.perf_counter(), 0, len(made.wanted)
     while not made.poll().converged:
         run_to_end(made.work(1))
         gpu.ctx.finish()
-        spent = time.perf_counter() - start
-        if made.issued and (foreseen := spent * max(wanted / made.issued, 1.0)) > seconds:
-            raise UserError(f"to fill the set would take about {foreseen:,.0f} s, more than {seconds:,.0f}")
+        if not begun:  # what comes before the first node enters is not of nodes
+            start, begun = time.perf_counter(), made.issued
+        elif made.issued >= wanted / FORETOLD:
+            foreseen = (time.perf_counter() - start) * max(wanted / max(made.issued - begun, 1), 1.0)
+            if foreseen > seconds:
+                raise UserError(f"to fill the set would take about {foreseen:,.0f} s, more than {seconds:,.0f}")
 
 
 def times(gpu: Gpu, made: Local, seconds: float) -> Row:
