@@ -9,8 +9,6 @@ layout(location = 0) out vec4 out_matrix;
 
 void main() {
     ivec2 px = ivec2(gl_FragCoord.xy);
-    out_matrix = vec4(0.0);
-    if (px.x > px.y) return;
     vec3 sum = vec3(0.0);
     for (int p = 0; p < u_pending; ++p) {
         vec4 row = texelFetch(t_waiting, at_slot(px.y, p), 0);
