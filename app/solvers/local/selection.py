@@ -17,7 +17,9 @@ STEPS = 8  # sizes of the cascade between one and twice as large
 FARTHEST, NEAREST = (
     14,
     -3,
-)  # octaves: from so many edges of a patch on, at most and at least, clusters take the place of patches
+)  # octaves of edges of a patch, beyond which clusters take the place of patches: at most, at least
+CUBE = 8  # edges of a patch, along the edge of a cube from all of which patches reach as far
+ROOM = 0.94  # of the set, that is filled from the middle of a cube
 GROWTH = 1.25  # times as far as clusters of one level, those of the next: with 2, few patches would be left near by
 CORNER = 0.87  # edges of a cluster's cube, from its middle to its corner
 
@@ -28,7 +30,7 @@ class Selection:
     def __init__(self, patches: Patches, most: int) -> None:
         self._patches, self._most = patches, most
         self._tree = cKDTree(patches.centre[: patches.count])
-        self._step = 0
+        self._step, self._cube = 0, np.full(3, np.nan)
 
     def nearest(self, observer: F64) -> I64:
         """The nearest patches, nearest first. observer (3,) [solver space]."""
@@ -38,15 +40,27 @@ class Selection:
     def cascade(self, observer: F64) -> I64:
         """Patches near by, and beyond, up to the end of the world, clusters that are the larger the farther away, nearest first:
         patches reach as far as the set has room for. The same wherever the observer came from."""
-        top, bottom = FARTHEST * STEPS, NEAREST * STEPS
-        while self._step < top and self._fits(observer, self._step + 1):
-            self._step += 1
-        while self._step > bottom and not self._fits(observer, self._step):
-            self._step -= 1
-        return self._cut(observer, self._step)[: self._most]
+        if self._patches.count <= self._most:
+            return self.nearest(observer)
+        step = self._step_around(observer)
+        while step > NEAREST * STEPS and not self._fits(observer, step, self._most):
+            step -= 1
+        return self._cut(observer, step)[: self._most]
 
-    def _fits(self, observer: F64, step: int) -> bool:
-        return len(self._cut(observer, step)) <= self._most
+    def _step_around(self, observer: F64) -> int:
+        """How far patches reach from the middle of the cube that the observer is in, with some room left: the same all over it,
+        since each other reach would exchange a tenth of the set."""
+        cube = np.floor(observer / (CUBE * self._patches.edge))
+        if not np.array_equal(cube, self._cube):
+            self._cube, middle, most = cube, (cube + 0.5) * CUBE * self._patches.edge, int(ROOM * self._most)
+            while self._step < FARTHEST * STEPS and self._fits(middle, self._step + 1, most):
+                self._step += 1
+            while self._step > NEAREST * STEPS and not self._fits(middle, self._step, most):
+                self._step -= 1
+        return self._step
+
+    def _fits(self, observer: F64, step: int, most: int) -> bool:
+        return len(self._cut(observer, step)) <= most
 
     def _cut(self, observer: F64, step: int) -> I64:
         """Nodes, nearest first, of which no cluster of level n is nearer than 2^(step/STEPS) GROWTH^n edges of a patch."""
