@@ -125,7 +125,7 @@ def test_no_more_light_is_reflected_than_arrives(gpu: Gpu, bounces: str, outside
     indirect = vector(lit, solver.lighting.indirect)
     outside_light = np.frombuffer(solver.lighting.outside.read(), np.float32)[:3] * lit.lightmap.unit
     reflected = vector(lit, solver.lighting.reflected)  # direct light
-    area, albedo = held.area[there][:, None], solver.albedo[held.nodes]
+    area, albedo = held.area[there][:, None], solver.members.albedo[held.nodes]
     came = (area * held.outside[there][:, None] * outside_light).sum()
     sent = (area * (reflected + albedo * indirect)).sum()
     assert (area * indirect).sum() <= (came + sent) * (1 + 1e-4)

@@ -11,6 +11,7 @@ Another lamp costs a product; another albedo lets nodes enter anew, one after th
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,14 +23,17 @@ from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64, Material
 from app.solvers.base import EnergyBalance, Inspection, Progress
+from app.solvers.local.balance import balance_of, residual_of
 from app.solvers.local.form_factors import LocalSet
 from app.solvers.local.inspectable import facts_of, figures_of
 from app.solvers.local.lighting import SWEEPS, Lighting
 from app.solvers.local.matrix import ROW, LocalMatrix
+from app.solvers.local.members import DRIFT, Members
 from app.solvers.local.options import LocalOptions
 from app.solvers.local.patches import patch_count, patches_of
 from app.solvers.local.rows import Rows, rows_in
 from app.solvers.local.selection import Selection, Swap, swaps
+from app.solvers.local.tiles import Tiles
 from app.util.parts import is_running, run_to_end
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
@@ -40,20 +44,17 @@ WHOLE = 3  # highest level of patches that are large so that a whole scene is in
 FILLING = 64  # nodes that enter at once before there is half of a set
 ROWS = 256  # made at once before that, and
 ROWS_WHILE_WALKING = 48  # while it goes on
-TILES_AT_ONCE = 64  # that shadow rays are sent from, between two pictures
-NEAR_TILES, TILES_IN_TURN = 128, 64  # whose light is shown anew in each picture, while the set changes
 LEFT, MOST_REFLECTED = 1e-4, 0.99  # of light, that bounces may leave; mean albedo that their number allows for
 OUTSIDE_BOUNCES = 8  # between the set and what is outside of it
 FADE, FADED = 0.75, 16  # share of what was shown that stays in each picture after nodes came and went, and for how many
 FLUSH_PARTS = 3  # of the pass over the matrix that all updates wait for: whole, it takes a third of a frame
-DRIFT = 1e-3  # of a diagonal, beyond which its node enters anew
 BATCH = 64
 
 
 class Local:
     """Lights one lightmap around the observer. Whoever makes it releases it.
 
-    issued: nodes that have entered the set so far. albedo (nodes, 3): of each patch and cluster. Raises UserError for a set that
+    issued: nodes that have entered the set so far. Raises UserError for a set that
     does not fit memory or the driver, and for quadtrees.
     """
 
@@ -63,15 +64,13 @@ class Local:
         self.gpu, self.lightmap = gpu, lightmap
         self.rays, self.origins = RayScene(gpu, lightmap.pool), Origins(gpu, lightmap)
         self.direct = DirectLight(gpu, lightmap, self.rays, self.origins)
-        self._observer = lightmap.space.local_from_world(_first_eye(lightmap))
+        self._tiles = Tiles(lightmap.pool, lightmap.space.local_from_world(_first_eye(lightmap)))
         self._parts: list[Any] = []
         self._under_way: Generator[None, None, int] | None = None
-        self._tile_centres = _tile_centres(lightmap)
-        self._stale: list[int] | None = None  # None: not looked for
-        self._fading = self._turn = 0
-        self._edited = self._editing = False
-        self._all_known = True
-        self.issued = 0
+        self._fading = self._bounces_left = self.issued = 0
+        # whether lamps are others, change in every piece of work, and direct light is known of all tiles as they are now
+        self._edited, self._editing, self._all_known, self._lit = False, False, True, False
+        self._escaped, self._residual = np.zeros(3), 0.0
         try:
             self._build(options)
         except UserError:
@@ -102,10 +101,10 @@ class Local:
         self._parts.append(rows)
         lighting = Lighting(gpu, lightmap, self.origins, patches, rows.places, most, 2**level)
         self._parts.append(lighting)
-        self.options, self.patches, self.matrix, self.rows, self.lighting = options, patches, matrix, rows, lighting
-        self.level = level
+        self.options, self.patches, self.rows, self.lighting, self.level = options, patches, rows, lighting, level
         self._selection = Selection(patches, most)
-        self.set = LocalSet(patches, rows, most)
+        self.set, self.matrix = LocalSet(patches, rows, most), matrix
+        self.members = Members(self.set, matrix, self._albedo())
 
     # -- work ----------------------------------------------------------------------------------------------------------
 
@@ -124,8 +123,9 @@ class Local:
             self.direct.sum(self.lightmap.scene)
             self._lit = False
         self._editing, self._all_known = False, True
-        entered, tiles = 0, self._next_tiles()
-        if self._is_dark_here:
+        entered = 0
+        tiles = self._tiles.next_to_shoot(self.direct, self.options.shadow_rays)
+        if self._tiles.dark_near(self.direct):
             yield from self._shoot(tiles, bands)
         else:
             yield from self._make_rows()
@@ -149,38 +149,10 @@ class Local:
         self.direct.sum(self.lightmap.scene, tiles)
         self._lit = False
 
-    @property
-    def _is_dark_here(self) -> bool:
-        """Whether no shadow rays have been sent yet from some of what is nearest."""
-        if not self.direct.sets:
-            return False
-        away = np.where(self.lightmap.pool.slot_texels > 0, self._away(), np.inf)
-        nearest = np.argpartition(away, min(NEAR_TILES, len(away) - 1))[:NEAR_TILES]
-        return bool((self.direct.fewest[nearest[np.isfinite(away[nearest])]] == 0).any())
-
-    def _away(self) -> F64:
-        """(tiles,) from the observer to the middle of each tile."""
-        return np.asarray(np.linalg.norm(self._tile_centres - self._observer, axis=1))
-
     def _compose(self, *, all_: bool, stays: float = 0.0) -> None:
         """Write the light that is shown; if not all of it, that which is near, and some of the rest in turn. stays: share of what
         was shown before."""
-        self.lighting.compose(self.direct.light, self._tiles if all_ else self._tiles_in_turn(), stays=stays)
-
-    @property
-    def _tiles(self) -> I64:
-        """All that hold anything."""
-        return np.flatnonzero(self.lightmap.pool.used)
-
-    def _tiles_in_turn(self) -> I64:
-        """Those that are near, and some of the others, each in turn; all where there are few."""
-        tiles = self._tiles
-        if len(tiles) <= NEAR_TILES + TILES_IN_TURN:
-            return tiles
-        order = np.argpartition(self._away()[tiles], NEAR_TILES)
-        rest = np.sort(tiles[order[NEAR_TILES:]])
-        first, self._turn = self._turn % len(rest), self._turn + TILES_IN_TURN
-        return np.concatenate([tiles[order[:NEAR_TILES]], np.roll(rest, -first)[:TILES_IN_TURN]])
+        self.lighting.compose(self.direct.light, self._tiles.all if all_ else self._tiles.in_turn(), stays=stays)
 
     def _follow_edit(self) -> Generator[None, None, None]:
         """The light of other lamps, in one piece of work; of lamps that change in every picture, what is near, and some of the
@@ -189,7 +161,7 @@ class Local:
         self._editing = True
         self.direct.follow(self.lightmap.scene)
         yield from self.direct.catch_up(self.options.shadow_rays)
-        tiles = self._tiles_in_turn() if goes_on else self._tiles
+        tiles = self._tiles.in_turn() if goes_on else self._tiles.all
         self.direct.sum(self.lightmap.scene, tiles)
         self._lit, self._all_known = False, not goes_on
         self._relight()
@@ -199,7 +171,9 @@ class Local:
         """The indirect light of the set as it is, where it is not known yet: bounces that are done one after the other, and light
         from outside that follows from that inside, go on in the next pieces of work."""
         if not self._lit:
-            self._tell_nodes()
+            held, members = self.set, self.members
+            albedo = members.albedo[held.node]
+            self.lighting.set_nodes(held.node, held.area, albedo, held.outside, members.age)
             self._bounces_left = self._bounces
         elif not self._bounces_left:
             return
@@ -211,15 +185,8 @@ class Local:
         """How often light is found until no more than LEFT of it is missing."""
         if self.matrix.coloured:
             return OUTSIDE_BOUNCES if np.abs(self.set.outside).max() > DRIFT else 0
-        held = self.set
-        mean = (held.area[:, None] * np.where(held.node[:, None] >= 0, self.albedo[held.node], 0.0)).sum(0)
-        reflected = min(float((mean / max(held.area.sum(), 1e-300)).max()), MOST_REFLECTED)
+        reflected = min(self.members.mean_albedo, MOST_REFLECTED)
         return int(np.ceil(np.log(LEFT) / np.log(reflected) / SWEEPS)) if reflected > 0 else 0
-
-    def _tell_nodes(self) -> None:
-        held = self.set
-        albedo = np.where(held.node[:, None] >= 0, self.albedo[held.node], 0.0)
-        self.lighting.set_nodes(held.node, held.area, albedo, held.outside, self._frame - self._entered)
 
     def _make_rows(self) -> Iterator[None]:
         """Rows that nodes need which are to enter, nearest first."""
@@ -240,20 +207,10 @@ class Local:
             if self._filling:
                 return []
             ready = np.union1d(ready, self.set.nodes)  # nothing leaves for what cannot enter yet
-        plan = list(swaps(self.patches, self.set.nodes, ready, self.set.free, self._observer))
+        plan = list(swaps(self.patches, self.set.nodes, ready, self.set.free, self._tiles.observer))
         if not plan and len(ready) == len(self._wanted):
-            plan = [Swap((node,), (node,)) for node in self._stale_nodes()]
+            plan = [Swap((node,), (node,)) for node in self.members.stale()]
         return plan
-
-    def _stale_nodes(self) -> list[int]:
-        """Nodes that must enter anew: whose albedo is another, or whose diagonal has drifted; looked for once nothing moves."""
-        if self._stale is None:
-            held = self.set
-            drifted = np.abs(held.drift()) > DRIFT
-            weight = self.albedo[held.node] * held.area[:, None]
-            other = self.matrix.coloured and (np.abs(weight - self._weight) > 1e-6 * held.area[:, None]).any(1)
-            self._stale = [int(node) for node in held.node[(drifted | other) & (held.node >= 0)]]
-        return self._stale
 
     def _swap(self, plan: list[Swap], bands: int) -> Generator[None, None, int]:
         """Carry out as much of the plan as a piece of work may; less where an edit waits for it to end."""
@@ -267,47 +224,13 @@ class Local:
             if entered and (full or self._edited):
                 break
             yield
-            for node in swap.leave:
-                self._leave(node)
-            for node in swap.enter:
-                entered.append(self._enter(node, diagonals.get(node)))
-            if self._stale is not None and swap.leave == swap.enter:
-                self._stale.remove(swap.enter[0])
-            else:
-                self._stale = None
+            entered += self.members.swap(swap, diagonals)
         self.issued += len(entered)
-        self._frame += 1
-        self._entered[entered] = self._frame
+        self.members.swapped(entered)
         yield from self.matrix.flush_in(FLUSH_PARTS * bands)
         self.lighting.set_slots(self.set.slot_at)
         self._lit = False
         return len(entered)
-
-    def _leave(self, node: int) -> None:
-        slot = self.set.leave(node)
-        self.matrix.leave(slot, self._weight[slot])
-        self._left[node] = self._count
-
-    def _enter(self, node: int, diagonal: float | None = None) -> int:
-        """The slot that a node has entered. diagonal: see ``LocalSet.enter``."""
-        held, slot = self.set, self.set.first_free()
-        kernel = held.enter(node, slot, diagonal)
-        weight = self.albedo[held.node] * np.where(held.node >= 0, held.area, 0.0)[:, None]
-        self._weight[slot] = weight[slot]
-        self._count += 1
-        known = (held.node >= 0) & (self._since <= self._left.get(node, -1))
-        self.matrix.enter(slot, kernel, self._weight[slot], self._weight * (held.node >= 0)[:, None], known)
-        self._since[slot] = self._count
-        return slot
-
-    def _next_tiles(self) -> I64:
-        """From which shadow rays are sent next: of those with fewest, the nearest."""
-        counts = np.where(self.lightmap.pool.slot_texels > 0, self.direct.fewest, np.iinfo(np.int64).max)
-        left = np.flatnonzero(counts < self.options.shadow_rays)
-        if not len(left):
-            return left
-        left = left[counts[left] == counts[left].min()]
-        return np.sort(left[np.argsort(self._away()[left], kind="stable")[:TILES_AT_ONCE]])
 
     def _finish(self) -> None:
         """End the work that is under way, if any; of its own parts this asks nothing."""
@@ -329,8 +252,8 @@ class Local:
             some = self.lightmap.pool.slot_texels > 0
             asked = self.options.shadow_rays
             shadow = 1 - float(np.minimum(self.direct.fewest[some], asked).mean()) / asked
-        missing = max(here, shadow, float(bool(self._stale)) / wanted) if emits else 0.0
-        known = self._stale is not None and not self._stale and self._fading == self._bounces_left == 0
+        missing = max(here, shadow, self.members.waiting / wanted) if emits else 0.0
+        known = self.members.settled and self._fading == self._bounces_left == 0
         done = not emits or (missing <= self.options.missing and known and not self._edited and self._all_known)
         return Progress(self.issued, missing if self.issued or not emits else 1.0, self._escaped, converged=done)
 
@@ -343,52 +266,12 @@ class Local:
     def energy(self) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
         self._finish()
-        lightmap = self.lightmap
-        area = lightmap.pool.surfaces.area[..., None]
-        albedo, H = lightmap.albedo().astype(np.float64), lightmap.irradiance().astype(np.float64)
-        raw = np.frombuffer(self.direct.light.read(), np.float32).reshape(*lightmap.size[::-1], 4)
-        D = lightmap.pool.tiles_from_image(raw)[..., :3].astype(np.float64) * lightmap.unit
-        emitted, arrived = lightmap.emitted, (D * area).sum((0, 1, 2))
-        # light of lamps that no texel got, and of what nodes reflect, the share that their own rays lost
-        lost = 1.0 - self.set.received[self.set.node >= 0]
-        nodes = self.set.nodes
-        B = self.patches.mean(self._texels(albedo * H))[nodes] if len(nodes) else np.zeros((0, 3))
-        square = lightmap.space.scale**2
-        escaped = emitted - arrived + (lost * self.patches.area[nodes]) @ B * square
-        whole = float(area.sum())
-        begun = self.issued > 0 or not lightmap.scene.emits
-        self._escaped = escaped if begun else np.zeros(3)
-        self._loss = self.loss()
-        return EnergyBalance(
-            emitted=emitted,
-            absorbed=((1 - albedo) * H * area).sum((0, 1, 2)),
-            escaped=self._escaped,
-            unshot=np.zeros(3) if begun else emitted,
-            reflectance=(albedo * area).sum((0, 1, 2)) / max(whole, 1e-300),
-            area=whole,
-        )
-
-    def loss(self) -> float:
-        """By how much the indirect light of the set is off from what another bounce along its form factors makes of it, in 64
-        bits, of the mean [-]: what storage loses, and ways of bouncing that are cut short. Waits for the GPU."""
-        held, there = self.set, self.set.node >= 0
-        if not there.any():
-            return 0.0
-        lighting = self.lighting
-        indirect, reflected = (
-            np.frombuffer(texture.read(), np.float32).reshape(-1, 4)[there, :3].astype(np.float64)
-            for texture in (lighting.indirect, lighting.reflected)
-        )
-        outside = np.frombuffer(lighting.outside.read(), np.float32)[:3].astype(np.float64)
-        again = held.outside[there, None] * outside + held.matrix() @ (reflected + self.albedo[held.nodes] * indirect)
-        area = held.area[there, None]
-        return float((area * np.abs(again - indirect)).sum() / max((area * indirect).sum(), 1e-300))
-
-    def _texels(self, tiles: F64) -> F64:
-        """(texels, 3) in order, of tiles (tiles, t, t, 3)."""
-        order, pool = self.patches.order, self.lightmap.pool
-        y, x = order >> 16, order & 0xFFFF
-        return np.asarray(tiles[y // pool.tile * pool.columns + x // pool.tile, y % pool.tile, x % pool.tile])
+        balance = balance_of(self.lightmap, self.direct.light, self.patches, self.members)
+        self._residual = residual_of(self.lighting, self.members)
+        if not self.issued and self.lightmap.scene.emits:
+            return replace(balance, escaped=np.zeros(3), unshot=balance.emitted)
+        self._escaped = balance.escaped
+        return balance
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
 
@@ -397,27 +280,16 @@ class Local:
         if self._under_way is not None:
             self._under_way.close()
             self._under_way = None
-        most = self.set.most
         self.lightmap.clear()
-        self.set.clear()
-        self.matrix.clear()
+        self.members.albedo = self._albedo()
+        self.members.clear()
         self.lighting.clear()
         self.lighting.set_slots(self.set.slot_at)
         self.direct.forget()
         self.direct.follow(self.lightmap.scene)
-        self._set_albedo()
-        self._weight = np.zeros((most, 3))  # ρA with which the node in each slot has entered
-        self._since = np.full(most, -1)  # the count at which what is in each slot entered
-        self._left = dict[int, int]()  # and each node left
-        self._entered, self._frame, self._count, self._turn = np.zeros(most), 0, 0, 0
-        self._lit, self._edited, self._stale = False, False, None
-        self._bounces_left = self._fading = 0
-        self._editing, self._all_known = (
-            False,
-            True,
-        )  # whether lamps change in every piece, and direct light is that of all now
-        self._escaped, self._loss = np.zeros(3), 0.0
-        self.issued = 0
+        self._edited, self._editing, self._all_known, self._lit = False, False, True, False
+        self._fading = self._bounces_left = self.issued = 0
+        self._escaped, self._residual = np.zeros(3), 0.0
         self._look()
 
     def set_options(self, options: LocalOptions) -> None:
@@ -443,13 +315,13 @@ class Local:
         self._edited = True
         self._finish()  # soon, and with the light of the edit
         if [m.albedo for m in materials] != before:
-            self._set_albedo()
-            self._stale, self._edited = None, True
+            self.members.albedo, self._edited = self._albedo(), True
+            self.members.look_again()
 
-    def _set_albedo(self) -> None:
-        lightmap = self.lightmap
-        materials = lightmap.scene.materials
-        self.albedo = self.patches.albedo(materials, lightmap.scene.material_ids, lightmap.charts.face_triangle)
+    def _albedo(self) -> F64:
+        """(nodes, 3) of each patch and cluster."""
+        scene = self.lightmap.scene
+        return self.patches.albedo(scene.materials, scene.material_ids, self.lightmap.charts.face_triangle)
 
     def set_observer(self, position: F64) -> None:
         """The eye is at ``position`` (3,) [m]: from the next piece of work on, what is near it is lit. Raises UserError for no
@@ -457,16 +329,16 @@ class Local:
         if not np.isfinite(position).all():
             raise UserError(f"the observer is at {', '.join(f'{x:g}' for x in position)}: no place in the world")
         observer = self.lightmap.space.local_from_world(np.asarray(position, np.float64))
-        if not np.array_equal(observer, self._observer):
-            self._observer = observer
+        if not np.array_equal(observer, self._tiles.observer):
+            self._tiles.observer = observer
             self._look()
 
     def _look(self) -> None:
         """Which nodes are wanted in the set from here."""
         choose = self._selection.cascade if self.options.outside == "cascade" else self._selection.nearest
-        before, self._wanted = getattr(self, "_wanted", None), choose(self._observer)
+        before, self._wanted = getattr(self, "_wanted", None), choose(self._tiles.observer)
         if before is None or not np.array_equal(before, self._wanted):
-            self._stale = None
+            self.members.look_again()
 
     # -- what there is to see ------------------------------------------------------------------------------------------
 
@@ -492,34 +364,30 @@ class Local:
         """What the set, its rows and its matrix are; of a texel, the node that it is in."""
         held, lightmap = self.set, self.lightmap
         figures = figures_of(
-            held, self.patches, self.rows, self.matrix, self.lighting, self._observer, lightmap.space.scale
-        ) | {"Residual of the matrix": f"{100 * self._loss:.2g} %"}
+            held, self.patches, self.rows, self.matrix, self.lighting, self._tiles.observer, lightmap.space.scale
+        ) | {"Residual of the matrix": f"{100 * self._residual:.2g} %"}
         counts = {"Rays traced": self.rows.traced + self.direct.traced}
         if texel is None or any(at >= size for at, size in zip(texel, lightmap.size, strict=True)):
             return Inspection(figures=figures, counts=counts)
         place = np.flatnonzero(self.patches.order == (texel[1] << 16 | texel[0]))
         slot = int(held.slot_at[place[0]]) if len(place) else -1
-        age = float(self._frame - self._entered[slot])
+        age = float(self.members.age[slot])
         facts = facts_of(int(held.node[slot]), slot, self.patches, age, float(held.outside[slot]))
         return Inspection(figures=figures, counts=counts, texel_facts=facts)
 
     def passes(self, amount: int) -> dict[str, Callable[[], None]]:
         """Each part of a piece of work by itself, to be timed."""
-        tiles = np.arange(min(TILES_AT_ONCE, self.lightmap.pool.tiles))
+        tiles = self._tiles.in_turn()
         node = int(self._wanted[0])
         run_to_end(self.rows.make(self._wanted[:1][~self.rows.has(self._wanted[:1])], self._wanted))
 
         def swap() -> None:
             if self.set.slot[node] >= 0:
-                self._leave(node)
-            self._enter(node)
+                self.members.leave(node)
+            self.members.enter(node)
             self.matrix.flush()
 
-        def rows() -> None:
-            run_to_end(self.rows.make(self._wanted[:0], self._wanted))
-
         return {
-            "rows": rows,
             "swap": swap,
             "shadow rays": lambda: run_to_end(self.direct.shoot_from(tiles)),
             "sum": lambda: self.direct.sum(self.lightmap.scene),
@@ -555,7 +423,7 @@ def default_patches(gpu: Gpu, options: LocalOptions) -> int:
     """As many as the driver and the memory for the matrix allow, up to what this kind of renderer keeps up with."""
     most = min(SOFTWARE if gpu.software else HARDWARE, gpu.limits.max_texture)
     components = 1 if options.bounces == "iterate" else 4
-    return min(most, int(np.sqrt(options.matrix_memory * 2**20 * 8 / (components * options.bits))))
+    return min(most, int(np.sqrt(options.matrix_memory * 2**20 * 8 / (components * options.bits))) // ROW * ROW)
 
 
 def _first_eye(lightmap: Lightmap) -> F64:
@@ -564,12 +432,3 @@ def _first_eye(lightmap: Lightmap) -> F64:
     if not cameras:
         return lightmap.space.centre
     return np.asarray(np.asarray(cameras[0].world_from_camera, np.float64)[:3, 3])
-
-
-def _tile_centres(lightmap: Lightmap) -> F64:
-    """(tiles, 3) [solver space]; far away of empty slots."""
-    pool = lightmap.pool
-    there = pool.surfaces.face >= 0
-    at = np.where(there[..., None], pool.space.local_from_world(pool.surfaces.position), 0.0)
-    count = there.sum((1, 2))[:, None]
-    return np.asarray(np.where(count > 0, at.sum((1, 2)) / np.maximum(count, 1), np.inf))

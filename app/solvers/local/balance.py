@@ -1,0 +1,60 @@
+"""What the light of the local set adds up to: where all energy is, and by how much the light is off from another bounce."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.gpu import Texture
+from app.lightmap.lightmap import Lightmap
+from app.scene.model import F64
+from app.solvers.base import EnergyBalance
+from app.solvers.local.lighting import Lighting
+from app.solvers.local.members import Members
+from app.solvers.local.patches import Patches
+
+
+def balance_of(lightmap: Lightmap, direct: Texture, patches: Patches, members: Members) -> EnergyBalance:
+    """emitted = absorbed + escaped + imbalance, RGB [W]: escaped is the light of lamps that no texel got, and of what nodes
+    reflect the share that their own rays lost. Reads every texel and waits for the GPU."""
+    held = members.held
+    area = lightmap.pool.surfaces.area[..., None]
+    albedo, H = lightmap.albedo().astype(np.float64), lightmap.irradiance().astype(np.float64)
+    raw = np.frombuffer(direct.read(), np.float32).reshape(*lightmap.size[::-1], 4)
+    D = lightmap.pool.tiles_from_image(raw)[..., :3].astype(np.float64) * lightmap.unit
+    nodes, lost = held.nodes, 1.0 - held.received[held.node >= 0]
+    escaped = lightmap.emitted - (D * area).sum((0, 1, 2))
+    if len(nodes):
+        B = patches.mean(_in_order(lightmap, patches, albedo * H))[nodes]
+        escaped = escaped + (lost * patches.area[nodes]) @ B * lightmap.space.scale**2
+    whole = float(area.sum())
+    return EnergyBalance(
+        emitted=lightmap.emitted,
+        absorbed=((1 - albedo) * H * area).sum((0, 1, 2)),
+        escaped=escaped,
+        unshot=np.zeros(3),
+        reflectance=(albedo * area).sum((0, 1, 2)) / max(whole, 1e-300),
+        area=whole,
+    )
+
+
+def _in_order(lightmap: Lightmap, patches: Patches, tiles: F64) -> F64:
+    """(texels, 3) in order, of tiles (tiles, t, t, 3)."""
+    order, pool = patches.order, lightmap.pool
+    y, x = order >> 16, order & 0xFFFF
+    return np.asarray(tiles[y // pool.tile * pool.columns + x // pool.tile, y % pool.tile, x % pool.tile])
+
+
+def residual_of(lighting: Lighting, members: Members) -> float:
+    """By how much the indirect light of the set is off from what another bounce along its form factors makes of it, in 64 bits,
+    of the mean [-]: what storage loses, and ways of bouncing that are cut short. Waits for the GPU."""
+    held, there = members.held, members.held.node >= 0
+    if not there.any():
+        return 0.0
+    indirect, reflected = (
+        np.frombuffer(texture.read(), np.float32).reshape(-1, 4)[there, :3].astype(np.float64)
+        for texture in (lighting.indirect, lighting.reflected)
+    )
+    outside = np.frombuffer(lighting.outside.read(), np.float32)[:3].astype(np.float64)
+    again = held.outside[there, None] * outside + held.matrix() @ (reflected + members.albedo[held.nodes] * indirect)
+    area = held.area[there, None]
+    return float((area * np.abs(again - indirect)).sum() / max((area * indirect).sum(), 1e-300))
