@@ -1,4 +1,4 @@
-"""What the light of the local set adds up to: where all energy is, and by how much the light is off from another bounce."""
+"""What the light of the local set adds up to: where all energy is, and by how much the matrix is off."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from app.solvers.base import EnergyBalance
 from app.solvers.local.lighting import Lighting
 from app.solvers.local.members import Members
 from app.solvers.local.patches import Patches
+
+LEAST = 1e-6  # 1 - λ: in a furnace of λ = 1 light never ends
 
 
 def balance_of(lightmap: Lightmap, direct: Texture, patches: Patches, members: Members) -> EnergyBalance:
@@ -44,9 +46,10 @@ def _in_order(lightmap: Lightmap, patches: Patches, tiles: F64) -> F64:
     return np.asarray(tiles[y // pool.tile * pool.columns + x // pool.tile, y % pool.tile, x % pool.tile])
 
 
-def residual_of(lighting: Lighting, members: Members) -> float:
-    """By how much the indirect light of the set is off from what another bounce along its form factors makes of it, in 64 bits,
-    of the mean [-]: what storage loses, and ways of bouncing that are cut short. Waits for the GPU."""
+def matrix_error(lighting: Lighting, members: Members) -> float:
+    """By how much the indirect light of the set is off, of the mean [-]: what storage loses, and ways of bouncing that are cut
+    short. Another bounce along its form factors, in 64 bits, has the residual r; where light goes on by λ each time, the mean
+    albedo times the mean of what rows sum to, |r| / (1 - λ) is off. Waits for the GPU."""
     held, there = members.held, members.held.node >= 0
     if not there.any():
         return 0.0
@@ -57,4 +60,6 @@ def residual_of(lighting: Lighting, members: Members) -> float:
     outside = np.frombuffer(lighting.outside.read(), np.float32)[:3].astype(np.float64)
     again = held.outside[there, None] * outside + held.matrix() @ (reflected + members.albedo[held.nodes] * indirect)
     area = held.area[there, None]
-    return float((area * np.abs(again - indirect)).sum() / max((area * indirect).sum(), 1e-300))
+    goes_on = members.mean_albedo * float(np.average(held.row_sum[there], weights=held.area[there]))
+    residual = float((area * np.abs(again - indirect)).sum() / max((area * indirect).sum(), 1e-300))
+    return residual / max(1.0 - goes_on, LEAST)

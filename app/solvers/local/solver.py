@@ -23,7 +23,7 @@ from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64, Material
 from app.solvers.base import EnergyBalance, Inspection, Progress
-from app.solvers.local.balance import balance_of, residual_of
+from app.solvers.local.balance import balance_of, matrix_error
 from app.solvers.local.form_factors import LocalSet
 from app.solvers.local.inspectable import facts_of, figures_of
 from app.solvers.local.lighting import SWEEPS, Lighting
@@ -48,6 +48,7 @@ LEFT, MOST_REFLECTED = 1e-4, 0.99  # of light, that bounces may leave; mean albe
 OUTSIDE_BOUNCES = 8  # between the set and what is outside of it
 FADE, FADED = 0.75, 16  # share of what was shown that stays in each picture after nodes came and went, and for how many
 FLUSH_PARTS = 3  # of the pass over the matrix that all updates wait for: whole, it takes a third of a frame
+NOTED = 0.02  # of the light, that the matrix is off by, from which on it is said
 BATCH = 64
 
 
@@ -70,7 +71,7 @@ class Local:
         self._fading = self._bounces_left = self.issued = 0
         # whether lamps are others, change in every piece of work, and direct light is known of all tiles as they are now
         self._edited, self._editing, self._all_known, self._lit = False, False, True, False
-        self._escaped, self._residual = np.zeros(3), 0.0
+        self._escaped, self._error = np.zeros(3), 0.0
         try:
             self._build(options)
         except UserError:
@@ -255,19 +256,28 @@ class Local:
         missing = max(here, shadow, self.members.waiting / wanted) if emits else 0.0
         known = self.members.settled and self._fading == self._bounces_left == 0
         done = not emits or (missing <= self.options.missing and known and not self._edited and self._all_known)
-        return Progress(self.issued, missing if self.issued or not emits else 1.0, self._escaped, converged=done)
+        remaining = missing if self.issued or not emits else 1.0
+        return Progress(self.issued, remaining, self._escaped, converged=done, note=self._note)
+
+    @property
+    def _note(self) -> str | None:
+        """What to do where the matrix has lost much of the light."""
+        if self._error <= NOTED or not self.matrix.coloured:
+            return None
+        better = "--bounces inverse" if self.options.bounces == "series" else "--bits 32 or --bounces iterate"
+        return f"the local matrix is off by {self._error:.0%} of the light: {better} would do"
 
     def settle(self) -> Progress:
         """End the work under way, and wait for the GPU."""
         self.poll(wait=True)
-        self.gpu.ctx.finish()
+        self._error = matrix_error(self.lighting, self.members)
         return self.poll()
 
     def energy(self) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
         self._finish()
         balance = balance_of(self.lightmap, self.direct.light, self.patches, self.members)
-        self._residual = residual_of(self.lighting, self.members)
+        self._error = matrix_error(self.lighting, self.members)
         if not self.issued and self.lightmap.scene.emits:
             return replace(balance, escaped=np.zeros(3), unshot=balance.emitted)
         self._escaped = balance.escaped
@@ -289,7 +299,7 @@ class Local:
         self.direct.follow(self.lightmap.scene)
         self._edited, self._editing, self._all_known, self._lit = False, False, True, False
         self._fading = self._bounces_left = self.issued = 0
-        self._escaped, self._residual = np.zeros(3), 0.0
+        self._escaped, self._error = np.zeros(3), 0.0
         self._look()
 
     def set_options(self, options: LocalOptions) -> None:
@@ -365,7 +375,7 @@ class Local:
         held, lightmap = self.set, self.lightmap
         figures = figures_of(
             held, self.patches, self.rows, self.matrix, self.lighting, self._tiles.observer, lightmap.space.scale
-        ) | {"Residual of the matrix": f"{100 * self._residual:.2g} %"}
+        ) | {"Matrix off by": f"{100 * self._error:.2g} %"}
         counts = {"Rays traced": self.rows.traced + self.direct.traced}
         if texel is None or any(at >= size for at, size in zip(texel, lightmap.size, strict=True)):
             return Inspection(figures=figures, counts=counts)
