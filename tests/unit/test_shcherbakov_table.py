@@ -11,7 +11,7 @@ from scene_files import written
 from scipy.sparse import csr_array
 
 from app.atlas.options import AtlasOptions
-from app.bench.papers import shcherbakov, table_plot
+from app.bench.papers import shcherbakov
 from app.bench.papers.local_walk import Differences, steps_of, walk
 from app.bench.papers.shcherbakov_verdicts import verdicts
 from app.bench.papers.whole_solution import (
@@ -194,6 +194,7 @@ def test_what_no_row_can_judge_is_not_judged() -> None:
 
 
 def test_the_plot_leaves_out_what_has_no_size() -> None:
+    table_plot = pytest.importorskip("app.bench.papers.table_plot", reason="of the extra bench", exc_type=ImportError)
     plot = shcherbakov.TABLE.plot
     assert plot is not None
     labels = [label for label, *_ in table_plot.lines(plot, rows())]
