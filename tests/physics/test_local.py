@@ -178,6 +178,22 @@ def test_what_is_shown_does_not_jump_when_patches_come_and_go(gpu: Gpu) -> None:
     lit.release()
 
 
+@pytest.mark.parametrize("outside", OUTSIDE)
+def test_texels_are_in_the_slot_of_their_node_all_along_a_walk(gpu: Gpu, outside: str) -> None:
+    """Also while rows are missing, when what is to enter waits: no two nodes of the set cover a texel."""
+    lit = lit_by(gpu, table_room(), density=6, patches=192, outside=outside, shadow_rays=4)
+    solver = matrix_of(lit)
+    for eye in (HERE, THERE, ELSEWHERE, HERE):
+        solver.set_observer(np.array(eye))
+        for _ in range(12):
+            run_to_end(solver.work(1))
+            held, patches = solver.set, solver.patches
+            for slot in np.flatnonzero(held.node >= 0):
+                node = held.node[slot]
+                assert (held.slot_at[patches.start[node] : patches.end[node]] == slot).all()
+    lit.release()
+
+
 # -- edits -------------------------------------------------------------------------------------------------------------
 
 
@@ -198,7 +214,20 @@ def test_another_lamp_is_lit_in_one_piece_of_work_and_costs_no_ray(gpu: Gpu, bou
     lit.release()
 
 
-@EXACT
+@pytest.mark.parametrize("bounces", BOUNCES)
+def test_lamps_switched_off_are_dark(gpu: Gpu, bounces: str) -> None:
+    """But for what bounces leave."""
+    lit = lit_by(gpu, table_room(), bounces=bounces)
+    before = lit.H.max()
+    off = tuple(replace(m, emission=(0.0,) * 3) for m in lit.lightmap.scene.materials)
+    matrix_of(lit).set_materials(off)
+    assert not lit.solver.poll().converged
+    settle(lit)
+    assert np.abs(lit.H).max() < 1e-3 * before
+    lit.release()
+
+
+@pytest.mark.parametrize("bounces", BOUNCES)
 def test_another_albedo_ends_where_a_fresh_solve_ends(gpu: Gpu, bounces: str) -> None:
     lit = lit_by(gpu, table_room(), bounces=bounces)
     before = lit.H

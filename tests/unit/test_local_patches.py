@@ -110,6 +110,11 @@ def test_the_cascade_is_the_same_wherever_the_observer_came_from(patches: Patche
         np.testing.assert_array_equal(one.cascade(np.array(eye)), other.cascade(np.array(eye)))
 
 
+def test_a_set_too_small_for_the_world_names_no_node_twice(patches: Patches) -> None:
+    found = Selection(patches, 20).cascade(np.zeros(3))
+    assert len(found) <= 20 and texels_in(patches, found).max() == 1
+
+
 def test_a_set_with_room_for_all_is_all_patches(patches: Patches) -> None:
     found = Selection(patches, patches.count).cascade(np.zeros(3))
     np.testing.assert_array_equal(np.sort(found), np.arange(patches.count))

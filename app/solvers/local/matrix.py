@@ -31,7 +31,7 @@ from app.gpu import Framebuffer, Gpu, Pass, Texture, glsl_constant
 from app.scene.model import F32, F64
 
 PENDING = 20  # vectors that wait for one pass over the matrix
-SCALE = 1024.0  # of what is stored in 16 bits: half floats lose digits below 6e-5
+SCALE = 256.0  # of what is stored in 16 bits: half floats lose digits below 6e-5
 ROW = int(glsl_constant("solvers/local/vector.glsl", "ROW"))  # slots, in a row of a vector's texture
 CHUNKS = 16  # into which a product with the matrix is cut, so that enough fragments work on it
 

@@ -36,6 +36,11 @@ class Members:
         self._stale: list[int] | None = None  # None: not looked for
 
     @property
+    def left(self) -> int:
+        """Nodes that have left and not come again."""
+        return len(self._left)
+
+    @property
     def age(self) -> F64:
         """(slots,) swaps since what is in each entered."""
         return self._swaps - self._entered

@@ -73,6 +73,7 @@ class Selection:
             found.append(nodes[~split])
             count += len(found[-1])
             if count > self._most:
+                found[-1], nodes = nodes, nodes[:0]
                 break
             first, last = patches.children[nodes[split]].T
             nodes = ranges(first, last)

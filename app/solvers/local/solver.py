@@ -48,6 +48,7 @@ LEFT, MOST_REFLECTED = 1e-4, 0.99  # of light, that bounces may leave; mean albe
 OUTSIDE_BOUNCES = 8  # between the set and what is outside of it
 FADE, FADED = 0.75, 16  # share of what was shown that stays in each picture after nodes came and went, and for how many
 FLUSH_PARTS = 3  # of the pass over the matrix that all updates wait for: whole, it takes a third of a frame
+MOST_ALBEDO = 0.9999  # in a closed room of 1 light never ends, and its matrix has no inverse
 NOTED = 0.02  # of the light, that the matrix is off by, from which on it is said
 BATCH = 64
 
@@ -69,6 +70,7 @@ class Local:
         self._parts: list[Any] = []
         self._under_way: Generator[None, None, int] | None = None
         self._fading = self._bounces_left = self.issued = 0
+        self._first = True  # whether the set is filled for the first time
         # whether lamps are others, change in every piece of work, and direct light is known of all tiles as they are now
         self._edited, self._editing, self._all_known, self._lit = False, False, True, False
         self._escaped, self._error = np.zeros(3), 0.0
@@ -118,12 +120,15 @@ class Local:
 
     def _piece(self, bands: int) -> Generator[None, None, int]:
         if self._edited:
+            goes_on = self._editing
             yield from self._follow_edit()
-            return 0
-        if self._editing and not self._all_known:
-            self.direct.sum(self.lightmap.scene)
-            self._lit = False
-        self._editing, self._all_known = False, True
+            if not goes_on:
+                return 0
+        else:
+            if self._editing and not self._all_known:
+                self.direct.sum(self.lightmap.scene)
+                self._lit = False
+            self._editing, self._all_known = False, True
         entered = 0
         tiles = self._tiles.next_to_shoot(self.direct, self.options.shadow_rays)
         if self._tiles.dark_near(self.direct):
@@ -202,15 +207,26 @@ class Local:
         return 2 * (self.set.most - self.set.free) < len(self._wanted)
 
     def _plan(self) -> list[Swap]:
-        """The next nodes that enter and leave, or enter anew."""
-        ready = self._wanted[self.rows.has(self._wanted)]
-        if len(ready) < len(self._wanted):
-            if self._filling:
-                return []
-            ready = np.union1d(ready, self.set.nodes)  # nothing leaves for what cannot enter yet
-        plan = list(swaps(self.patches, self.set.nodes, ready, self.set.free, self._tiles.observer))
-        if not plan and len(ready) == len(self._wanted):
-            plan = [Swap((node,), (node,)) for node in self.members.stale()]
+        """The next nodes that enter and leave, whole swaps whose rows are there, or that enter anew. Nothing leaves for what
+        cannot enter yet."""
+        have_rows = bool(self.rows.has(self._wanted).all())
+        if self._filling and not have_rows:
+            return []
+        plan, waiting, free = list[Swap](), list[Swap](), self.set.free
+        for swap in swaps(self.patches, self.set.nodes, self._wanted, free, self._tiles.observer):
+            more = len(swap.enter) - len(swap.leave)
+            if not swap.enter:
+                waiting.append(swap)
+            elif self.rows.has(np.array(swap.enter)).all():
+                while more > free and waiting:
+                    plan.append(waiting.pop(0))
+                    free += len(plan[-1].leave)
+                if more <= free:
+                    plan.append(swap)
+                    free -= more
+        if have_rows:
+            plan += waiting
+            plan = plan or [Swap((node,), (node,)) for node in self.members.stale()]
         return plan
 
     def _swap(self, plan: list[Swap], bands: int) -> Generator[None, None, int]:
@@ -218,6 +234,7 @@ class Local:
         at_once, diagonals = self.options.swaps, dict[int, float]()
         if self._filling:
             at_once = FILLING
+        if self._first:  # rows of a part of the set must not sum to more than those of all of it
             diagonals = dict(zip(self._wanted.tolist(), self.set.diagonals(self._wanted).tolist(), strict=True))
         entered: list[int] = []
         for swap in plan:
@@ -228,6 +245,9 @@ class Local:
             entered += self.members.swap(swap, diagonals)
         self.issued += len(entered)
         self.members.swapped(entered)
+        self._first = self._first and self.to_come > 0
+        if self.options.bounces == "series" and self.members.left > self.set.most:
+            self._fill_anew()  # paths through nodes that left pile up
         yield from self.matrix.flush_in(FLUSH_PARTS * bands)
         self.lighting.set_slots(self.set.slot_at)
         self._lit = False
@@ -255,7 +275,9 @@ class Local:
             shadow = 1 - float(np.minimum(self.direct.fewest[some], asked).mean()) / asked
         missing = max(here, shadow, self.members.waiting / wanted) if emits else 0.0
         known = self.members.settled and self._fading == self._bounces_left == 0
-        done = not emits or (missing <= self.options.missing and known and not self._edited and self._all_known)
+        followed = not self._edited and self._all_known
+        dark = not emits and not self.issued
+        done = followed and (dark or (missing <= self.options.missing and known))
         remaining = missing if self.issued or not emits else 1.0
         return Progress(self.issued, remaining, self._escaped, converged=done, note=self._note)
 
@@ -264,20 +286,26 @@ class Local:
         """What to do where the matrix has lost much of the light."""
         if self._error <= NOTED or not self.matrix.coloured:
             return None
-        better = "--bounces inverse" if self.options.bounces == "series" else "--bits 32 or --bounces iterate"
+        exact = "--bounces iterate" if self.options.bits == 32 else "--bits 32 or --bounces iterate"
+        better = "--bounces inverse" if self.options.bounces == "series" else exact
         return f"the local matrix is off by {self._error:.0%} of the light: {better} would do"
 
     def settle(self) -> Progress:
         """End the work under way, and wait for the GPU."""
         self.poll(wait=True)
-        self._error = matrix_error(self.lighting, self.members)
+        self._look_for_error()
         return self.poll()
+
+    def _look_for_error(self) -> None:
+        """By how much the matrix is off, once its light is that of the set as it is."""
+        found = self.to_come == 0 and self.members.settled and self._lit and self._bounces_left == 0
+        self._error = matrix_error(self.lighting, self.members) if found else 0.0
 
     def energy(self) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
         self._finish()
         balance = balance_of(self.lightmap, self.direct.light, self.patches, self.members)
-        self._error = matrix_error(self.lighting, self.members)
+        self._look_for_error()
         if not self.issued and self.lightmap.scene.emits:
             return replace(balance, escaped=np.zeros(3), unshot=balance.emitted)
         self._escaped = balance.escaped
@@ -299,6 +327,7 @@ class Local:
         self.direct.follow(self.lightmap.scene)
         self._edited, self._editing, self._all_known, self._lit = False, False, True, False
         self._fading = self._bounces_left = self.issued = 0
+        self._first = True  # whether the set is filled for the first time
         self._escaped, self._error = np.zeros(3), 0.0
         self._look()
 
@@ -327,11 +356,20 @@ class Local:
         if [m.albedo for m in materials] != before:
             self.members.albedo, self._edited = self._albedo(), True
             self.members.look_again()
+            if self.options.bounces == "series":
+                self._fill_anew()  # paths with the old albedo would stay
+
+    def _fill_anew(self) -> None:
+        """Take all nodes out: they enter with the next pieces of work."""
+        self.members.clear()
+        self.lighting.set_slots(self.set.slot_at)
+        self._first, self._lit = True, False
 
     def _albedo(self) -> F64:
         """(nodes, 3) of each patch and cluster."""
         scene = self.lightmap.scene
-        return self.patches.albedo(scene.materials, scene.material_ids, self.lightmap.charts.face_triangle)
+        albedo = self.patches.albedo(scene.materials, scene.material_ids, self.lightmap.charts.face_triangle)
+        return np.minimum(albedo, MOST_ALBEDO)
 
     def set_observer(self, position: F64) -> None:
         """The eye is at ``position`` (3,) [m]: from the next piece of work on, what is near it is lit. Raises UserError for no
@@ -387,9 +425,10 @@ class Local:
 
     def passes(self, amount: int) -> dict[str, Callable[[], None]]:
         """Each part of a piece of work by itself, to be timed."""
+        self._finish()
         tiles = self._tiles.in_turn()
-        node = int(self._wanted[0])
-        run_to_end(self.rows.make(self._wanted[:1][~self.rows.has(self._wanted[:1])], self._wanted))
+        node, needed = int(self._wanted[0]), np.concatenate([self.set.nodes, self._wanted])
+        run_to_end(self.rows.make(self._wanted[:1][~self.rows.has(self._wanted[:1])], needed))
 
         def swap() -> None:
             if self.set.slot[node] >= 0:

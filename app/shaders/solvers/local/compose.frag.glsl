@@ -50,6 +50,8 @@ void main() {
     ivec2 px = ivec2(gl_FragCoord.xy);
     out_irradiance = vec4(0.0);
     if (texelFetch(t_places, px, 0).x == NO_PLACE) return;
-    vec3 H = texelFetch(t_direct, px, 0).rgb + max(indirect_at(px), 0.0);
+    vec3 indirect = indirect_at(px);
+    if (!any(isnan(indirect))) indirect = max(indirect, 0.0);  // what is no number must be seen
+    vec3 H = texelFetch(t_direct, px, 0).rgb + indirect;
     out_irradiance = vec4((1.0 - u_stays) * H, u_stays);
 }

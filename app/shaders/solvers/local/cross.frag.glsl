@@ -8,6 +8,8 @@ uniform vec3 u_weight;
 uniform bool u_exact;
 uniform float u_scale;
 
+const float LEAST = 1e-4;  // as in wait.frag.glsl
+
 layout(location = 0) out vec4 out_matrix;
 
 void main() {
@@ -17,7 +19,7 @@ void main() {
     if (u_exact) {
         vec3 closed = texelFetch(t_closed, ivec2(0), 0).rgb;
         if (i == u_slot) k = closed;
-        k /= 1.0 - u_weight * closed;
+        k /= max(1.0 - u_weight * closed, LEAST);
     }
     out_matrix = vec4(u_scale * k, 0.0);
 }
