@@ -37,7 +37,7 @@ class Members:
 
     @property
     def left(self) -> int:
-        """Nodes that have left and not come again."""
+        """How many different nodes have left since there were none."""
         return len(self._left)
 
     @property

@@ -104,6 +104,7 @@ class Rows:
 
     def of(self, nodes: I64) -> I32:
         """(n, N) i32 sorted: the place of what each ray of a node hit, LOST where it hit nothing that has texels."""
+        assert self.has(nodes).all(), "rows are made before they are asked for"
         return self._hits[self._row[nodes]]
 
     @property

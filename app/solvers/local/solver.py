@@ -41,7 +41,7 @@ from app.visibility.rays import RayScene
 I64 = NDArray[np.int64]
 SOFTWARE, HARDWARE = 1024, 4096  # patches of the set by default, where a CPU rasterises and where not
 WHOLE = 3  # highest level of patches that are large so that a whole scene is in the set
-FILLING = 64  # nodes that enter at once before there is half of a set
+FILLING = 64  # nodes that enter at once while the set is filled
 ROWS = 256  # made at once before that, and
 ROWS_WHILE_WALKING = 48  # while it goes on
 LEFT, MOST_REFLECTED = 1e-4, 0.99  # of light, that bounces may leave; mean albedo that their number allows for
@@ -198,19 +198,15 @@ class Local:
         """Rows that nodes need which are to enter, nearest first."""
         wanted = self._wanted
         missing = wanted[~self.rows.has(wanted)]
-        at_once = ROWS if self._filling else ROWS_WHILE_WALKING
+        at_once = ROWS if self._first else ROWS_WHILE_WALKING
         if len(missing):
             yield from self.rows.make(missing[:at_once], np.concatenate([self.set.nodes, wanted]))
-
-    @property
-    def _filling(self) -> bool:
-        return 2 * (self.set.most - self.set.free) < len(self._wanted)
 
     def _plan(self) -> list[Swap]:
         """The next nodes that enter and leave, whole swaps whose rows are there, or that enter anew. Nothing leaves for what
         cannot enter yet."""
         have_rows = bool(self.rows.has(self._wanted).all())
-        if self._filling and not have_rows:
+        if self._first and not have_rows:
             return []
         plan, waiting, free = list[Swap](), list[Swap](), self.set.free
         for swap in swaps(self.patches, self.set.nodes, self._wanted, free, self._tiles.observer):
@@ -232,9 +228,8 @@ class Local:
     def _swap(self, plan: list[Swap], bands: int) -> Generator[None, None, int]:
         """Carry out as much of the plan as a piece of work may; less where an edit waits for it to end."""
         at_once, diagonals = self.options.swaps, dict[int, float]()
-        if self._filling:
-            at_once = FILLING
         if self._first:  # rows of a part of the set must not sum to more than those of all of it
+            at_once = FILLING
             diagonals = dict(zip(self._wanted.tolist(), self.set.diagonals(self._wanted).tolist(), strict=True))
         entered: list[int] = []
         for swap in plan:
