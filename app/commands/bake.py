@@ -13,7 +13,7 @@ import numpy as np
 
 from app.bake import prepare_directory, write_bake
 from app.commands.report import report, summary
-from app.commands.steps import not_reached, open_scene, session_options, solve
+from app.commands.steps import estimate, open_scene, session_options, solve
 from app.errors import UserError
 from app.gpu import gpu_context
 from app.lightmap.collapse import collapse
@@ -36,9 +36,7 @@ def bake(flags: argparse.Namespace) -> int:
         open_scene(session, flags.scene, console)
         failure = solve(session, flags, console)
         stopped = failure is not None or session.run.interrupted
-        whole = stopped or _estimate(session, console)
-        if (unreached := not_reached(session, flags)) is not None:
-            console.warn(unreached)
+        whole = stopped or estimate(session, flags, console)
         clock = time.perf_counter()
         lightmap = session.lightmap
         irradiance, covered = collapse(lightmap.pool, lightmap.irradiance(ambient=True))
@@ -55,19 +53,6 @@ def bake(flags: argparse.Namespace) -> int:
     result = {"output": [str(path) for path in vars(files).values()], **result}
     console.result(result, f"{flags.output}: {line}")
     return 130 if result["interrupted"] or not whole else 0
-
-
-def _estimate(session: Session, console: Console) -> bool:
-    """Work out how far off the light is expected to be. False where Ctrl-C goes without."""
-    clock = time.perf_counter()
-    try:
-        with console.progress("gathering") as tell:
-            session.estimate_now(lambda share: tell("the error that is expected", share))
-    except KeyboardInterrupt:
-        console.warn("stopped: nothing is said of the error that is expected")
-        return False
-    session.load_seconds["expected error"] = time.perf_counter() - clock
-    return True
 
 
 @contextlib.contextmanager

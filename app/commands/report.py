@@ -60,17 +60,22 @@ def notes(session: Session) -> list[str]:
     found = [] if note is None else [note]
     if abs(share) > UNBALANCED:
         what = "is lost" if share > 0 else "comes from nothing"
-        why, smaller = "texels are", "--density"
-        if not session.family.distributes:
-            why = f"it is {session.family.remains}, or {why}"
-        elif "level" in {spec.name for spec in specs(session.family.options)}:
-            why, smaller = f"patches and {why}", "--density, --level"
-        other = " or --solver gathering" if session.family.distributes else ""
-        found.append(
-            f"{abs(share):.1%} of the light {what}: {why} large beside what stands between them; "
-            f"smaller ones ({smaller}){other} would do"
-        )
+        found.append(f"{abs(share):.1%} of the light {what}: {_remedy(session)}")
     return found
+
+
+def _remedy(session: Session) -> str:
+    """Why light is lost or comes from nothing, and what would do."""
+    family = session.family
+    if not family.everywhere:
+        return "what is far from the observer is known coarsely, or as a mean; --solver gathering lights all of it"
+    why, smaller = "texels are", "--density"
+    if not family.distributes:
+        why = f"it is {family.remains}, or {why}"
+    elif "level" in {spec.name for spec in specs(family.options)}:
+        why, smaller = f"patches and {why}", "--density, --level"
+    other = " or --solver gathering" if family.distributes else ""
+    return f"{why} large beside what stands between them; smaller ones ({smaller}){other} would do"
 
 
 def summary(session: Session, result: dict[str, Any]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from app.commands.flags import WalkOptions
 from app.commands.report import report, summary
-from app.commands.steps import check_display, open_scene, session_options, solve
+from app.commands.steps import check_display, estimate, open_scene, session_options, solve, stop_of
 from app.commands.walk import Walk, save_walk
 from app.errors import UserError
 from app.gpu import gpu_context
@@ -49,6 +49,8 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
             _open_reference(session, flags.reference, console)
         view.tell_observer()
         failure = solve(session, flags, console)
+        if stop_of(flags).by_error and session.run.converged:
+            estimate(session, flags, console)
         session.compare(wait=True)
         if flags.exposure is None:
             view.expose()

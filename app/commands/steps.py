@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from typing import Any
 
 from app.atlas.options import AtlasOptions
@@ -19,7 +20,7 @@ from app.session.stats import Stats
 from app.solvers import SOLVERS
 from app.util.console import Console
 
-__all__ = ["check_display", "not_reached", "open_scene", "session_options", "solve"]
+__all__ = ["check_display", "estimate", "open_scene", "session_options", "solve", "stop_of"]
 
 
 def session_options(flags: argparse.Namespace) -> dict[str, Any]:
@@ -45,7 +46,7 @@ def _solver_options(flags: argparse.Namespace) -> Options:
     return options.replace(**{family.threshold: max(min(allowed, spec.default), spec.minimum)})
 
 
-def not_reached(session: Session, flags: argparse.Namespace) -> str | None:
+def _not_reached(session: Session, flags: argparse.Namespace) -> str | None:
     """What to say where a solve has converged and its expected error is still larger than was asked for."""
     for flag, asked, name in (("--error", flags.error, "median"), ("--error-rms", flags.error_rms, "rms")):
         expected = None if session.expected is None else getattr(session.expected, name)
@@ -78,11 +79,15 @@ def open_scene(
         console.warn(warning)
 
 
+def stop_of(flags: argparse.Namespace) -> Stop:
+    """When the solve is to end."""
+    error, rms = (None if asked is None else asked / 100 for asked in (flags.error, flags.error_rms))
+    return Stop(flags.work, flags.time, error, rms)
+
+
 def solve(session: Session, flags: argparse.Namespace, console: Console) -> NotFiniteError | None:
     """Solve. What broke the light is returned: what there is can still be written."""
-    error, rms = (None if asked is None else asked / 100 for asked in (flags.error, flags.error_rms))
-    stop = Stop(flags.work, flags.time, error, rms)
-
+    stop = stop_of(flags)
     said = set()
 
     def say(stats: Stats) -> None:
@@ -100,3 +105,19 @@ def solve(session: Session, flags: argparse.Namespace, console: Console) -> NotF
         if note not in said:
             console.warn(note)
     return None
+
+
+def estimate(session: Session, flags: argparse.Namespace, console: Console) -> bool:
+    """Work out how far off the light is expected to be, and say where that is more than was asked for. False where Ctrl-C goes
+    without."""
+    clock = time.perf_counter()
+    try:
+        with console.progress("gathering") as tell:
+            session.estimate_now(lambda share: tell("the error that is expected", share))
+    except KeyboardInterrupt:
+        console.warn("stopped: nothing is said of the error that is expected")
+        return False
+    session.load_seconds["expected error"] = time.perf_counter() - clock
+    if (unreached := _not_reached(session, flags)) is not None:
+        console.warn(unreached)
+    return True

@@ -38,11 +38,11 @@ def light_of_lamps(local: Local) -> np.ndarray:
 def filled(gpu: Gpu, bands: int, rng: np.random.Generator) -> np.ndarray:
     """A matrix that some nodes have entered, its updates added in so many parts."""
     matrix = LocalMatrix(gpu, MOST, "inverse", 32)
-    areas, weights = np.ones(MOST), np.zeros((MOST, 3))
+    albedos = np.zeros((MOST, 3))
     for slot in range(6):
         kernel = np.where(np.arange(MOST) < slot, rng.uniform(0.0, 0.1, MOST), 0.0)
-        matrix.enter(slot, kernel, np.full(3, 0.5), weights, np.zeros(MOST, bool))
-        weights[slot] = 0.5 * areas[slot]
+        matrix.enter(slot, kernel, np.full(3, 0.5), albedos, np.zeros(MOST, bool))
+        albedos[slot] = 0.5
     for _ in matrix.flush_in(bands):
         pass
     found = matrix.read()

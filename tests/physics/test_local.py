@@ -251,7 +251,7 @@ def test_another_albedo_ends_where_a_fresh_solve_ends(gpu: Gpu, bounces: str) ->
     [
         ({"patches": 16384, "matrix_memory": 65536}, ""),
         ({"patches": 1024, "matrix_memory": 1}, "--matrix-memory 1: the matrix of"),
-        ({"row_memory": 1, "rays": 1024}, "--row-memory 1:"),
+        ({"patches": 1024, "row_memory": 1, "rays": 1024}, "--row-memory 1:"),
     ],
 )
 def test_what_does_not_fit_says_so(gpu: Gpu, options: dict[str, object], what: str) -> None:

@@ -80,6 +80,12 @@ def test_morton_codes_are_those_of_cubes_in_cubes() -> None:
 
 # -- which are in the set ----------------------------------------------------------------------------------------------
 
+
+def all_may(nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether they may enter."""
+    return np.ones(len(nodes), bool)
+
+
 EYES = ((0.0, 0.0, 0.0), (0.3, -0.1, 0.2), (-0.5, 0.3, -0.4), (9.0, 0.0, 0.0))
 
 
@@ -130,22 +136,41 @@ def test_swaps_lead_to_what_is_wanted_and_never_run_over(patches: Patches, casca
         observer = np.array(eye)
         wanted = selection.cascade(observer) if cascade else selection.nearest(observer)
         now = set(inside.tolist())
-        for swap in swaps(patches, inside, wanted, MOST - len(inside), observer):
+        for swap in swaps(patches, inside, wanted, MOST - len(inside), observer, all_may):
             assert set(swap.leave) <= now
             now = now - set(swap.leave) | set(swap.enter)
             assert len(now) <= MOST
             assert texels_in(patches, np.array(sorted(now))).max() == 1, "two nodes cover the same texel"
         assert now == set(wanted.tolist())
         inside = np.array(sorted(now))
-        assert not list(swaps(patches, inside, wanted, 0, observer)), "nothing is nearer"
+        assert not list(swaps(patches, inside, wanted, 0, observer, all_may)), "nothing is nearer"
 
 
 def test_what_is_nearest_enters_first_and_what_is_farthest_leaves_first(patches: Patches) -> None:
     selection = Selection(patches, MOST)
     inside, observer = selection.nearest(np.zeros(3)), np.array([0.4, 0.0, 0.1])
-    plan = list(swaps(patches, inside, selection.nearest(observer), 0, observer))
+    plan = list(swaps(patches, inside, selection.nearest(observer), 0, observer, all_may))
     enter = [node for swap in plan for node in swap.enter]
     leave = [node for swap in plan for node in swap.leave]
     assert len(enter) > 10 and len(enter) == len(leave)
     assert (np.diff(distances(patches, np.array(enter), observer)) >= -1e-12).all()
     assert (np.diff(distances(patches, np.array(leave), observer)) <= 1e-12).all()
+
+
+@pytest.mark.parametrize("cascade", [False, True])
+def test_nothing_leaves_for_what_may_not_enter_yet(patches: Patches, cascade: bool) -> None:
+    selection, observer = Selection(patches, MOST), np.array([0.4, 0.0, 0.1])
+    choose = selection.cascade if cascade else selection.nearest
+    inside, wanted = choose(np.zeros(3)), choose(observer)
+    late = np.setdiff1d(wanted, inside)[::3]
+    now = set(inside.tolist())
+    for swap in swaps(patches, inside, wanted, MOST - len(inside), observer, lambda nodes: ~np.isin(nodes, late)):
+        assert not set(swap.enter) & set(late.tolist())
+        now = now - set(swap.leave) | set(swap.enter)
+        assert len(now) <= MOST
+    assert now != set(inside.tolist()), "the others enter"
+    covered = texels_in(patches, np.array(sorted(now))) > 0
+    assert covered.sum() >= 0.95 * (texels_in(patches, inside) > 0).sum(), "no hole is left where rows are waited for"
+    left = len(late)
+    rest = list(swaps(patches, np.array(sorted(now)), wanted, MOST - len(now), observer, all_may))
+    assert len([node for swap in rest for node in swap.enter]) >= left

@@ -29,7 +29,7 @@ from app.solvers.gathering.compose import Compose, Noise, noise_of
 from app.solvers.gathering.hits import GROUP, Hits
 from app.solvers.gathering.inspectable import Inspectable
 from app.solvers.gathering.options import GatheringOptions
-from app.util.parts import is_running, run_to_end
+from app.util.parts import UnderWay, run_to_end
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
@@ -76,7 +76,7 @@ class Gathering:
         self._compose = Compose(gpu, lightmap, self.origins, self.points, self._at, self.rays)
         self._balance = Balance(gpu, self.points)
         self._inspectable = Inspectable(gpu, lightmap, self.points, self._at, self.hits, self._directs, self._compose)
-        self._under_way: Generator[None, None, int] | None = None
+        self._under_way = UnderWay()
         self._judged: list[tuple[int, int, ReadBack]] = []  # rays, version of the leaves
         self._progress = Progress(0, 1.0, np.zeros(3))
         self._edited, self._shown, self.drawn = False, 0, 0
@@ -93,15 +93,13 @@ class Gathering:
 
     def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
         """About ``amount`` rays more of each texel, whole groups of them, in parts. Returns how many."""
-        self._finish()
+        self._under_way.finish()
         count = -(-min(amount, BATCH if self.issued else FIRST) // GROUP) * GROUP
         if self._edited:
-            self._under_way = self._follow_edit()
-        elif self._leaves_wait:
-            self._under_way = self._follow_leaves(bands)
-        else:
-            self._under_way = self._gather_more(count, bands)
-        return self._under_way
+            return self._under_way.begin(self._follow_edit())
+        if self._leaves_wait:
+            return self._under_way.begin(self._follow_leaves(bands))
+        return self._under_way.begin(self._gather_more(count, bands))
 
     def _gather_more(self, count: int, bands: int) -> Generator[None, None, int]:
         """So many rays more of each texel, and the light that they bring."""
@@ -213,18 +211,12 @@ class Gathering:
         """On the points, and on texels where they are others."""
         return (self.direct,) if self.at_points is self.direct else (self.at_points, self.direct)
 
-    def _finish(self) -> None:
-        """End the work that is under way, if any; of its own parts this asks nothing."""
-        if self._under_way is not None and not is_running(self._under_way):
-            run_to_end(self._under_way)
-            self._under_way = None
-
     # -- how far it is -------------------------------------------------------------------------------------------------
 
     def poll(self, *, wait: bool = False) -> Progress:
         """The newest progress that has arrived, a piece of work late; with ``wait`` that of the last."""
         if wait:
-            self._finish()
+            self._under_way.finish()
         while len(self._judged) > (0 if wait else 1):
             done, version, judged = self._judged.pop(0)
             self._noise, self._noise_of = noise_of(judged), version
@@ -242,7 +234,7 @@ class Gathering:
 
     def energy(self) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
-        self._finish()
+        self._under_way.finish()
         balance = self._balance.measure(self.hits, self.at_points.light, self._compose.indirect)
         self._progress = replace(self._progress, escaped=balance.escaped)
         return balance
@@ -251,9 +243,7 @@ class Gathering:
 
     def reset(self) -> None:
         """Forget all light and all rays."""
-        if self._under_way is not None:
-            self._under_way.close()
-            self._under_way = None
+        self._under_way.drop()
         for *_, judged in self._judged:
             judged.take()
         self._judged.clear()
@@ -276,7 +266,7 @@ class Gathering:
 
     def set_options(self, options: GatheringOptions) -> None:
         """Use other knobs from the next rays on; what is shown follows at once."""
-        self._finish()
+        self._under_way.finish()
         smooth, self.options = self.options.smooth, options
         if self.issued and options.smooth != smooth:
             self._show(self._shown)
@@ -373,8 +363,7 @@ class Gathering:
             yield
 
     def release(self) -> None:
-        if self._under_way is not None:
-            self._under_way.close()
+        self._under_way.drop()
         for *_, judged in self._judged:
             judged.take()
         refinement = self.lightmap.refinement

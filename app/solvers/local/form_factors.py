@@ -69,7 +69,7 @@ class LocalSet:
 
     def enter(self, node: int, slot: int, diagonal: float | None = None) -> F64:
         """Put a node into a free slot. diagonal: its F_ii, where other nodes are known that will enter, too. Returns (most,)
-        F_ij / A_j of it with each slot, its own as well, in 1 / unit."""
+        √(A_i A_j) F_ij / A_j of it with each slot, its own as well: symmetric, and never more than 1."""
         start, end = self._patches.start[node], self._patches.end[node]
         hits = self._rows.of(np.array([node]))[0]
         self.node[slot], self.slot[node], self.slot_at[start:end] = node, slot, slot
@@ -83,7 +83,7 @@ class LocalSet:
         kernel[slot] = self.diagonal[slot] / self.area[slot]
         self.row_sum += kernel * self.area[slot]
         self.row_sum[slot] = kernel @ self.area
-        return kernel
+        return np.asarray(kernel * np.sqrt(self.area[slot] * self.area))
 
     def kernel(self, slot: int) -> F64:
         """(most,) F_ij / A_j of a slot's node with each other, and with itself what is on the diagonal, in 1 / unit."""

@@ -29,10 +29,10 @@ def figures_of(
     }
 
 
-def facts_of(node: int, slot: int, patches: Patches, age: float, share: float) -> dict[str, str]:
-    """Of the node that a texel is in. age: frames since it entered; share: of what it sees that is outside of the set."""
+def facts_of(node: int, slot: int, patches: Patches, age: int, share: float) -> dict[str, str]:
+    """Of the node that a texel is in. age: pieces of work since it entered; share: of what it sees that is outside of the set."""
     if slot < 0:
         return {"Local set": "not in it"}
     texels = int(patches.end[node] - patches.start[node])
     kind = "patch" if patches.level[node] == 0 else f"cluster of level {patches.level[node]}"
-    return {"Local set": f"{kind}, {texels:,} texels, {age:.0f} swaps ago", "Sees of outside": f"{100 * share:.1f} %"}
+    return {"Local set": f"{kind}, {texels:,} texels, {age:,} pictures ago", "Sees of outside": f"{100 * share:.1f} %"}

@@ -1,6 +1,7 @@
 """Lighting: from the direct light on texels, by one product with the matrix, to the indirect light of nodes, and back to texels.
 
     H_i = x_i + Σ_j G_ij (e_j + ρ_j x_j),    e = mean of ρ H_direct over a node,    x_i = F_i,outside B_outside
+    G_ij = S_ij √(A_j / A_i)
 
 ``iterate`` sums H = x + F (e + ρ H) a few times instead, from the light of the frame before. When nodes come and go, what is
 shown becomes what it is now by and by, so that a border that moves is not seen; when lamps change, at once.
@@ -23,6 +24,7 @@ from app.visibility.origins import Origins
 SWEEPS = 4  # bounces of ``iterate`` whenever it lights
 A_ROW = 1 << int(glsl_constant("direct_light/folded.glsl", "FOLD_BITS"))
 NODE_VECTORS = 3
+COLOURS = 1024  # that tell nodes apart, where they are shown
 
 
 class Lighting:
@@ -65,25 +67,31 @@ class Lighting:
         self._target: Framebuffer | None = None
         self._of: Texture | None = None
         self._reading: ReadBack | None = None
-        self.from_outside = 0.0
         self.clear()
 
     def clear(self) -> None:
         """No light."""
         for target in self._targets.values():
             target.clear()
+        self._forget_reading()
+        self.from_outside = 0.0
 
     # -- what the set is -----------------------------------------------------------------------------------------------
 
-    def set_nodes(self, node: NDArray[np.int64], area: F64, albedo: F64, outside: F64, age: F64) -> None:
-        """What is in each slot: node (most,) or -1, area, albedo (most, 3), share of outside, age in frames."""
+    def set_nodes(
+        self, node: NDArray[np.int64], area: F64, albedo: F64, outside: F64, entered: NDArray[np.int64]
+    ) -> None:
+        """What is in each slot: node (most,) or -1, area, albedo (most, 3), share of outside, and the piece of
+        work in which it entered."""
         patches, there = self._patches, node >= 0
         table = np.zeros((NODE_VECTORS, self.most, 4), np.float32)
         table[0, :, :3], table[0, :, 3] = albedo, np.where(there, area, 0.0)
-        table[1, :, 0], table[1, :, 1] = patches.start[node], patches.end[node]
+        table[1, :, 0], table[2, :, 2] = patches.start[node] & 0xFFFF, patches.start[node] >> 16  # exact as floats
+        table[1, :, 1] = patches.end[node] - patches.start[node]
         table[1, :, 2] = np.where(there, outside, 0.0)
         table[1, :, 3] = self._edge * np.exp2(patches.level[node].astype(np.float64))
-        table[2, :, 0], table[2, :, 1] = patches.level[node], age
+        table[2, :, 0], table[2, :, 1] = patches.level[node], entered
+        table[2, :, 3] = node % COLOURS
         self._nodes.write(table.tobytes())
 
     def set_slots(self, slot_at: NDArray[np.int32]) -> None:
@@ -153,13 +161,14 @@ class Lighting:
         )
         self._gpu.release_all(mesh)
 
-    def marks(self) -> Texture:
-        """What the local set is, on every texel, see mark.frag.glsl."""
+    def marks(self, now: int) -> Texture:
+        """What the local set is, on every texel, see mark.frag.glsl. now: pieces of work so far."""
         if self._marks is None:
             texture = self._gpu.texture(self._lightmap.size, 4, "f4")
             self._marks = texture, self._gpu.target(texture)
         texture, target = self._marks
-        self._mark.draw(target, textures={"t_places": self._places, "t_slots": self._slots, "t_nodes": self._nodes})
+        known = {"t_places": self._places, "t_slots": self._slots, "t_nodes": self._nodes}
+        self._mark.draw(target, textures=known, uniforms={"u_now": float(now)})
         return texture
 
     def _forget_target(self) -> None:
@@ -167,10 +176,14 @@ class Lighting:
             self._gpu.release_all(self._target)
         self._target = self._of = None
 
-    def release(self) -> None:
-        self._forget_target()
+    def _forget_reading(self) -> None:
         if self._reading is not None:
             self._reading.take()
+            self._reading = None
+
+    def release(self) -> None:
+        self._forget_target()
+        self._forget_reading()
         if self._marks is not None:
             self._gpu.release_all(*self._marks)
         self._gpu.release_all(*self._targets.values(), *self._targets)

@@ -3,15 +3,15 @@
     G = F + FρF + FρFρF + … = F (I - ρF)⁻¹,    H = direct + G ρ direct
 
 is what the paper calls the matrix of several reflections [Shcherbakov19, 3.2], per colour. Stored is what is symmetric by
-reciprocity, K_ij = G_ij / A_j, and half of it. A node n with form factors f (f_i = F_in / A_n) enters, with
-w = ρ_n A_n and all vectors and products among the nodes that are there, by
+reciprocity, S_ij = G_ij √(A_i / A_j), and half of it. A node n with form factors f (f_i = F_in √(A_i / A_n), f_n = F_nn) enters,
+with ρ that of each node and all vectors and products among the nodes that are there, by
 
-    inverse:  k = f + K Aρ f,    σ = f_n + f·Aρ k,    K += w/(1 - wσ) k kᵀ,    column n = k/(1 - wσ),    K_nn = σ/(1 - wσ)
-    series:   d = w f·Aρ f,      k = (1 + d)(f + K Aρ f),    K += w k kᵀ,      column n = k,            K_nn = 0
+    inverse:  k = f + S ρ f,    σ = f_n + f·ρ k,    S += ρ_n/(1 - ρ_n σ) k kᵀ,    column n = k/(1 - ρ_n σ),  S_nn = σ/(1 - ρ_n σ)
+    series:   d = ρ_n f·ρ f,    k = (1 + d)(f + S ρ f),    S += ρ_n k kᵀ,         column n = k,              S_nn = 0
 
-the bordered inverse, and equations 1 to 5 of the paper. It leaves by K -= w/(1 + w K_nn) k kᵀ with k its column, which undoes
+the bordered inverse, and equations 1 to 5 of the paper. It leaves by S -= ρ_n/(1 + ρ_n S_nn) k kᵀ with k its column, which undoes
 the first exactly; the paper only clears row and column, and paths through the node stay in the others. They would be counted
-twice when it comes again: pairs that were both there when it left are left out then. ``iterate`` keeps F / A alone, and
+twice when it comes again: pairs that were both there when it left are left out then. ``iterate`` keeps the f alone, and
 light is reflected in it a few times whenever it is asked for.
 
 Updates wait as vectors, a few of them, until one pass over the matrix adds them all: reading and writing it is what costs.
@@ -81,20 +81,20 @@ class LocalMatrix:
 
     # -- nodes that come and go ----------------------------------------------------------------------------------------
 
-    def enter(self, slot: int, kernel: F64, weight: F64, others: F64, seen: NDArray[np.bool_]) -> None:
-        """A node enters a free slot. kernel (most,): f, with each slot, F_ij / A_j; weight (3,): w = ρA of it; others (most, 3):
-        Aρ of each slot; seen (most,): whether what is in a slot was there when the node left last."""
+    def enter(self, slot: int, kernel: F64, albedo: F64, others: F64, seen: NDArray[np.bool_]) -> None:
+        """A node enters a free slot. kernel (most,): f, with each slot; albedo (3,): ρ of it; others (most, 3): ρ of each
+        slot, 0 where it is free; seen (most,): whether what is in a slot was there when the node left last."""
         first = np.ones(3)
         listed = np.flatnonzero((kernel != 0) & (np.arange(self.most) != slot))
         if self.bounces == "series":
-            first += weight * ((kernel[listed] ** 2)[:, None] * others[listed]).sum(0)
+            first += albedo * ((kernel[listed] ** 2)[:, None] * others[listed]).sum(0)
         given = np.zeros((self.most, 4), np.float32)
         given[:, :3], given[:, 3] = kernel[:, None] * first, 1.0 - seen
         if self.bounces == "series":
             given[slot, :3] = 0.0
         self._given.write(given.tobytes())
         if not self.coloured:
-            self._write_cross(slot, self._given, self._closed, exact=False, weight=np.zeros(3))
+            self._write_cross(slot, self._given, self._closed, exact=False, albedo=np.zeros(3))
             return
         terms = np.zeros((self.most, 4), np.float32)
         terms[: len(listed), :3] = others[listed] * given[listed, :3]
@@ -120,11 +120,11 @@ class LocalMatrix:
         )
         known = bool(seen.any()) and not exact
         for masked in (False, True)[: 1 + known]:
-            self._push(slot, weight, enters=True, exact=exact, masked=masked)
-        self._write_cross(slot, self._column, self._closed, exact=exact, weight=weight)
+            self._push(slot, albedo, enters=True, exact=exact, masked=masked)
+        self._write_cross(slot, self._column, self._closed, exact=exact, albedo=albedo)
 
-    def leave(self, slot: int, weight: F64) -> None:
-        """The node in a slot leaves. weight (3,): w = ρA, with which it has entered."""
+    def leave(self, slot: int, albedo: F64) -> None:
+        """The node in a slot leaves. albedo (3,): ρ, with which it has entered."""
         if self.bounces == "inverse":
             self._make_room(1)
             self._look.draw(
@@ -138,20 +138,20 @@ class LocalMatrix:
                 },
                 uniforms={"u_slot": slot, "u_pending": self._pending, "u_scale": 1 / self._scale, "u_count": -1},
             )
-            self._push(slot, weight, enters=False, exact=True, masked=False)
+            self._push(slot, albedo, enters=False, exact=True, masked=False)
         if self.coloured:
             self._forget_waiting(slot)
         self._given.write(bytes(16 * self.most))
-        self._write_cross(slot, self._given, self._closed, exact=False, weight=np.zeros(3))
+        self._write_cross(slot, self._given, self._closed, exact=False, albedo=np.zeros(3))
 
-    def _push(self, slot: int, weight: F64, *, enters: bool, exact: bool, masked: bool) -> None:
+    def _push(self, slot: int, albedo: F64, *, enters: bool, exact: bool, masked: bool) -> None:
         """Let the column that was just found wait as an update."""
         self._wait.draw(
             self._targets[self._waiting],
             textures={"t_column": self._column, "t_closed": self._closed, "t_given": self._given},
             uniforms={
                 "u_slot": slot,
-                "u_weight": tuple(weight.tolist()),
+                "u_albedo": tuple(albedo.tolist()),
                 "u_enters": enters,
                 "u_exact": exact,
                 "u_masked": masked,
@@ -167,7 +167,7 @@ class LocalMatrix:
         for nth in range(self._pending):
             target.clear(viewport=(slot % ROW, nth * self._rows + slot // ROW, 1, 1))
 
-    def _write_cross(self, slot: int, column: Texture, closed: Texture, *, exact: bool, weight: F64) -> None:
+    def _write_cross(self, slot: int, column: Texture, closed: Texture, *, exact: bool, albedo: F64) -> None:
         """Row and column of a slot."""
         for viewport in ((0, slot, slot + 1, 1), (slot, slot, 1, self.most - slot)):
             self._cross.draw(
@@ -175,7 +175,7 @@ class LocalMatrix:
                 textures={"t_column": column, "t_closed": closed},
                 uniforms={
                     "u_slot": slot,
-                    "u_weight": tuple(weight.tolist()),
+                    "u_albedo": tuple(albedo.tolist()),
                     "u_exact": exact,
                     "u_scale": self._scale,
                 },
@@ -215,7 +215,7 @@ class LocalMatrix:
     # -- light ---------------------------------------------------------------------------------------------------------
 
     def multiply(self, vector: Texture) -> Texture:
-        """K v, v a vector RGBA32F, as CHUNKS columns that are to be summed (CHUNKS, most) RGBA32F, of 1 / ``scale``."""
+        """S v, v a vector RGBA32F, as CHUNKS columns that are to be summed (CHUNKS, most) RGBA32F, of 1 / ``scale``."""
         self.flush()
         self._multiply.draw(
             self._targets[self._partial],
@@ -225,7 +225,7 @@ class LocalMatrix:
         return self._partial
 
     def read(self) -> F32:
-        """K (most, most, 3), or (most, most, 1) for ``iterate``. Waits for the GPU."""
+        """S (most, most, 3), or (most, most, 1) for ``iterate``. Waits for the GPU."""
         self.flush()
         dtype: Any = np.float16 if self._matrix.dtype == "f2" else np.float32
         raw = np.frombuffer(self._matrix.read(), dtype).reshape(self.most, self.most, -1)

@@ -16,11 +16,12 @@ OTHER = 1e-6  # of an albedo, beyond which it is another
 class Members:
     """A set and a matrix that hold the same nodes.
 
-    albedo (nodes, 3): of each patch and cluster, with which nodes enter from now on.
+    albedo (nodes, 3): of each patch and cluster, with which nodes enter from now on. pieces: of work, so far; entered (slots,):
+    the one in which what is in each slot entered.
     """
 
     def __init__(self, held: LocalSet, matrix: LocalMatrix, albedo: F64) -> None:
-        self.held, self.matrix, self.albedo = held, matrix, albedo
+        self.held, self.matrix, self.albedo, self.pieces = held, matrix, albedo, 0
         self.clear()
 
     def clear(self) -> None:
@@ -28,22 +29,17 @@ class Members:
         most = self.held.most
         self.held.clear()
         self.matrix.clear()
-        self._weight = np.zeros((most, 3))  # ρA with which the node in each slot has entered
+        self._inside = np.zeros((most, 3))  # ρ with which the node in each slot has entered
         self._since = np.full(most, -1)  # the count at which what is in each slot entered
         self._left: dict[int, int] = {}  # and each node left
-        self._count = self._swaps = 0
-        self._entered = np.zeros(most)
+        self._count = 0
+        self.entered = np.zeros(most, np.int64)
         self._stale: list[int] | None = None  # None: not looked for
 
     @property
     def left(self) -> int:
         """How many different nodes have left since there were none."""
         return len(self._left)
-
-    @property
-    def age(self) -> F64:
-        """(slots,) swaps since what is in each entered."""
-        return self._swaps - self._entered
 
     @property
     def mean_albedo(self) -> float:
@@ -78,8 +74,7 @@ class Members:
         if self._stale is None:
             held = self.held
             drifted = np.abs(held.drift()) > DRIFT
-            weight, area = self._albedo_of_slots * held.area[:, None], held.area[:, None]
-            other = self.matrix.coloured and (np.abs(weight - self._weight) > OTHER * area).any(1)
+            other = self.matrix.coloured and (np.abs(self._albedo_of_slots - self._inside) > OTHER).any(1)
             self._stale = [int(node) for node in held.node[(drifted | other) & (held.node >= 0)]]
         return self._stale
 
@@ -96,25 +91,20 @@ class Members:
             self._stale = None
         return slots
 
-    def swapped(self, slots: list[int]) -> None:
-        """Some swaps are done, by which nodes have entered these slots."""
-        self._swaps += 1
-        self._entered[slots] = self._swaps
-
     def leave(self, node: int) -> None:
         """Take a node out."""
         slot = self.held.leave(node)
-        self.matrix.leave(slot, self._weight[slot])
+        self.matrix.leave(slot, self._inside[slot])
         self._left[node] = self._count
 
     def enter(self, node: int, diagonal: float | None = None) -> int:
         """The slot that a node has entered. diagonal: see ``LocalSet.enter``."""
         held, slot = self.held, self.held.first_free()
         kernel = held.enter(node, slot, diagonal)
-        self._weight[slot] = self.albedo[node] * held.area[slot]
+        self._inside[slot] = self.albedo[node]
         self._count += 1
         there = held.node >= 0
         known = there & (self._since <= self._left.get(node, -1))
-        self.matrix.enter(slot, kernel, self._weight[slot], self._weight * there[:, None], known)
+        self.matrix.enter(slot, kernel, self._inside[slot], self._inside * there[:, None], known)
         self._since[slot] = self._count
         return slot

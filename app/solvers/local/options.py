@@ -28,7 +28,8 @@ class LocalOptions(Options):
     )
     patches: int | None = option(
         None,
-        "patches of the local set; left out, as many as memory allows, 1024 at most where a CPU rasterises, else 4096",
+        "patches of the local set, in steps of 64; left out, as many as memory allows, 1024 at most where a CPU rasterises, "
+        "else 4096",
         minimum=16,
         maximum=16_384,
     )

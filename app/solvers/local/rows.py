@@ -28,6 +28,7 @@ I64 = NDArray[np.int64]
 FORMAT = b"glowtree rows 1"  # changes when rays start elsewhere, or rows are held otherwise
 CACHE_FILES = 8  # kept, newest first
 BYTES = 4  # for each ray
+ROWS_OF_A_NODE = 2  # of the set: what enters while it moves needs its row before another is forgotten
 LOST = np.iinfo(np.int32).max  # a ray that left the scene, or met a side without texels
 AT_ONCE = 1 << 16  # rays, of one draw
 NO_PLACE = 0xFFFFFFFF
@@ -114,7 +115,7 @@ class Rows:
 
     def make(self, nodes: I64, needed: I64) -> Generator[None, None, None]:
         """The rows of these nodes, in parts. needed: nodes whose rows stay where memory ends."""
-        self._make_room(len(nodes), needed)
+        self.make_room(len(nodes), needed)
         at_once = max(AT_ONCE // self.rays, 1)
         for first in range(0, len(nodes), at_once):
             some = nodes[first : first + at_once]
@@ -135,7 +136,7 @@ class Rows:
         self._row[nodes] = np.arange(rows.start, rows.stop)
         self.made += len(nodes)
 
-    def _make_room(self, more: int, needed: I64) -> None:
+    def make_room(self, more: int, needed: I64) -> None:
         """Forget rows that nobody needs where there is no memory for so many more."""
         if self.made + more <= self._most:
             return
@@ -207,9 +208,9 @@ class Rows:
 def rows_in(mebibytes: int, rays: int, least: int) -> int:
     """How many rows of so many rays are in that memory. Raises UserError where a local set of ``least`` nodes needs more."""
     most = mebibytes * 2**20 // (rays * BYTES)
-    if most < 2 * least:
+    needed = ROWS_OF_A_NODE * least
+    if most < needed:
         raise UserError(
-            f"--row-memory {mebibytes}: {2 * least} rows of {rays} rays take "
-            f"{-(-2 * least * rays * BYTES // 2**20)} MiB"
+            f"--row-memory {mebibytes}: {needed} rows of {rays} rays take {-(-needed * rays * BYTES // 2**20)} MiB"
         )
     return most

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,9 +100,12 @@ class Swap:
     enter: tuple[int, ...]
 
 
-def swaps(patches: Patches, inside: I64, wanted: I64, free: int, observer: F64) -> Iterator[Swap]:
+def swaps(
+    patches: Patches, inside: I64, wanted: I64, free: int, observer: F64, can_enter: Callable[[I64], NDArray[np.bool_]]
+) -> Iterator[Swap]:
     """How nodes ``inside`` become those ``wanted``, with no more than ``free`` more of them at any time: what enters, nearest
-    first, each with all that it overlaps; where there is no room, first what leaves, farthest first."""
+    first, each with all that it overlaps; where there is no room, first what leaves, farthest first. can_enter: which of nodes
+    (n,) may enter yet; the others are left out, and nothing leaves for them."""
     enter, leave = np.setdiff1d(wanted, inside), np.setdiff1d(inside, wanted)
     nodes = np.concatenate([enter, leave])
     if not len(nodes):
@@ -122,13 +125,18 @@ def swaps(patches: Patches, inside: I64, wanted: I64, free: int, observer: F64) 
         mine = members[g]
         return Swap(tuple(nodes[mine[~entering[mine]]].tolist()), tuple(nodes[mine[entering[mine]]].tolist()))
 
-    growing = [g for g in np.argsort(away, kind="stable").tolist() if net[g] > 0]
-    shrinking = [g for g in np.argsort(-away, kind="stable").tolist() if net[g] <= 0]
+    waits = np.zeros(len(away), bool)
+    np.logical_or.at(waits, group[: len(enter)], ~can_enter(enter))
+    enters = np.bincount(group[: len(enter)], minlength=len(away)) > 0
+    growing = [g for g in np.argsort(away, kind="stable").tolist() if net[g] > 0 and not waits[g]]
+    shrinking = [g for g in np.argsort(-away, kind="stable").tolist() if net[g] <= 0 and not waits[g]]
     while growing or shrinking:
         if growing and net[growing[0]] <= free:
             g = growing.pop(0)
         elif shrinking:
             g = shrinking.pop(0)
+            if not (growing or enters[g]) and waits.any():
+                continue  # its slot is for what may not enter yet
         else:
             return
         free -= int(net[g])

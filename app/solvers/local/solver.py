@@ -31,10 +31,10 @@ from app.solvers.local.matrix import ROW, LocalMatrix
 from app.solvers.local.members import DRIFT, Members
 from app.solvers.local.options import LocalOptions
 from app.solvers.local.patches import patch_count, patches_of
-from app.solvers.local.rows import Rows, rows_in
+from app.solvers.local.rows import BYTES, ROWS_OF_A_NODE, Rows, rows_in
 from app.solvers.local.selection import Selection, Swap, swaps
 from app.solvers.local.tiles import Tiles
-from app.util.parts import is_running, run_to_end
+from app.util.parts import UnderWay, run_to_end
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
@@ -68,7 +68,7 @@ class Local:
         self.direct = DirectLight(gpu, lightmap, self.rays, self.origins)
         self._tiles = Tiles(lightmap.pool, lightmap.space.local_from_world(_first_eye(lightmap)))
         self._parts: list[Any] = []
-        self._under_way: Generator[None, None, int] | None = None
+        self._under_way = UnderWay()
         self._fading = self._bounces_left = self.issued = 0
         self._first = True  # whether the set is filled for the first time
         # whether lamps are others, change in every piece of work, and direct light is known of all tiles as they are now
@@ -113,10 +113,9 @@ class Local:
 
     def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
         """What a frame has time for: nodes that enter and leave, at most as many as the options say, or shadow rays; and the
-        light of both. Returns how many nodes have entered."""
-        self._finish()
-        self._under_way = self._piece(bands)
-        return self._under_way
+        light of both, however much ``amount`` is. Returns how many nodes have entered."""
+        self._under_way.finish()
+        return self._under_way.begin(self._piece(bands))
 
     def _piece(self, bands: int) -> Generator[None, None, int]:
         if self._edited:
@@ -130,6 +129,7 @@ class Local:
                 self._lit = False
             self._editing, self._all_known = False, True
         entered = 0
+        self.members.pieces += 1
         tiles = self._tiles.next_to_shoot(self.direct, self.options.shadow_rays)
         if self._tiles.dark_near(self.direct):
             yield from self._shoot(tiles, bands)
@@ -179,7 +179,7 @@ class Local:
         if not self._lit:
             held, members = self.set, self.members
             albedo = members.albedo[held.node]
-            self.lighting.set_nodes(held.node, held.area, albedo, held.outside, members.age)
+            self.lighting.set_nodes(held.node, held.area, albedo, held.outside, members.entered)
             self._bounces_left = self._bounces
         elif not self._bounces_left:
             return
@@ -203,26 +203,14 @@ class Local:
             yield from self.rows.make(missing[:at_once], np.concatenate([self.set.nodes, wanted]))
 
     def _plan(self) -> list[Swap]:
-        """The next nodes that enter and leave, whole swaps whose rows are there, or that enter anew. Nothing leaves for what
-        cannot enter yet."""
+        """The next nodes that enter and leave, whole swaps whose rows are there, or that enter anew."""
         have_rows = bool(self.rows.has(self._wanted).all())
         if self._first and not have_rows:
             return []
-        plan, waiting, free = list[Swap](), list[Swap](), self.set.free
-        for swap in swaps(self.patches, self.set.nodes, self._wanted, free, self._tiles.observer):
-            more = len(swap.enter) - len(swap.leave)
-            if not swap.enter:
-                waiting.append(swap)
-            elif self.rows.has(np.array(swap.enter)).all():
-                while more > free and waiting:
-                    plan.append(waiting.pop(0))
-                    free += len(plan[-1].leave)
-                if more <= free:
-                    plan.append(swap)
-                    free -= more
-        if have_rows:
-            plan += waiting
-            plan = plan or [Swap((node,), (node,)) for node in self.members.stale()]
+        held = self.set
+        plan = list(swaps(self.patches, held.nodes, self._wanted, held.free, self._tiles.observer, self.rows.has))
+        if not plan and have_rows:
+            plan = [Swap((node,), (node,)) for node in self.members.stale()]
         return plan
 
     def _swap(self, plan: list[Swap], bands: int) -> Generator[None, None, int]:
@@ -239,7 +227,7 @@ class Local:
             yield
             entered += self.members.swap(swap, diagonals)
         self.issued += len(entered)
-        self.members.swapped(entered)
+        self.members.entered[entered] = self.members.pieces
         self._first = self._first and self.to_come > 0
         if self.options.bounces == "series" and self.members.left > self.set.most:
             self._fill_anew()  # paths through nodes that left pile up
@@ -248,18 +236,12 @@ class Local:
         self._lit = False
         return len(entered)
 
-    def _finish(self) -> None:
-        """End the work that is under way, if any; of its own parts this asks nothing."""
-        if self._under_way is not None and not is_running(self._under_way):
-            run_to_end(self._under_way)
-            self._under_way = None
-
     # -- how far it is -------------------------------------------------------------------------------------------------
 
     def poll(self, *, wait: bool = False) -> Progress:
         """How much of the set and of the shadow rays is still to come."""
         if wait:
-            self._finish()
+            self._under_way.finish()
         emits = self.lightmap.scene.emits
         wanted = max(len(self._wanted), 1)
         here = self.to_come / wanted
@@ -298,7 +280,7 @@ class Local:
 
     def energy(self) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
-        self._finish()
+        self._under_way.finish()
         balance = balance_of(self.lightmap, self.direct.light, self.patches, self.members)
         self._look_for_error()
         if not self.issued and self.lightmap.scene.emits:
@@ -310,9 +292,7 @@ class Local:
 
     def reset(self) -> None:
         """Forget all light, and let the set be filled anew. Rows stay: they follow from the scene alone."""
-        if self._under_way is not None:
-            self._under_way.close()
-            self._under_way = None
+        self._under_way.drop()
         self.lightmap.clear()
         self.members.albedo = self._albedo()
         self.members.clear()
@@ -328,7 +308,7 @@ class Local:
 
     def set_options(self, options: LocalOptions) -> None:
         """Use other knobs: those that the matrix or its rows follow from begin again. Raises UserError, and keeps what it has."""
-        self._finish()
+        self._under_way.finish()
         built = ("bounces", "patches", "patch_level", "rays", "bits", "matrix_memory")
         if any(getattr(options, name) != getattr(self.options, name) for name in built):
             self._build(options)
@@ -337,6 +317,7 @@ class Local:
             self.rows.set_memory(options.row_memory, self.set.most)
             self.options = options
             self._look()
+            self.rows.make_room(0, np.concatenate([self.set.nodes, self._wanted]))
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light of other lamps with the next piece of work; of other albedos, while nodes enter
@@ -347,7 +328,7 @@ class Local:
             self.reset()
             return
         self._edited = True
-        self._finish()  # soon, and with the light of the edit
+        self._under_way.finish()  # soon, and with the light of the edit
         if [m.albedo for m in materials] != before:
             self.members.albedo, self._edited = self._albedo(), True
             self.members.look_again()
@@ -391,7 +372,7 @@ class Local:
 
     @property
     def layers(self) -> Mapping[str, Texture]:
-        return {"direct": self.direct.light, "local": self.lighting.marks()}
+        return {"direct": self.direct.light, "local": self.lighting.marks(self.members.pieces)}
 
     @property
     def wanted(self) -> I64:
@@ -414,13 +395,13 @@ class Local:
             return Inspection(figures=figures, counts=counts)
         place = np.flatnonzero(self.patches.order == (texel[1] << 16 | texel[0]))
         slot = int(held.slot_at[place[0]]) if len(place) else -1
-        age = float(self.members.age[slot])
+        age = self.members.pieces - int(self.members.entered[slot])
         facts = facts_of(int(held.node[slot]), slot, self.patches, age, float(held.outside[slot]))
         return Inspection(figures=figures, counts=counts, texel_facts=facts)
 
     def passes(self, amount: int) -> dict[str, Callable[[], None]]:
         """Each part of a piece of work by itself, to be timed."""
-        self._finish()
+        self._under_way.finish()
         tiles = self._tiles.in_turn()
         node, needed = int(self._wanted[0]), np.concatenate([self.set.nodes, self._wanted])
         run_to_end(self.rows.make(self._wanted[:1][~self.rows.has(self._wanted[:1])], needed))
@@ -456,8 +437,7 @@ class Local:
         self._parts.clear()
 
     def release(self) -> None:
-        if self._under_way is not None:
-            self._under_way.close()
+        self._under_way.drop()
         self._release_parts()
         for part in (self.direct, self.origins, self.rays):
             part.release()
@@ -467,7 +447,9 @@ def default_patches(gpu: Gpu, options: LocalOptions) -> int:
     """As many as the driver and the memory for the matrix allow, up to what this kind of renderer keeps up with."""
     most = min(SOFTWARE if gpu.software else HARDWARE, gpu.limits.max_texture)
     components = 1 if options.bounces == "iterate" else 4
-    return min(most, int(np.sqrt(options.matrix_memory * 2**20 * 8 / (components * options.bits))) // ROW * ROW)
+    in_matrix = int(np.sqrt(options.matrix_memory * 2**20 * 8 / (components * options.bits)))
+    in_rows = options.row_memory * 2**20 // (options.rays * BYTES) // ROWS_OF_A_NODE
+    return max(min(most, in_matrix, in_rows) // ROW, 1) * ROW
 
 
 def _first_eye(lightmap: Lightmap) -> F64:

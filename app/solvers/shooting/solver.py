@@ -25,7 +25,7 @@ from app.solvers.shooting.material_edits import MaterialEdits, needs_restart
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.records import BATCH, Shot, powers_of, shot_of, sizes_of
 from app.solvers.shooting.reports import Reports
-from app.util.parts import is_running, run_to_end
+from app.util.parts import UnderWay, run_to_end
 from app.visibility.item_image import ItemImage
 
 LOOK_AFTER = 32  # shots, or a quarter of all, between two looks at leaves that did not change at the last
@@ -48,7 +48,7 @@ class Shooting:
         if lightmap.refinement is not None:
             lightmap.refinement.follower = self
         self._reports, self._edits, self._picture = Reports(gpu), MaterialEdits(gpu, lightmap), ItemImage(gpu)
-        self._under_way: Generator[None, None, int] | None = None
+        self._under_way = UnderWay()
         self._progress = Progress(0, 1.0, np.zeros(3))  # but for what follows from now
         self._look_at = 0  # shots in the log at which leaves are looked at again
         self.issued = 0
@@ -60,10 +60,10 @@ class Shooting:
     def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
         """Up to ``amount`` shots (at most BATCH), the strongest patches first, in parts. Returns how many were issued: of a
         batch, those too weak beside its best are left for later, and not counted once ``poll`` has the report of it."""
-        self._finish()
+        self._under_way.finish()
         shots = min(amount, BATCH)
-        self._under_way = self._shoot(shots, bands) if self.batch.replay is None else self._follow_leaves(shots, bands)
-        return self._under_way
+        parts = self._shoot(shots, bands) if self.batch.replay is None else self._follow_leaves(shots, bands)
+        return self._under_way.begin(parts)
 
     def _shoot(self, shots: int, bands: int) -> Generator[None, None, int]:
         """A batch, and the report of it."""
@@ -105,18 +105,12 @@ class Shooting:
         self.lightmap.refinement.drop_judgement()
         self.lightmap.refinement.stable = False
 
-    def _finish(self) -> None:
-        """End the work that is under way, if any; of its own parts this asks nothing."""
-        if self._under_way is not None and not is_running(self._under_way):
-            run_to_end(self._under_way)
-            self._under_way = None
-
     # -- how far it is -------------------------------------------------------------------------------------------------
 
     def poll(self, *, wait: bool = False) -> Progress:
         """The newest progress that has arrived: the state before the work that sent it; with ``wait`` that of the last."""
         if wait:
-            self._finish()
+            self._under_way.finish()
         for choice, report, shooter in self._reports.arrived(wait=wait):
             self._follow_report(choice, report, shooter)
         if self._reports.all_arrived:
@@ -150,7 +144,7 @@ class Shooting:
 
     def _unshot_share(self) -> float:
         """The residual now, Σ |Σ r A| over tiles, as a share of the emitted power. Waits for the GPU."""
-        self._finish()
+        self._under_way.finish()
         return self._share(self.batch.unshot())
 
     @property
@@ -175,16 +169,14 @@ class Shooting:
 
     def energy(self) -> EnergyBalance:
         """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
-        self._finish()
+        self._under_way.finish()
         return self.batch.ledger.balance()
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
 
     def reset(self) -> None:
         """Forget all light: H = 0, r = E. The leaves stay."""
-        if self._under_way is not None:
-            self._under_way.close()
-            self._under_way = None
+        self._under_way.drop()
         if self.lightmap.refinement is not None:
             self.lightmap.refinement.begin_again()
         self._look_at = 0
@@ -200,7 +192,7 @@ class Shooting:
             self.lightmap.refinement.stable = False
             if options == self.options:
                 return
-        self._finish()
+        self._under_way.finish()
         if self.batch.replay is not None:
             self.batch.replay.stop()
         self.options = options
@@ -216,7 +208,7 @@ class Shooting:
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light that is there stays, and the difference is shot, negative too [Chen90]. Begins
         again where nothing is left to emit, and where the storage holds no negative light."""
-        self._finish()
+        self._under_way.finish()
         batch = self.batch
         if needs_restart(self.lightmap, materials) or batch.ledger.emitted.sum() <= 0:
             self.lightmap.set_materials(materials)
@@ -297,7 +289,7 @@ class Shooting:
     def audit(self, corner: tuple[int, int]) -> Audit:
         """What becomes of a shot from the patch with this lower corner [texels of the tile pool] if it shot now. Changes no
         light. The patch must hold some residual."""
-        self._finish()
+        self._under_way.finish()
         return self.batch.audit(corner)
 
     def try_one(self) -> None:

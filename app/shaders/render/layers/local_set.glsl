@@ -1,10 +1,10 @@
 // The local set around the observer: a colour for the level of each patch and cluster, shaded a little one by one, white while it has
 // just entered; grey outside of the set.
 #include "render/level_colour.glsl"
-uniform sampler2D t_offered;  // level from 1, 0 in none; swaps since it entered; its number
+uniform sampler2D t_offered;  // level from 1, 0 in none; pieces of work since it entered; the number of its colour
 
 const float GOLDEN = 0.61803399;  // its steps keep neighbours in the numbering apart
-const float NEW = 8.0;            // swaps, until it is old
+const float NEW = 8.0;            // pieces of work, until it is old
 
 vec3 layer_colour(ivec2 texel_px) {
     vec3 mark = texelFetch(t_offered, texel_px, 0).rgb;

@@ -1,4 +1,4 @@
-// Light that comes back to a node that enters, σ = f_n + f·Aρ k, over all paths among the others.
+// Light that comes back to a node that enters, σ = f_n + f·ρ k, over all paths among the others.
 #include "solvers/local/vector.glsl"
 
 uniform sampler2D t_column;

@@ -1,10 +1,10 @@
-// The column of a node that enters, k = f + K Aρ f, or of one that leaves, its column of K; what waits is part of K.
+// The column of a node that enters, k = f + S ρ f, or of one that leaves, its column of S; what waits is part of K.
 #include "solvers/local/matrix.glsl"
 #include "solvers/local/vector.glsl"
 
 uniform sampler2D t_waiting;  // vectors; a: their sign
 uniform sampler2D t_given;    // f
-uniform sampler2D t_list;     // Aρf of the nodes that it sees; a: their slots
+uniform sampler2D t_list;     // ρf of the nodes that it sees; a: their slots
 uniform sampler2D t_sums;     // of what waits, see dots.frag.glsl
 uniform int u_slot;
 uniform int u_count;  // of the list; negative of a node that leaves

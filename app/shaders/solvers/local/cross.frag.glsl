@@ -4,7 +4,7 @@
 uniform sampler2D t_column;
 uniform sampler2D t_closed;
 uniform int u_slot;
-uniform vec3 u_weight;
+uniform vec3 u_albedo;
 uniform bool u_exact;
 uniform float u_scale;
 
@@ -19,7 +19,7 @@ void main() {
     if (u_exact) {
         vec3 closed = texelFetch(t_closed, ivec2(0), 0).rgb;
         if (i == u_slot) k = closed;
-        k /= max(1.0 - u_weight * closed, LEAST);
+        k /= max(1.0 - u_albedo * closed, LEAST);
     }
     out_matrix = vec4(u_scale * k, 0.0);
 }

@@ -1,4 +1,4 @@
-// The product of each vector that waits with Aρf of a node that enters.
+// The product of each vector that waits with ρf of a node that enters.
 #include "solvers/local/vector.glsl"
 
 uniform sampler2D t_waiting;

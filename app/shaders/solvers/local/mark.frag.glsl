@@ -1,9 +1,10 @@
-// The local set on every texel: level of the node from 1 (0: in none), its age [frames], its slot.
+// The local set on every texel: level of the node from 1 (0: in none), pieces of work since it entered, the number of its colour.
 #include "direct_light/folded.glsl"
 #include "solvers/local/node.glsl"
 
 uniform usampler2D t_places;
 uniform usampler2D t_slots;
+uniform float u_now;  // pieces of work so far
 
 layout(location = 0) out vec4 out_mark;
 
@@ -13,6 +14,6 @@ void main() {
     if (place == 0xFFFFFFFFu) return;
     int slot = int(texelFetch(t_slots, folded(int(place)), 0).x) - 1;
     if (slot < 0) return;
-    vec2 level_age = texelFetch(t_nodes, at_slot(slot, 2), 0).xy;
-    out_mark = vec4(level_age.x + 1.0, level_age.y, float(slot), 0.0);
+    vec4 node = texelFetch(t_nodes, at_slot(slot, 2), 0);
+    out_mark = vec4(node.x + 1.0, u_now - node.y, node.w, 0.0);
 }

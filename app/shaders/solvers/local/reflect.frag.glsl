@@ -18,7 +18,7 @@ void main() {
     Node node = load_node(slot_at(ivec2(gl_FragCoord.xy)));
     out_reflected = vec4(0.0);
     if (node.area <= 0.0) return;
-    int length = node.end - node.start, count = min(length, MOST);
+    int length = node.count, count = min(length, MOST);
     vec4 sum = vec4(0.0);
     for (int n = 0; n < count; ++n) {
         // in floats: products would be beyond 32 bits
