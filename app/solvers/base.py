@@ -22,8 +22,8 @@ LAYERS = {
     "direct": "the part of H that came straight from lamps, RGB [stored units]",
     "variance": "variance of the mean of H over RGB [stored units²]",
     "rays": "rays traced from it",
-    "local": "r: level of what it is in, of a local set, from 1, 0 in none; g: pieces of work since that entered; b: number of its "
-    "colour",
+    "local": "r: level of what it is in, of a local set, from 1, 0 in none; g: pieces of work since that entered; b: number of "
+    "its colour",
 }
 
 
