@@ -18,7 +18,16 @@ def arrays_of(scene: Scene) -> dict[str, NDArray[Any]]:
             arrays[name] = uv
     for k, material in enumerate(scene.materials):
         arrays[f"material {k}"] = np.array([*material.albedo, *material.emission, material.double_sided])
-        for kind, texture in (("albedo", material.albedo_texture), ("emission", material.emission_texture)):
+        if not material.opaque:
+            arrays[f"opacity {k}"] = np.array(
+                [material.opacity, -1 if material.opacity_cutoff is None else material.opacity_cutoff]
+            )
+        textures = {
+            "albedo": material.albedo_texture,
+            "emission": material.emission_texture,
+            "cut-out": material.opacity_texture,
+        }
+        for kind, texture in textures.items():
             if texture is not None:
                 arrays[f"{kind} {k} {texture.wrap} {texture.bilinear} {texture.texcoord}"] = texture.pixels
                 arrays[f"{kind} {k} transform"] = texture.uv_transform

@@ -1,7 +1,7 @@
 """Scenes written by hand as TOML. Unknown keys are errors; an error names file, key and reason.
 
     [scene]                     # name; unit = "m" | "cm" | "mm": what every length below is counted in
-    [[material]]                # name; albedo = [r, g, b]; double_sided = false
+    [[material]]                # name; albedo = [r, g, b]; double_sided = false; opacity = 1: light passes by 1 - opacity
                                 # emission = [r, g, b] radiance L [W/(sr m²)], or exitance = [r, g, b] πL [W/m²]
                                 # texture = { pattern = "checker" | "stripes", colors = [[r, g, b], [r, g, b]] }
                                 #        or { image = "file beside the TOML" }, both with repeat = [across, up]
@@ -94,6 +94,7 @@ class MaterialTable(Table):
     exitance: Light | None = None
     texture: TextureTable | None = None
     double_sided: bool = False
+    opacity: Part01 = 1.0
 
     @model_validator(mode="after")
     def _one_light(self) -> Self:
@@ -233,7 +234,7 @@ class _Builder:
             light = (r / math.pi, g / math.pi, b / math.pi)
         texture = None if table.texture is None else self._texture(f"material.{index}.texture", table.texture)
         albedo = table.albedo or ((0.5, 0.5, 0.5) if texture is None else (1.0, 1.0, 1.0))
-        return Material(table.name, albedo, light, texture, None, table.double_sided)
+        return Material(table.name, albedo, light, texture, None, table.double_sided, table.opacity)
 
     def _texture(self, where: str, table: TextureTable) -> Texture:
         scale = np.diag([*table.repeat, 1.0])[:2]

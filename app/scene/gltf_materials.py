@@ -1,7 +1,8 @@
 """glTF materials as diffuse surfaces.
 
 The albedo is the base colour as it stands, also of metals: without a mirror term, what a metal reflects leaves
-diffusely. Emission is emissiveFactor × emissiveStrength [W/(sr m²)] × texture. Roughness, normal maps, alpha and vertex
+diffusely. Emission is emissiveFactor × emissiveStrength [W/(sr m²)] × texture. Opacity is the alpha of the base colour, unless
+alphaMode is OPAQUE, times 1 - transmission (KHR_materials_transmission), whose tint is ignored. Roughness, normal maps and vertex
 colours have no effect. A picture that cannot be read counts as white, so the factor alone is used; where the file gives
 no base colour factor either, the albedo is 0.5.
 """
@@ -10,18 +11,21 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Literal
 
 import numpy as np
 
 from app.scene.gltf_file import GltfFile
 from app.scene.gltf_schema import Image, TextureInfo, TextureTransform
 from app.scene.gltf_schema import Material as GltfMaterial
-from app.scene.images import ImageError, read_image
+from app.scene.gltf_schema import Texture as GltfTexture
+from app.scene.images import ImageError, read_channel, read_image
 from app.scene.model import F32, F64, RGB, Material, Texture
 from app.scene.validate import counted
 
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 NEAREST = 9728
+Channel = Literal["R", "A"]
 UNKNOWN_ALBEDO: RGB = (0.5, 0.5, 0.5)
 
 
@@ -43,19 +47,18 @@ class _Reader:
     def __init__(self, file: GltfFile) -> None:
         self.file = file
         self._pixels: dict[int, F32 | None] = {}
+        self._channels: dict[tuple[int, Channel], F32 | None] = {}
         self._without_picture = 0
         self._far_texcoords = 0
 
     def warnings(self, used: list[GltfMaterial]) -> list[str]:
         missing = sum(pixels is None for pixels in self._pixels.values())
         unlit = sum(m.extensions.unlit is not None for m in used)
-        alpha = sum(m.alpha_mode != "OPAQUE" for m in used)
         notes = [
             (missing, "picture", "pictures", "could not be read: the material's factor is used"),
             (self._without_picture, "texture", "textures", "without a picture that can be read: ignored"),
             (self._far_texcoords, "texture", "textures", "with TEXCOORD_2 or higher: ignored"),
             (unlit, "unlit material", "unlit materials", "treated as diffuse"),
-            (alpha, "material", "materials", "with alpha treated as opaque"),
         ]
         return [f"{counted(n, one, many)} {text}" for n, one, many, text in notes if n]
 
@@ -65,12 +68,13 @@ class _Reader:
         if gloss is not None:
             factor, info = gloss.diffuse_factor, gloss.diffuse_texture
         albedo_texture = self._texture(info)
-        r, g, b, _ = factor or (1.0, 1.0, 1.0, 1.0)
+        r, g, b, alpha = factor or (1.0, 1.0, 1.0, 1.0)
         lost = info is not None and albedo_texture is None and factor is None
         strength = source.extensions.emissive_strength
         k = 1.0 if strength is None else strength.emissive_strength
         er, eg, eb = source.emissive_factor
         emits = k * max(source.emissive_factor) > 0.0
+        opacity, opacity_texture, cutoff = self._opacity(source, alpha, info)
         return Material(
             name=source.name or f"material {index}",
             albedo=UNKNOWN_ALBEDO if lost else (r, g, b),
@@ -78,15 +82,49 @@ class _Reader:
             albedo_texture=albedo_texture,
             emission_texture=self._texture(source.emissive_texture) if emits else None,
             double_sided=source.double_sided,
+            opacity=opacity,
+            opacity_texture=opacity_texture,
+            opacity_cutoff=cutoff,
         )
+
+    def _opacity(
+        self, source: GltfMaterial, alpha: float, info: TextureInfo | None
+    ) -> tuple[float, Texture | None, float | None]:
+        """Opacity, its texture and its cutoff. Where alpha has a texture, one of the transmission counts by its mean."""
+        opacity, texture, cutoff = 1.0, None, None
+        if source.alpha_mode in ("MASK", "BLEND"):
+            opacity, texture = alpha, self._one_channel(info, "A")
+            cutoff = source.alpha_cutoff if source.alpha_mode == "MASK" else None
+        glass = source.extensions.transmission
+        if glass is None or cutoff is not None:
+            return opacity, texture, cutoff
+        passing = self._one_channel(glass.transmission_texture, "R")
+        if passing is None:
+            return opacity * (1.0 - glass.transmission_factor), texture, None
+        kept = np.asarray(1.0 - glass.transmission_factor * passing.pixels, np.float32)
+        if texture is None:
+            return opacity, dataclasses.replace(passing, pixels=kept), None
+        return opacity * float(kept.mean()), texture, None
+
+    def _one_channel(self, info: TextureInfo | None, channel: Channel) -> Texture | None:
+        """A texture's red or alpha; None without it."""
+        made = self._texture(info)
+        if info is None or made is None:
+            return None
+        index = self._source(self.file.pick(self.file.document.textures, info.index, "texture"))
+        assert index is not None
+        if (index, channel) not in self._channels:
+            data = self._data(self.file.pick(self.file.document.images, index, "image"))
+            assert data is not None
+            self._channels[index, channel] = read_channel(data, channel)
+        pixels = self._channels[index, channel]
+        return None if pixels is None else dataclasses.replace(made, pixels=pixels)
 
     def _texture(self, info: TextureInfo | None) -> Texture | None:
         if info is None:
             return None
         texture = self.file.pick(self.file.document.textures, info.index, "texture")
-        source = texture.source
-        if texture.extensions.webp is not None and texture.extensions.webp.source is not None:
-            source = texture.extensions.webp.source
+        source = self._source(texture)
         if source is None:
             self._without_picture += 1
             return None
@@ -108,16 +146,21 @@ class _Reader:
 
     def _image(self, index: int, image: Image) -> F32 | None:
         if index not in self._pixels:
-            data: bytes | None = None
-            if image.buffer_view is not None:
-                data = bytes(self.file.view(image.buffer_view))
-            elif image.uri is not None:
-                data = self.file.resource(image.uri)
+            data = self._data(image)
             try:
                 self._pixels[index] = None if data is None else read_image(data)
             except ImageError:
                 self._pixels[index] = None
         return self._pixels[index]
+
+    def _source(self, texture: GltfTexture) -> int | None:
+        webp = texture.extensions.webp
+        return texture.source if webp is None or webp.source is None else webp.source
+
+    def _data(self, image: Image) -> bytes | None:
+        if image.buffer_view is not None:
+            return bytes(self.file.view(image.buffer_view))
+        return None if image.uri is None else self.file.resource(image.uri)
 
 
 def uv_transform(transform: TextureTransform) -> F64:

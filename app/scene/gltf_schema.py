@@ -121,6 +121,11 @@ class EmissiveStrength(Model):
     emissive_strength: Annotated[float, Field(ge=0.0)] = 1.0
 
 
+class Transmission(Model):
+    transmission_factor: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    transmission_texture: TextureInfo | None = None
+
+
 class Empty(Model):
     pass
 
@@ -128,6 +133,7 @@ class Empty(Model):
 class MaterialExtensions(Model):
     emissive_strength: EmissiveStrength | None = Field(default=None, alias="KHR_materials_emissive_strength")
     specular_glossiness: SpecularGlossiness | None = Field(default=None, alias="KHR_materials_pbrSpecularGlossiness")
+    transmission: Transmission | None = Field(default=None, alias="KHR_materials_transmission")
     unlit: Empty | None = Field(default=None, alias="KHR_materials_unlit")
 
 
@@ -137,6 +143,7 @@ class Material(Model):
     emissive_factor: Vec3 = (0.0, 0.0, 0.0)
     emissive_texture: TextureInfo | None = None
     alpha_mode: str = "OPAQUE"
+    alpha_cutoff: Annotated[float, Field(ge=0.0)] = 0.5
     double_sided: bool = False
     extensions: MaterialExtensions = MaterialExtensions()
 

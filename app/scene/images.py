@@ -8,9 +8,12 @@ from __future__ import annotations
 import io
 import urllib.parse
 import warnings
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from app.scene.model import F32
@@ -33,6 +36,31 @@ def read_image(source: bytes | Path) -> F32:
 
     Alpha is ignored. Larger pictures are averaged down in linear light, so that their mean stays.
     """
+    return _shrunk(_decoded(_pixels(source, lambda image: image if _is_wide(image) else image.convert("RGB"))))
+
+
+def read_channel(source: bytes | Path, channel: Literal["R", "A"]) -> F32 | None:
+    """Red or alpha of a picture as (h, w, 1) f32, as it stands; None where there is no alpha. Else as ``read_image``."""
+
+    def chosen(image: Image.Image) -> Image.Image | None:
+        if channel == "R" and _is_wide(image):
+            return image
+        return image.convert("RGBA").getchannel(channel) if channel == "R" or image.has_transparency_data else None
+
+    values = _pixels(source, chosen)
+    if values.ndim < 2:
+        return None
+    most = 255.0 if values.dtype == np.uint8 else 65535.0
+    return _shrunk(np.clip(values.astype(np.float32) / most, 0.0, 1.0)[:, :, None])
+
+
+def _is_wide(image: Image.Image) -> bool:
+    """Whether it holds more than 8 bits of each number."""
+    return image.mode.startswith(("I", "F"))
+
+
+def _pixels(source: bytes | Path, chosen: Callable[[Image.Image], Image.Image | None]) -> NDArray[Any]:
+    """What is chosen of a picture, as an array. ImageError if unusable."""
     try:
         data = io.BytesIO(source) if isinstance(source, bytes) else io.BytesIO(source.read_bytes())
         with warnings.catch_warnings():
@@ -40,13 +68,11 @@ def read_image(source: bytes | Path) -> F32:
             with Image.open(data) as image:
                 if image.width * image.height > MAX_PIXELS:
                     raise ImageError(f"{image.width}×{image.height} pixels are too many")
-                wide = image.mode.startswith(("I", "F"))
-                pixels = np.asarray(image if wide else image.convert("RGB"))
+                return np.asarray(chosen(image))
     except (OSError, UnidentifiedImageError, Image.DecompressionBombError, SyntaxError, EOFError) as error:
         raise ImageError(str(error)) from error
     except (ValueError, TypeError, IndexError, OverflowError, MemoryError) as error:  # what Pillow's decoders leak
         raise ImageError(str(error)) from error
-    return _shrunk(_decoded(pixels))
 
 
 def _decoded(pixels: np.ndarray[tuple[int, ...], np.dtype[np.generic]]) -> F32:
@@ -65,7 +91,7 @@ def _shrunk(pixels: F32) -> F32:
         return pixels
     fy, fx = min(factor, pixels.shape[0]), min(factor, pixels.shape[1])
     h, w = pixels.shape[0] // fy, pixels.shape[1] // fx
-    blocks = pixels[: h * fy, : w * fx].reshape(h, fy, w, fx, 3)
+    blocks = pixels[: h * fy, : w * fx].reshape(h, fy, w, fx, -1)
     mean: F32 = blocks.mean(axis=(1, 3), dtype=np.float32)
     return mean
 

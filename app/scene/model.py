@@ -24,7 +24,7 @@ RGB = tuple[float, float, float]
 class Texture:
     """An image as a material uses it.
 
-    pixels: (h, w, 3) f32, linear Rec.709, row 0 at the top, v = 0 at the top (glTF).
+    pixels: (h, w, 3) f32, linear Rec.709, of an opacity (h, w, 1); row 0 at the top, v = 0 at the top (glTF).
     wrap: one of ``repeat``, ``mirror``, ``clamp`` for u and v.
     uv_transform: (2, 3) f64, applied to the vertex UVs before the look-up (KHR_texture_transform).
     """
@@ -39,7 +39,11 @@ class Texture:
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """A diffuse surface. A texture multiplies its factor; ``double_sided`` reflects and emits on both sides."""
+    """A diffuse surface. A texture multiplies its factor; ``double_sided`` reflects and emits on both sides.
+
+    Opacity is the share of the surface that is there, the rest lets light pass. With a cutoff the surface is all there where its
+    opacity reaches that, and a hole elsewhere.
+    """
 
     name: str
     albedo: RGB = (0.5, 0.5, 0.5)  # ρ [-], each in [0, 1]
@@ -47,6 +51,18 @@ class Material:
     albedo_texture: Texture | None = None
     emission_texture: Texture | None = None
     double_sided: bool = False
+    opacity: float = 1.0  # [-], in [0, 1]
+    opacity_texture: Texture | None = None
+    opacity_cutoff: float | None = None
+
+    @property
+    def opaque(self) -> bool:
+        """Whether no light passes anywhere; ``validate`` drops textures and cutoffs that let none pass."""
+        return self.opacity >= 1.0 and self.opacity_texture is None
+
+    @property
+    def textures(self) -> list[Texture]:
+        return [t for t in (self.albedo_texture, self.emission_texture, self.opacity_texture) if t is not None]
 
     @property
     def emits(self) -> bool:

@@ -1,8 +1,9 @@
 """Wavefront OBJ and MTL (Wavefront Advanced Visualizer, appendix B) as a Scene.
 
 Read: v, vt, vn, f (polygons as fans, negative indices), o, g, usemtl, mtllib; of materials Kd as albedo, Ke as radiance
-L like glTF's emission, map_Kd as a picture inside the scene's folder. The format has no flag for it, so every surface
-is double-sided. Albedo is 0.5 where a material is missing, or has a picture that is and no Kd.
+L like glTF's emission, d or else 1 - Tr as opacity, map_Kd and, times the opacity, map_d as pictures inside the scene's folder.
+The format has no flag for it, so every surface is double-sided. Albedo is 0.5 where a material is missing, or has a picture that
+is and no Kd.
 """
 
 from __future__ import annotations
@@ -17,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import SceneError
-from app.scene.images import ImageError, path_inside, read_image
+from app.scene.images import ImageError, path_inside, read_channel, read_image
 from app.scene.model import F32, RGB, Material, Scene, Texture
 from app.scene.validate import Part, check_triangle_count, counted, validate
 
+Pictures = dict[tuple[str, str], F32 | None]  # by key and file; None where it cannot be read
 KINDS = {"v": 3, "vt": 2, "vn": 3}  # numbers per line that are used
 
 
@@ -151,7 +153,7 @@ def _materials(path: Path, mesh: _Mesh) -> tuple[list[Material], list[str]]:
             notes.append(f"material library '{library}' is missing")
         else:
             known |= _read_mtl(path, found)
-    pictures: dict[str, F32 | None] = {}
+    pictures: Pictures = {}
     materials = [_material(path, name, known.get(name), pictures) for name in mesh.materials]
     unknown = sum(name not in known for name in mesh.materials)
     if unknown:
@@ -179,7 +181,7 @@ def _read_mtl(path: Path, library: Path) -> dict[str, dict[str, str]]:
     return materials
 
 
-def _material(path: Path, name: str, lines: dict[str, str] | None, pictures: dict[str, F32 | None]) -> Material:
+def _material(path: Path, name: str, lines: dict[str, str] | None, pictures: Pictures) -> Material:
     material = Material(name or "no material", double_sided=True)
     if lines is None:
         return material
@@ -187,20 +189,41 @@ def _material(path: Path, name: str, lines: dict[str, str] | None, pictures: dic
         material = dataclasses.replace(material, albedo=_colour(path, name, "Kd", lines["kd"]))
     if "ke" in lines:
         material = dataclasses.replace(material, emission=_colour(path, name, "Ke", lines["ke"]))
-    if "map_kd" not in lines:
-        return material
-    uri = _file_of_map(lines["map_kd"])
-    if uri not in pictures:
-        found = path_inside(path.parent, uri)
-        try:
-            pictures[uri] = None if found is None else read_image(found)
-        except ImageError:
-            pictures[uri] = None
-    pixels = pictures[uri]
-    if pixels is None:
+    if "d" in lines:  # options before it, -halo
+        material = dataclasses.replace(material, opacity=_number(path, name, "d", lines["d"].split()[-1]))
+    elif "tr" in lines:
+        material = dataclasses.replace(material, opacity=1.0 - _number(path, name, "Tr", lines["tr"]))
+    if "map_d" in lines:
+        cut_out = _picture(path, "map_d", lines["map_d"], pictures)
+        material = dataclasses.replace(material, opacity_texture=cut_out)
+    texture = _picture(path, "map_kd", lines["map_kd"], pictures) if "map_kd" in lines else None
+    if texture is None:
         return material
     albedo = material.albedo if "kd" in lines else (1.0, 1.0, 1.0)
-    return dataclasses.replace(material, albedo=albedo, albedo_texture=Texture(uri, pixels))
+    return dataclasses.replace(material, albedo=albedo, albedo_texture=texture)
+
+
+def _picture(path: Path, key: str, text: str, pictures: Pictures) -> Texture | None:
+    """The picture of a map line; of map_d its alpha, or else its red."""
+    uri = _file_of_map(text)
+    if (key, uri) not in pictures:
+        found = path_inside(path.parent, uri)
+        try:
+            if found is None:
+                pictures[key, uri] = None
+            elif key == "map_d":
+                alpha = read_channel(found, "A")
+                pictures[key, uri] = read_channel(found, "R") if alpha is None else alpha
+            else:
+                pictures[key, uri] = read_image(found)
+        except ImageError:
+            pictures[key, uri] = None
+    pixels = pictures[key, uri]
+    return None if pixels is None else Texture(uri, pixels)
+
+
+def _number(path: Path, material: str, key: str, text: str) -> float:
+    return _colour(path, material, key, text)[0]
 
 
 def _colour(path: Path, material: str, key: str, text: str) -> RGB:

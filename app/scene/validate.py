@@ -234,8 +234,8 @@ def _join_corners(
 def _check_materials(source: str | Path, materials: Sequence[Material], notes: list[str]) -> list[Material]:
     checked, clamped, darkened = [], 0, 0
     for material in materials:
-        if not all(math.isfinite(x) for x in (*material.albedo, *material.emission)):
-            raise SceneError(source, f"material '{material.name}': albedo and emission must be finite numbers")
+        if not all(math.isfinite(x) for x in (*material.albedo, *material.emission, material.opacity)):
+            raise SceneError(source, f"material '{material.name}': albedo, emission and opacity must be finite numbers")
         if max(material.emission) > BRIGHTEST:
             raise SceneError(
                 source, f"material '{material.name}': emission above {BRIGHTEST:g} W/(sr m²) is out of range"
@@ -245,12 +245,25 @@ def _check_materials(source: str | Path, materials: Sequence[Material], notes: l
         clamped += albedo != material.albedo
         darkened += emission != material.emission
         name = one_line(material.name)
-        checked.append(dataclasses.replace(material, name=name, albedo=albedo, emission=emission))
+        checked.append(_even_opacity(dataclasses.replace(material, name=name, albedo=albedo, emission=emission)))
     if clamped:
         notes.append(f"{counted(clamped, 'material', 'materials')} with an albedo outside 0 to 1: clamped")
     if darkened:
         notes.append(f"{counted(darkened, 'material', 'materials')} with an emission below 0: set to 0")
     return checked
+
+
+def _even_opacity(material: Material) -> Material:
+    """Without the texture and the cutoff of an opacity that is 1, or 0, all over; held between 0 and 1."""
+    texture, cutoff = material.opacity_texture, material.opacity_cutoff
+    opacity = min(max(material.opacity, 0.0), 1.0)
+    least, most = (
+        opacity * float(f) for f in ((1, 1) if texture is None else (texture.pixels.min(), texture.pixels.max()))
+    )
+    all_over = float(least >= cutoff) if cutoff is not None else least
+    if texture is None or all_over == 1.0 or most < (cutoff or 1e-300):
+        return dataclasses.replace(material, opacity=all_over, opacity_texture=None, opacity_cutoff=None)
+    return dataclasses.replace(material, opacity=opacity)
 
 
 def _rgb(values: Iterable[float]) -> RGB:
@@ -264,7 +277,7 @@ def _drop_unmapped_textures(
     """Give textured triangles without texture coordinates a copy of their material in its pictures' mean colours."""
     ids, materials, unmapped = ids.copy(), list(materials), 0
     for i, material in enumerate(tuple(materials)):
-        textures = [t for t in (material.albedo_texture, material.emission_texture) if t is not None]
+        textures = material.textures
         if not textures:
             continue
         mine = ids == i
@@ -277,7 +290,9 @@ def _drop_unmapped_textures(
             ids[bad] = len(materials)
             albedo = _mean_colour(material.albedo, material.albedo_texture)
             emission = _mean_colour(material.emission, material.emission_texture)
-            materials.append(Material(material.name, albedo, emission, double_sided=material.double_sided))
+            opacity = _mean_colour((material.opacity,) * 3, material.opacity_texture)[0]
+            plain = Material(material.name, albedo, emission, None, None, material.double_sided, opacity)
+            materials.append(plain)
     if unmapped:
         what = counted(unmapped, "textured triangle", "textured triangles")
         notes.append(f"{what} without texture coordinates: the picture's mean colour is used")
@@ -287,7 +302,7 @@ def _drop_unmapped_textures(
 def _mean_colour(factor: RGB, texture: Texture | None) -> RGB:
     if texture is None:
         return factor
-    mean = texture.pixels.mean(axis=(0, 1), dtype=np.float64)
+    mean = np.broadcast_to(texture.pixels.mean(axis=(0, 1), dtype=np.float64), 3)
     return _rgb(f * float(m) for f, m in zip(factor, mean, strict=True))
 
 

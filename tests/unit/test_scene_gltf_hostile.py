@@ -73,7 +73,6 @@ REPAIRED: dict[str, tuple[Callable[[Gltf], None], str]] = {
     "points": (points_too, "1 primitive without triangles"),
     "orthographic": (merge("cameras.0", {"type": "orthographic"}), "1 camera without perspective"),
     "zero yfov": (merge("cameras.0.perspective.yfov", 0), "1 camera was dropped"),
-    "alpha": (merge("materials.0.alphaMode", "MASK"), "with alpha treated as opaque"),
 }
 
 

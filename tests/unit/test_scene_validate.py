@@ -82,7 +82,7 @@ REFUSED: dict[str, tuple[list[Part], list[Material], str]] = {
     "flat": ([Part(SQUARE * [1, 0, 0], TRIANGLES)], [GREY], "no triangle has an area (2 given)"),
     "huge": ([Part(SQUARE * 1e13, TRIANGLES)], [GREY], "the scene is 1e+13 m across"),
     "tiny": ([Part(SQUARE * 1e-13, TRIANGLES)], [GREY], "the scene is 1e-13 m across"),
-    "albedo": ([Part(SQUARE, TRIANGLES)], [Material("m", (np.nan, 0, 0))], "material 'm': albedo and emission must be"),
+    "albedo": ([Part(SQUARE, TRIANGLES)], [Material("m", (np.nan, 0, 0))], "material 'm': albedo, emission and"),
 }
 
 
