@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import platform
+import sys
 from pathlib import Path
 
 
@@ -27,3 +29,13 @@ def processor() -> str:
 def load() -> float | None:
     """How many processes wanted a core in the minute before this run; None where the system does not say."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+
+
+def peak_memory() -> float | None:
+    """The most memory that this process has had so far [MiB]; None where the system does not say."""
+    if importlib.util.find_spec("resource") is None:
+        return None
+    import resource
+
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**20

@@ -63,4 +63,6 @@ def test_a_walk_is_measured(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -
     assert values["frames"] == 9, "a thirtieth of a second each, whatever the path says"
     assert 0 < values["median_ms"] <= values["p99_ms"] <= values["worst_ms"]
     assert 0 <= values["nodes_to_come"] <= 128
+    assert values["open_s"] > 0 and values["set_whole_s"] > 0
+    assert values["switch_ms"] > 0 and values["first_switch_ms"] > 0
     assert "a walk of 9 frames" in frames._walk_table(values)

@@ -46,6 +46,12 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return load_authored(written(tmp_path_factory.mktemp("village"), "village.toml", text))
 
 
+def test_light_from_outside_as_its_mean_is_a_row_of_its_own(gpu: Gpu, small: Scene) -> None:
+    row = shcherbakov.measure_row(gpu, 0.1, SIZE, "inverse", small, steps=STEPS, every=EVERY, outside="constant")
+    assert row["bounces"] == "inverse, constant outside" and row["picture"] >= 0
+    assert "update_ms" not in row
+
+
 @pytest.mark.parametrize("bounces", ["inverse", "iterate"])
 def test_a_row_is_measured(gpu: Gpu, small: Scene, bounces: str) -> None:
     """Small and short: that numbers come out and are of one order, not which."""

@@ -42,6 +42,7 @@ PLAIN_SWEEPS = 3  # multiplications of plain radiosity, at least [Shcherbakov19,
 FILLING = 64  # swaps in a piece of work, until the set is full
 FORETOLD = 8  # part of a set that has entered when it is known how long the rest will take
 LONGEST = 30  # times as long as another measurement that a set may take to be filled, and the walk again
+CONSTANT = 1024  # patches of the set beyond which light is taken as its mean
 RAYS = 64  # of each texel, of which all hits are kept
 EDITS = 5  # that a median is of
 
@@ -54,11 +55,18 @@ def measure_row(
     scene: str | Scene = SCENE,
     steps: int = STEPS,
     every: int = EVERY,
+    outside: str = "cascade",
 ) -> Row:
     """A row has the milliseconds of a swap and of lighting, and differences from the whole solution on the walk. Raises UserError
     where it would take more than LONGEST times the seconds to fill the set."""
     options = LocalOptions(
-        patches=size, patch_level=0, bounces=bounces, shadow_rays=SHADOW_RAYS, swaps=FILLING, missing=0.0
+        patches=size,
+        patch_level=0,
+        bounces=bounces,
+        outside=outside,
+        shadow_rays=SHADOW_RAYS,
+        swaps=FILLING,
+        missing=0.0,
     )
     cameras = steps_of(load_path(PATH).cameras, steps)
     with opened(gpu, scene, AtlasOptions(density=DENSITY), LightmapOptions(), options, "local") as (_, made):
@@ -71,8 +79,9 @@ def measure_row(
         walked = walk(gpu, made, whole, cameras, LONGEST * seconds, every)
         row = times(gpu, made, seconds)
     row |= differences(walked)
-    row |= {"size": size, "bounces": bounces, "patches": made.patches.count, "factors": whole.factors}
-    if bounces == "inverse":
+    way = bounces if outside == "cascade" else f"{bounces}, {outside} outside"
+    row |= {"size": size, "bounces": way, "patches": made.patches.count, "factors": whole.factors}
+    if way == "inverse":
         row |= update_bound(gpu, size, seconds)
     if (size, bounces) == (SHCHERBAKOV_LOCAL.patches, "series"):
         theirs = SHCHERBAKOV_LOCAL
@@ -225,6 +234,7 @@ TABLE = Table(
             for size in SIZES
             for bounces in BOUNCES
         ),
+        ("constant outside", partial(measure_row, size=CONSTANT, bounces="inverse", outside="constant")),
         ("all patches", measure_whole),
     ),
     Plot("size", ("lit_ms", "frame_ms"), "bounces", ("M", "ms: lighting as theirs, and with a swap")),

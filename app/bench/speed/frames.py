@@ -6,18 +6,21 @@ time is its own. CPU time is that of the whole process over all cores: on a soft
 other programs on the machine do not change it.
 
 With ``--drag`` a hand moves the sliders of the quadtrees meanwhile, a little in each frame: see slider_drag.py. With ``--walk``
-the eye walks along a path, a thirtieth of a second of it in each frame, once what is around its beginning is lit.
+the eye walks along a path, a thirtieth of a second of it in each frame, once what is around its beginning is lit; then its lamps
+are dimmed and made as they were.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from app.bench.machine import peak_memory
 from app.bench.speed.slider_drag import DRAGGED, drag
 from app.commands.steps import session_options
 from app.errors import UserError
@@ -25,6 +28,7 @@ from app.gpu import Gpu, gpu_context
 from app.lightmap.options import LightmapOptions
 from app.render.camera import CameraView
 from app.render.camera_path import load_path
+from app.scene.model import Material
 from app.session.pacing import Turns
 from app.session.session import Session
 from app.session.view import View
@@ -41,6 +45,7 @@ FRAMES = 300
 FRAMES_PER_SECOND = 30.0  # of a walk
 SLOW = 1e3 / FRAMES_PER_SECOND  # ms
 STANDING = 60.0  # s at most, in which what is around the beginning of a walk is lit
+SWITCHED = 3  # times that lamps are dimmed and made as they were
 GROWTH = 1.0  # s from opening on, in which a tree has grown visibly
 
 
@@ -153,19 +158,52 @@ def _measure_drags(viewer: _Viewer, tell: Callable[[str, float], None]) -> dict[
 def _measure_walk(viewer: _Viewer, source: str, tell: Callable[[str, float], None]) -> dict[str, Any]:
     """Frames along a path, once the light at its beginning stands."""
     cameras = load_path(source, frames_per_second=FRAMES_PER_SECOND).cameras
+    start = time.perf_counter()
     viewer.open()
-    session, start = viewer.session, time.perf_counter()
+    session, opened = viewer.session, time.perf_counter()
     viewer.frame(camera=cameras[0])
-    while not session.run.converged and time.perf_counter() - start < STANDING:
-        tell("lighting the beginning", (time.perf_counter() - start) / STANDING)
+    whole = 0.0
+    while not session.run.converged and (stood := time.perf_counter() - opened) < STANDING:
+        tell("lighting the beginning", stood / STANDING)
         viewer.frame()
+        if not whole and not _to_come(session):
+            whole = time.perf_counter() - opened
     rows, to_come = [], []
     for nth, camera in enumerate(cameras):
         tell("walking", nth / len(cameras))
         rows.append(viewer.frame(camera=camera))
-        local = session.solver
-        to_come.append(local.to_come if isinstance(local, Local) else 0)
-    return _summary(rows) | {"nodes_to_come": float(np.mean(to_come))}
+        to_come.append(_to_come(session))
+    switched = [_switched(viewer, materials) for _ in range(SWITCHED) for materials in _dimmed_and_back(session)]
+    return _summary(rows) | {
+        "nodes_to_come": float(np.mean(to_come)),
+        "open_s": opened - start,
+        "set_whole_s": whole or None,
+        "first_switch_ms": switched[0],
+        "switch_ms": float(np.median(switched[1:])),
+        "peak_mib": peak_memory(),
+    }
+
+
+def _to_come(session: Session) -> int:
+    """Nodes of a local set that are not in it yet."""
+    local = session.solver
+    return local.to_come if isinstance(local, Local) else 0
+
+
+def _dimmed_and_back(session: Session) -> Iterator[tuple[Material, ...]]:
+    """All lamps with half of their light, and as they were."""
+    plain = session.materials
+    yield tuple(replace(m, emission=(m.emission[0] / 2, m.emission[1] / 2, m.emission[2] / 2)) for m in plain)
+    yield plain
+
+
+def _switched(viewer: _Viewer, materials: tuple[Material, ...]) -> float:
+    """Milliseconds from an edit of the lamps until a frame with their light is drawn, after one piece of work."""
+    start = time.perf_counter()
+    viewer.session.set_materials(materials)
+    viewer.session.run.work(1)
+    viewer.frame()
+    return (time.perf_counter() - start) * 1e3
 
 
 def _summary(rows: list[list[float]]) -> dict[str, Any]:
@@ -208,6 +246,10 @@ def _walk_table(values: dict[str, Any]) -> str:
         f"a walk of {values['frames']} frames: median {values['median_ms']:.1f} ms, 99 % below {values['p99_ms']:.1f} ms, "
         f"worst {values['worst_ms']:.1f} ms, {values['frames_per_second']:.1f} frames/s, CPU {values['cpu_ms']:.1f} ms",
         f"{values['slow_frames']} frames above {SLOW:.0f} ms; nodes of a local set still to come: {values['nodes_to_come']:.0f}",
+        f"opened in {values['open_s']:.1f} s"
+        + ("" if values["set_whole_s"] is None else f", all of the set there {values['set_whole_s']:.1f} s later")
+        + ("" if values["peak_mib"] is None else f", {values['peak_mib']:,.0f} MiB at most"),
+        f"lamps dimmed, until it is seen: {values['first_switch_ms']:.0f} ms the first time, {values['switch_ms']:.0f} ms then",
         *_parts(values["parts_ms"]),
     ]
     return "\n".join(lines)
