@@ -1,10 +1,13 @@
-"""What a material's textures put on each texel: the texture averaged over the texel's footprint.
+"""What a material's textures and vertex colours put on each texel: the texture averaged over the texel's footprint, the colour
+at its centroid, which is the mean of what varies linearly.
 
 Mip levels average a texture by area; each texel takes SAMPLES² bilinear look-ups at the level whose pixels are as large
 as what a look-up stands for [Williams83].
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +17,7 @@ from app.atlas.points import barycentric
 from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents
 from app.scene.model import F32, F64, I32, Scene, Texture
 
-__all__ = ["faces_tangents", "look_up", "texel_colours", "texture_coordinates"]
+__all__ = ["colours_at", "faces_tangents", "look_up", "texel_colours", "texture_coordinates"]
 
 SAMPLES = 2  # look-ups along each side of a texel
 BLOCK = 1 << 17  # texels in work at a time
@@ -23,13 +26,36 @@ BLOCK = 1 << 17  # texels in work at a time
 def texel_colours(
     scene: Scene, charts: Charts, leaves: Leaves, surfaces: TexelSurfaces
 ) -> tuple[F32 | None, F32 | None]:
-    """Albedo and emission textures on every texel, (n, t, t, 3) f32: 1 where the material has no such texture.
+    """Albedo and emission textures on every texel, (n, t, t, 3) f32, the albedo's times the scene's vertex colours: 1 where
+    there is neither.
 
-    None where no material in use has one. The material's factors are not included.
+    None where nothing in use has one. The material's factors are not included.
     """
     albedo = {m: material.albedo_texture for m, material in enumerate(scene.materials)}
     emission = {m: material.emission_texture for m, material in enumerate(scene.materials)}
-    return _colours(scene, charts, leaves, surfaces, albedo), _colours(scene, charts, leaves, surfaces, emission)
+    painted = _colours(scene, charts, leaves, surfaces, albedo)
+    if scene.colours is not None:
+        painted = _vertex_colours(scene, charts, surfaces) * (1 if painted is None else painted)
+    return painted, _colours(scene, charts, leaves, surfaces, emission)
+
+
+def _vertex_colours(scene: Scene, charts: Charts, surfaces: TexelSurfaces) -> F32:
+    """(n, t, t, 3) at the centroids of the texels, 1 where there is no surface."""
+    assert scene.colours is not None
+    out = np.ones((*surfaces.face.shape, 3), np.float32)
+    covered = surfaces.face >= 0
+    triangle = charts.face_triangle[surfaces.face[covered]]
+    out[covered] = colours_at(scene, triangle, barycentric(surfaces.position[covered], scene.corners[triangle]))
+    return out
+
+
+def colours_at(scene: Scene, triangle: NDArray[np.integer[Any]], weights: F64) -> F32:
+    """(n, 3) the vertex colours at points, by the weights (n, 3) of their triangles' corners; of points beside a triangle, those
+    of its nearest corners."""
+    assert scene.colours is not None
+    inside = np.clip(weights, 0.0, 1.0)
+    inside /= inside.sum(axis=1, keepdims=True)
+    return np.asarray(np.einsum("nk,nkc->nc", inside, scene.colours[triangle]), np.float32)
 
 
 def _colours(

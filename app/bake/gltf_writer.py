@@ -117,6 +117,8 @@ def _vertices(
     attributes: dict[str, NDArray[Any]] = {"POSITION": scene.corners[triangle] - offset}
     if scene.normals is not None:
         attributes["NORMAL"] = scene.normals[triangle] * np.where(back, -1.0, 1.0)[:, None, None]
+    if scene.colours is not None:
+        attributes["COLOR_0"] = scene.colours[triangle]
     for source, slot in texcoords.items():
         uv = (scene.uv0, scene.uv1)[source]
         if uv is not None:

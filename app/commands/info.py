@@ -81,7 +81,7 @@ def _whole_rows(entry_bytes: int, entries: int) -> int:
 
 def _textured(scene: Scene) -> int:
     """Colour textures that the texels need: of albedo and of emission."""
-    albedo = any(m.albedo_texture is not None for m in scene.materials)
+    albedo = scene.colours is not None or any(m.albedo_texture is not None for m in scene.materials)
     emission = any(m.emission_texture is not None and m.emits for m in scene.materials)
     return int(albedo) + int(emission)
 

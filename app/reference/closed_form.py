@@ -23,7 +23,7 @@ def no_furnace(scene: Scene) -> str | None:
     used = [scene.materials[k] for k in np.unique(scene.material_ids)]
     looks = {(m.albedo, m.emission, m.albedo_texture, m.emission_texture, m.double_sided) for m in used}
     albedo, _, *textures, double_sided = looks.pop()
-    if looks or any(textures) or double_sided:
+    if looks or any(textures) or double_sided or scene.colours is not None:
         return "not all surfaces are alike"
     if max(albedo) >= 1.0:
         return "nothing absorbs light"

@@ -106,6 +106,8 @@ def _side(scene: Scene, triangle: int, back: bool, n: int) -> tuple[F64, F64, F6
     weights = subdivide(np.eye(3)[[0, 2, 1]] if back else np.eye(3), n)
     material = scene.materials[scene.material_ids[triangle]]
     albedo = _factor(scene, triangle, weights, material.albedo, material.albedo_texture)
+    if scene.colours is not None:
+        albedo = albedo * (weights.mean(axis=1) @ scene.colours[triangle])
     exitance = np.pi * _factor(scene, triangle, weights, material.emission, material.emission_texture)
     return weights @ scene.corners[triangle], albedo, exitance
 

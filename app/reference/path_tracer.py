@@ -28,6 +28,7 @@ GAP = 5e-6  # share of the diagonal by which rays start above their surface: 40 
 RAYS = 1 << 20  # at a time
 ROULETTE = 5  # bounces, after which paths may end by chance
 SURVIVES = 0.95  # at most, then
+PAINT = "vertex_paint"  # the name of vertex colours in mitsuba
 
 
 def description() -> str:
@@ -90,7 +91,13 @@ class Tracer:
         corners += sheet * 0.5 * GAP * SIZE * scene.normals_areas[0][mine][:, None]
         order = slice(None, None, -1 if sheet < 0 else 1)
         props = mi.Properties()
-        bsdf = {"type": "diffuse", "reflectance": _colours(material.albedo, material.albedo_texture)}
+        painted = scene.colours is not None and bool((scene.colours[mine] < 1).any())
+        if painted and material.albedo_texture is not None:
+            raise UserError(f"material {material.name}: mitsuba takes a picture or vertex colours, not both")
+        reflectance = _colours(material.albedo, material.albedo_texture)
+        if painted:
+            reflectance = {"type": "mesh_attribute", "name": PAINT}
+        bsdf = {"type": "diffuse", "reflectance": reflectance}
         props["bsdf"] = mi.load_dict({"type": "twosided", "bsdf": bsdf} if double_sided else bsdf)
         if material.emits:
             radiance = _colours(material.emission, material.emission_texture)
@@ -103,6 +110,10 @@ class Tracer:
         parameters["vertex_texcoords"] = _texcoords(scene, material)[mine][:, order].astype(np.float32).ravel()
         parameters["faces"] = np.arange(3 * count, dtype=np.uint32)
         parameters.update()
+        if painted:
+            assert scene.colours is not None
+            colours = scene.colours[mine][:, order] * np.array(material.albedo, np.float32)
+            mesh.add_attribute(PAINT, 3, colours.astype(np.float32).ravel())
         return mesh
 
 

@@ -13,9 +13,9 @@ from app.scene.model import Scene
 def arrays_of(scene: Scene) -> dict[str, NDArray[Any]]:
     """All of a scene that light depends on, by name; cameras, names and order of its objects are not."""
     arrays: dict[str, NDArray[Any]] = {"corners": scene.corners, "material_ids": scene.material_ids}
-    for name, uv in (("uv0", scene.uv0), ("uv1", scene.uv1)):
-        if uv is not None:
-            arrays[name] = uv
+    for name, values in (("uv0", scene.uv0), ("uv1", scene.uv1), ("colours", scene.colours)):
+        if values is not None:
+            arrays[name] = values
     for k, material in enumerate(scene.materials):
         arrays[f"material {k}"] = np.array([*material.albedo, *material.emission, material.double_sided])
         if not material.opaque:

@@ -281,6 +281,7 @@ class _Builder:
                 material_ids,
                 None if part.uv0 is None else part.uv0[:, order],
                 None if part.uv1 is None else part.uv1[:, order],
+                colours=None if part.colours is None else part.colours[:, order],
             )
         )
         self.objects += [prefix + name for name in part.objects]

@@ -2,8 +2,8 @@
 
 Every node with a mesh becomes an object. Read: triangles, strips and fans, all component types, sparse accessors, node
 hierarchies, instances (also EXT_mesh_gpu_instancing), materials and their pictures (``gltf_materials``), TEXCOORD_0
-and 1, normals, perspective cameras. Counted and left out: points and lines, punctual lights, vertex colours, the pose
-of skins.
+and 1, normals, COLOR_0 as a factor of the albedo, perspective cameras. Counted and left out: points and lines, punctual
+lights, the pose of skins.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from app.scene.model import F64, Camera, Material, Scene
 from app.scene.validate import Part, check_triangle_count, counted, validate
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
+VALUES = {"TEXCOORD_0": ("VEC2",), "TEXCOORD_1": ("VEC2",), "NORMAL": ("VEC3",), "COLOR_0": ("VEC3", "VEC4")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,7 @@ class _Shape:
     uv0: NDArray[Any] | None
     uv1: NDArray[Any] | None
     normals: NDArray[Any] | None
+    colours: NDArray[Any] | None
 
 
 @np.errstate(all="ignore")
@@ -62,13 +64,12 @@ class _Reader:
         self._shapes: dict[int, list[_Shape]] = {}
         self._triangle_count = 0
         self.unpainted = 0  # primitives without material
-        self._not_triangles = self._coloured = self._skinned = self._lights = self._not_pinholes = 0
+        self._not_triangles = self._skinned = self._lights = self._not_pinholes = 0
 
     def warnings(self) -> list[str]:
         notes = [
             (self._lights, "point light", "point lights", "ignored: only surfaces emit"),
             (self._not_triangles, "primitive", "primitives", "without triangles left out"),
-            (self._coloured, "primitive", "primitives", "with vertex colours, which are ignored"),
             (self.unpainted, "primitive", "primitives", "without material: grey with albedo 0.5"),
             (self._skinned, "skinned mesh", "skinned meshes", "shown without pose"),
             (self._not_pinholes, "camera", "cameras", "without perspective left out"),
@@ -146,8 +147,8 @@ class _Reader:
         positions = self.file.accessor(attributes["POSITION"], "VEC3")
         count = len(positions)
         values: list[NDArray[Any] | None] = []
-        for name, kind in (("TEXCOORD_0", "VEC2"), ("TEXCOORD_1", "VEC2"), ("NORMAL", "VEC3")):
-            value = self.file.accessor(attributes[name], kind) if name in attributes else None
+        for name, kinds in VALUES.items():
+            value = self.file.accessor(attributes[name], *kinds) if name in attributes else None
             if value is not None and len(value) != count:
                 raise self.file.error(f"{where}: {len(value)} {name} for {count} POSITION")
             values.append(value)
@@ -165,7 +166,6 @@ class _Reader:
         else:
             self.file.pick(self.file.document.materials, primitive.material, "material")
             self.used_materials.add(primitive.material)
-        self._coloured += "COLOR_0" in attributes
         return _compact(positions, _triangles(corners.astype(np.int64), primitive.mode), primitive.material, values)
 
 
@@ -239,4 +239,5 @@ def _placed(shape: _Shape, worlds: F64, object_id: int, material: int) -> Part:
         None if shape.uv0 is None else np.tile(shape.uv0, (k, 1)),
         None if shape.uv1 is None else np.tile(shape.uv1, (k, 1)),
         normals,
+        None if shape.colours is None else np.tile(shape.colours[:, :3], (k, 1)),
     )

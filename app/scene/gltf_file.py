@@ -41,6 +41,7 @@ KNOWN_EXTENSIONS = {
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
@@ -167,14 +168,14 @@ class GltfFile:
             raise self.error(f"bufferView {index} reaches past the end of buffer {view.buffer}")
         return buffer[view.byte_offset : view.byte_offset + view.byte_length]
 
-    def accessor(self, index: int, kind: str) -> NDArray[Any]:
-        """(count, components) values of an accessor of type ``kind``; normalized integers become f32."""
+    def accessor(self, index: int, *kinds: str) -> NDArray[Any]:
+        """(count, components) values of an accessor of one of these types; normalized integers become f32."""
         accessor = self.pick(self.document.accessors, index, "accessor")
-        if accessor.type != kind:
-            raise self.error(f"accessor {index} is {accessor.type}: {kind} is needed")
+        if accessor.type not in kinds:
+            raise self.error(f"accessor {index} is {accessor.type}: {' or '.join(kinds)} is needed")
         if accessor.count > MAX_ELEMENTS:
             raise self.error(f"accessor {index} has {accessor.count:,} elements: at most {MAX_ELEMENTS:,} are allowed")
-        width, dtype = COMPONENTS[kind], np.dtype(DTYPES[accessor.component_type])
+        width, dtype = COMPONENTS[accessor.type], np.dtype(DTYPES[accessor.component_type])
         if accessor.buffer_view is None:
             values = np.zeros((accessor.count, width), dtype)
         else:

@@ -2,8 +2,8 @@
 
 The albedo is the base colour as it stands, also of metals: without a mirror term, what a metal reflects leaves
 diffusely. Emission is emissiveFactor × emissiveStrength [W/(sr m²)] × texture. Opacity is the alpha of the base colour, unless
-alphaMode is OPAQUE, times 1 - transmission (KHR_materials_transmission), whose tint is ignored. Roughness, normal maps and vertex
-colours have no effect. A picture that cannot be read counts as white, so the factor alone is used; where the file gives
+alphaMode is OPAQUE, times 1 - transmission (KHR_materials_transmission), whose tint is ignored. Roughness, normal maps and the
+alpha of vertices have no effect. A picture that cannot be read counts as white, so the factor alone is used; where the file gives
 no base colour factor either, the albedo is 0.5.
 """
 

@@ -90,6 +90,7 @@ def with_ceiling_light(scene: Scene) -> Scene:
         uv0=extended(scene.uv0, square),
         uv1=extended(scene.uv1, square),
         normals=extended(scene.normals, down),
+        colours=extended(scene.colours, np.ones((2, 3, 3), np.float32)),
     )
 
 

@@ -1,23 +1,27 @@
-"""Meshes without materials: PLY and STL through trimesh, as one grey, double-sided object; OBJ goes to ``obj``.
+"""Meshes without materials: PLY and STL through trimesh, as one double-sided object; OBJ goes to ``obj``.
 
-Albedo 0.5; colours of vertices and faces have no effect. Lengths are taken as metres, axes as they are.
+The albedo is the colour of the vertices or faces (sRGB) where a file has any, else 0.5.
 """
 
 from __future__ import annotations
 
 import io
+import logging
 import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
 from app.errors import SceneError
-from app.scene.model import Material, Scene
+from app.scene.images import linear_from_srgb
+from app.scene.model import F32, Material, Scene
 from app.scene.obj import load_obj
 from app.scene.validate import Part, validate
+
+TEXTURE_LINE, HEADER_BYTES = b"comment TextureFile", 4096
+PICTURE = "its picture is ignored: of a PLY file, only the colours of vertices and faces are read"
 
 
 @np.errstate(all="ignore")
@@ -29,24 +33,49 @@ def load_meshfile(path: Path) -> Scene:
         data = path.read_bytes()
     except OSError as error:
         raise SceneError(path, f"cannot be read: {error.strerror}") from error
-    parts = [Part(positions, triangles) for positions, triangles in _read(path, data)]
-    return validate(path, path.stem, parts, [path.stem], [Material("grey", double_sided=True)])
+    meshes = _read(path, data)
+    parts = [
+        Part(np.asarray(m.vertices, np.float64), np.asarray(m.faces, np.int64), colours=_colours(m)) for m in meshes
+    ]
+    if all(part.colours is not None for part in parts):
+        material = Material("colours", albedo=(1.0, 1.0, 1.0), double_sided=True)
+    else:
+        material = Material("grey", double_sided=True)
+    notes = [PICTURE] if TEXTURE_LINE in data[:HEADER_BYTES] else []
+    return validate(path, path.stem, parts, [path.stem], [material], warnings=notes)
 
 
-def _read(path: Path, data: bytes) -> list[tuple[NDArray[Any], NDArray[Any]]]:
-    """Vertices and faces of every mesh in the file, exactly as stored."""
+def _read(path: Path, data: bytes) -> list[trimesh.Trimesh]:
+    """Every mesh in the file, exactly as stored."""
     kind = path.suffix.lower().removeprefix(".")
     if kind == "stl":
         data = _checked_stl(path, data)
+    log = logging.getLogger("trimesh")
+    level = log.level
     try:
+        log.setLevel(logging.CRITICAL)  # what it would say of a PLY file's picture is said here
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # numpy's remarks on text that ends early; what is missing shows below
             scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False, validate=False)
             meshes = [g for g in scene.geometry.values() if isinstance(g, trimesh.Trimesh)]
-            return [(np.asarray(m.vertices, np.float64), np.asarray(m.faces, np.int64)) for m in meshes]
+            for mesh in meshes:
+                _ = mesh.vertices, mesh.faces, _colours(mesh)
+            return meshes
     except Exception as error:  # trimesh's parsers raise whatever the broken bytes lead to
         reason = " ".join(str(error).split())[:120]
         raise SceneError(path, f"not a readable {kind.upper()} file ({type(error).__name__}: {reason})") from error
+    finally:
+        log.setLevel(level)
+
+
+def _colours(mesh: trimesh.Trimesh) -> F32 | None:
+    """Linear Rec.709 per vertex (n, 3) or corner (m, 3, 3); None if the file has none."""
+    visual: Any = mesh.visual
+    if visual.kind not in ("vertex", "face"):
+        return None
+    srgb = visual.vertex_colors if visual.kind == "vertex" else visual.face_colors
+    linear = linear_from_srgb(np.asarray(srgb[:, :3], np.float32) / np.float32(255))
+    return linear if visual.kind == "vertex" else np.repeat(linear[:, None], 3, axis=1)
 
 
 def _checked_stl(path: Path, data: bytes) -> bytes:

@@ -19,6 +19,8 @@ F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 RGB = tuple[float, float, float]
 
+MOST_ALBEDO = 0.99  # of the whitest diffuser that is made, sintered PTFE; in a closed room of albedo 1 light never ends
+
 
 @dataclass(frozen=True, eq=False)
 class Texture:
@@ -84,7 +86,8 @@ class Scene:
 
     positions (n, 3) f64, triangles (m, 3) i32 counter-clockwise from the front, material_ids and object_ids (m,) i32
     into ``materials`` and ``objects`` (names). Per corner, where the file has them: uv0, uv1 (m, 3, 2) f32 with v = 0
-    at the top, normals (m, 3, 3) f32 unit (kept for export; light transport uses geometric normals).
+    at the top, normals (m, 3, 3) f32 unit (kept for export; light transport uses geometric normals), colours (m, 3, 3)
+    f32, linear Rec.709, in [0, 1], which multiply the albedo. What of the light is reflected is nowhere above MOST_ALBEDO.
     ``warnings`` are one-line counted repairs and omissions. Every value is finite, every index in range, every triangle
     has an area: ``validate`` guarantees it.
     """
@@ -100,6 +103,7 @@ class Scene:
     uv0: F32 | None = None
     uv1: F32 | None = None
     normals: F32 | None = None
+    colours: F32 | None = None
     warnings: tuple[str, ...] = ()
     source: Path | None = None
 

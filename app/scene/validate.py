@@ -1,8 +1,8 @@
 """From what a loader found to a Scene that keeps its promises: the one gate that every file passes.
 
 Repaired and counted as warnings: triangles without area, triangles listed twice, textured triangles without texture
-coordinates, albedo outside [0, 1], emission below 0, cameras that make no sense. Repaired without a word: normals that are
-zero or not finite.
+coordinates, albedo below 0 or above MOST_ALBEDO, vertex colours outside [0, 1], emission below 0, cameras that make
+no sense. Repaired without a word: normals that are zero or not finite.
 Refused with ``SceneError``: corners that are not finite, indices out of range, no triangle left, more than
 ``MAX_TRIANGLES``, an absurd size.
 """
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import SceneError
-from app.scene.model import F64, RGB, Camera, Material, Scene, Texture
+from app.scene.model import F32, F64, MOST_ALBEDO, RGB, Camera, Material, Scene, Texture
 
 MAX_TRIANGLES = 20_000_000
 EXTENT_RANGE = (1e-12, 1e12)  # m; outside of it areas leave the range of 32-bit floats by far
@@ -44,7 +44,7 @@ class Part:
     """Some triangles as a loader found them; nothing about them is trusted yet.
 
     positions (n, 3) [m]; triangles (m, 3) whole numbers; object_ids and material_ids: one for all or (m,).
-    uv0, uv1, normals: per vertex (n, 2|3), per corner (m, 3, 2|3), or None; NaN where a corner has none.
+    uv0, uv1, normals, colours: per vertex (n, 2|3), per corner (m, 3, 2|3), or None; NaN where a corner has none.
     """
 
     positions: Array
@@ -54,6 +54,7 @@ class Part:
     uv0: Array | None = None
     uv1: Array | None = None
     normals: Array | None = None
+    colours: Array | None = None
 
 
 def counted(count: int, one: str, many: str) -> str:
@@ -112,9 +113,11 @@ def validate(
     triangles = (np.cumsum(used) - 1)[triangles]
     uvs = [_join_corners([p.uv0 for p in parts], parts, keep, 2), _join_corners([p.uv1 for p in parts], parts, keep, 2)]
     normals = _join_corners([p.normals for p in parts], parts, keep, 3)
+    colours = _check_colours(_join_corners([p.colours for p in parts], parts, keep, 3), notes)
     checked_materials = _check_materials(source, materials, notes)
     material_ids = _join_ids([p.material_ids for p in parts], parts)[keep]
     material_ids, checked_materials = _drop_unmapped_textures(uvs, material_ids, checked_materials, notes)
+    checked_materials, colours = _hold_albedo(checked_materials, material_ids, colours, notes)
 
     scene = Scene(
         name=name,
@@ -127,6 +130,7 @@ def validate(
         cameras=_check_cameras(cameras, notes),
         uv0=None if uvs[0] is None else np.nan_to_num(uvs[0], nan=0.0, posinf=0.0, neginf=0.0),
         uv1=None if uvs[1] is None else np.nan_to_num(uvs[1], nan=0.0, posinf=0.0, neginf=0.0),
+        colours=colours,
         source=Path(source),
     )
     return dataclasses.replace(scene, normals=_unit_normals(scene, normals), warnings=tuple(notes))
@@ -240,14 +244,14 @@ def _check_materials(source: str | Path, materials: Sequence[Material], notes: l
             raise SceneError(
                 source, f"material '{material.name}': emission above {BRIGHTEST:g} W/(sr m²) is out of range"
             )
-        albedo = _rgb(min(max(x, 0.0), 1.0) for x in material.albedo)
+        albedo = _rgb(max(x, 0.0) for x in material.albedo)
         emission = _rgb(max(x, 0.0) for x in material.emission)
         clamped += albedo != material.albedo
         darkened += emission != material.emission
         name = one_line(material.name)
         checked.append(_even_opacity(dataclasses.replace(material, name=name, albedo=albedo, emission=emission)))
     if clamped:
-        notes.append(f"{counted(clamped, 'material', 'materials')} with an albedo outside 0 to 1: clamped")
+        notes.append(f"{counted(clamped, 'material', 'materials')} with an albedo below 0: set to 0")
     if darkened:
         notes.append(f"{counted(darkened, 'material', 'materials')} with an emission below 0: set to 0")
     return checked
@@ -264,6 +268,49 @@ def _even_opacity(material: Material) -> Material:
     if texture is None or all_over == 1.0 or most < (cutoff or 1e-300):
         return dataclasses.replace(material, opacity=all_over, opacity_texture=None, opacity_cutoff=None)
     return dataclasses.replace(material, opacity=opacity)
+
+
+def _check_colours(colours: F32 | None, notes: list[str]) -> F32 | None:
+    """Vertex colours in [0, 1], 1 where a corner has none or one that is not finite."""
+    if colours is None:
+        return None
+    colours = np.nan_to_num(colours, nan=1.0, posinf=1.0, neginf=1.0)
+    outside = int(((colours < 0.0) | (colours > 1.0)).any(axis=(1, 2)).sum())
+    if outside:
+        notes.append(f"{counted(outside, 'triangle', 'triangles')} with vertex colours outside 0 to 1: clamped")
+    return np.clip(colours, 0.0, 1.0)
+
+
+def _hold_albedo(
+    materials: list[Material], ids: NDArray[np.int64], colours: F32 | None, notes: list[str]
+) -> tuple[list[Material], F32 | None]:
+    """Nothing reflects more than MOST_ALBEDO. What varies most is held: a material's picture, else its vertex colours, else its
+    factor."""
+    held, holding = list(materials), 0
+    pictures: dict[tuple[int, RGB], F32] = {}
+    for i in np.unique(ids).tolist():
+        material, mine = materials[i], ids == i
+        factor = _rgb(min(a, 1.0) for a in material.albedo)
+        most = _rgb(MOST_ALBEDO / max(a, MOST_ALBEDO) for a in factor)
+        above, texture = factor != material.albedo, material.albedo_texture
+        if texture is not None:
+            above |= bool((texture.pixels > np.array(most, np.float32)).any())
+            if above:
+                key = id(texture.pixels), most
+                pictures.setdefault(key, np.minimum(texture.pixels, np.array(most, np.float32)))
+                texture = dataclasses.replace(texture, pixels=pictures[key])
+        elif colours is not None:
+            above |= bool((colours[mine] > np.array(most, np.float32)).any())
+            colours[mine] = np.minimum(colours[mine], np.array(most, np.float32))
+        else:
+            factor = _rgb(min(a, MOST_ALBEDO) for a in factor)
+            above |= factor != material.albedo
+        if above:
+            holding += 1
+            held[i] = dataclasses.replace(material, albedo=factor, albedo_texture=texture)
+    if holding:
+        notes.append(f"{counted(holding, 'material', 'materials')} with an albedo above {MOST_ALBEDO:g}: held there")
+    return held, colours
 
 
 def _rgb(values: Iterable[float]) -> RGB:

@@ -90,7 +90,10 @@ def quad_gltf(positions: Any = QUAD, indices: Any = QUAD_INDICES) -> Gltf:
         "materials": [
             {
                 "name": "paint",
-                "pbrMetallicRoughness": {"baseColorFactor": [0.1234, 0.0019, 1, 1], "baseColorTexture": {"index": 0}},
+                "pbrMetallicRoughness": {
+                    "baseColorFactor": [0.1234, 0.0019, 0.75, 1],
+                    "baseColorTexture": {"index": 0},
+                },
                 "emissiveFactor": [1, 0.5, 0.25],
                 "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}},
                 "doubleSided": True,

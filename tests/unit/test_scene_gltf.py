@@ -33,7 +33,7 @@ def test_quad_as_glb_and_as_json_with_data_uri(tmp_path: Path, name: str) -> Non
 
 def test_material_keeps_exact_factors_and_sampler(tmp_path: Path) -> None:
     (material,) = load(tmp_path, quad_gltf().glb()).materials
-    assert material.albedo == (0.1234, 0.0019, 1.0)
+    assert material.albedo == (0.1234, 0.0019, 0.75)
     assert material.emission == (8.0, 4.0, 2.0)
     assert material.double_sided and material.name == "paint"
     texture = material.albedo_texture

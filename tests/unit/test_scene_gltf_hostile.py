@@ -65,7 +65,10 @@ REPAIRED: dict[str, tuple[Callable[[Gltf], None], str]] = {
     "far coordinates": (merge("materials.0.emissiveTexture", {"index": 0, "texCoord": 2}), "TEXCOORD_2"),
     "point light": (merge("nodes.0.extensions", {"KHR_lights_punctual": {"light": 0}}), "1 point light ignored"),
     "unlit": (merge("materials.0.extensions", {"KHR_materials_unlit": {}}), "1 unlit material"),
-    "albedo": (merge("materials.0.pbrMetallicRoughness.baseColorFactor", [2, -1, 0, 1]), "albedo outside 0 to 1"),
+    "albedo": (
+        merge("materials.0.pbrMetallicRoughness.baseColorFactor", [2, -1, 0, 1]),
+        "albedo above 0.99: held there",
+    ),
     "emission": (merge("materials.0.emissiveFactor", [-1, 0, 0]), "emission below 0"),
     "no material": (lambda g: g.json["meshes"][0]["primitives"][0].pop("material") and None, "without material"),
     "no uv": (no_uv, "2 textured triangles without texture coordinates"),
@@ -90,7 +93,7 @@ def test_repaired_with_a_counted_warning(tmp_path: Path, name: str) -> None:
 def test_missing_picture_leaves_the_factor_or_grey(tmp_path: Path) -> None:
     gltf = quad_gltf()
     gltf.json["images"] = [{"uri": "none.png"}]
-    assert load(tmp_path, gltf.glb()).materials[0].albedo == (0.1234, 0.0019, 1.0)
+    assert load(tmp_path, gltf.glb()).materials[0].albedo == (0.1234, 0.0019, 0.75)
     drop_factor(gltf)
     assert load(tmp_path, gltf.glb()).materials[0].albedo == (0.5, 0.5, 0.5)
 

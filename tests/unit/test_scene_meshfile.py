@@ -74,7 +74,9 @@ def test_obj_without_its_pictures(tmp_path: Path) -> None:
     written(tmp_path, "room.mtl", "newmtl glow\nKd 0.2 0.2 0.2\nmap_Kd a.png\nnewmtl paint\nmap_Kd ../b.png\n")
     scene = load(tmp_path, OBJ)
     assert [m.albedo for m in scene.materials] == [(0.2, 0.2, 0.2), (0.5, 0.5, 0.5)]
-    assert scene.warnings == ("2 pictures could not be read: Kd is used, or albedo 0.5 without it",)
+    assert scene.warnings == (
+        "2 pictures could not be read ('a.png', '../b.png'): Kd is used, or albedo 0.5 without it",
+    )
 
 
 @pytest.mark.parametrize("kind", ["ply", "stl", "obj"])
@@ -140,3 +142,82 @@ def test_fuzz(tmp_path: Path, kind: str, data: st.DataObject) -> None:
     except SceneError:
         return
     assert len(scene.triangles) > 0 and np.isfinite(scene.normals_areas[0]).all()
+
+
+CONCAVE = {  # corners of the face, area, a point of its plane that is outside of it
+    "door": ([(0, 0), (1, 0), (1, 2), (2, 2), (2, 0), (3, 0), (3, 3), (0, 3)], 7.0, (1.5, 1.0)),
+    "arrow": ([(0, 0), (2, -2), (0, 2), (-2, -2)], 4.0, (0.0, -1.0)),
+    "keyhole": ([(0, 0), (3, 0), (3, 3), (0, 3), (0, 0), (1, 1), (1, 2), (2, 2), (2, 1), (1, 1)], 8.0, (1.5, 1.5)),
+}
+
+
+@pytest.mark.parametrize("name", CONCAVE)
+@pytest.mark.parametrize("turned", [False, True])
+def test_concave_faces_are_not_walled_up(tmp_path: Path, name: str, turned: bool) -> None:
+    ring, area, outside = CONCAVE[name]
+    ring = ring[::-1] if turned else ring
+    lines = [f"v {x} 1 {y}\nvt {x} {y}" for x, y in ring]
+    face = " ".join(f"{k}/{k}" for k in range(1, len(ring) + 1))
+    square = "v 9 0 0\nv 9 1 0\nv 9 1 1\nv 9 0 1\nf -4 -3 -2 -1\nf -3 -2 -1"
+    text = "\n".join([*lines, f"o before\n{square}\no wall\nusemtl paint\nf {face}\no after\n{square}"])
+    scene = load(tmp_path, text)
+    wall = scene.object_ids == 1
+    normals, areas = scene.normals_areas
+    assert areas[wall].sum() == pytest.approx(area) and len(scene.triangles) == wall.sum() + 6
+    assert np.allclose(normals[wall], [0, 1 if turned else -1, 0])  # as the face winds about it
+    assert scene.uv0 is not None and np.allclose(scene.uv0[wall] * [1, -1] + [0, 1], scene.corners[wall][..., [0, 2]])
+    assert [scene.materials[k].name for k in scene.material_ids[wall]] == ["paint"] * wall.sum()
+    point = np.array([outside[0], 1.0, outside[1]])
+    a, b, c = np.moveaxis(scene.corners[wall], 1, 0)
+    sides = np.array([np.cross(q - p, point - p)[:, 1] for p, q in ((a, b), (b, c), (c, a))])
+    assert not ((sides > 0).all(0) | (sides < 0).all(0)).any()  # the point lies in none of the triangles
+
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+NAMES = {  # usemtl lines, the material library
+    "with #": ("usemtl Material #25", "newmtl Material #26\nKd 0 0 0\nnewmtl Material #25\nKd 0.3 0.3 0.3"),
+    "with a comment": ("usemtl paint # of the wall", "newmtl paint\nKd 0.3 0.3 0.3 # grey"),
+    "tabs": ("usemtl\tpaint", "\tnewmtl\tpaint\n\t\tKd\t0.3\t0.3\t0.3"),
+    "in another case": ("usemtl Paint", "newmtl PAINT\nkd 0.3 0.3 0.3"),
+    "quoted": ('usemtl "my paint"', "newmtl my paint\nKd 0.3 0.3 0.3"),
+    "after a byte order mark": ("usemtl paint", "\ufeffnewmtl paint\nKd 0.3 0.3 0.3"),
+}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_of_materials(tmp_path: Path, name: str) -> None:
+    use, library = NAMES[name]
+    written(tmp_path, "m.mtl", library)
+    scene = load(tmp_path, f"\ufeffmtllib m.mtl\n{TRIANGLE}{use}\nf 1 2 3\n")
+    assert scene.materials[scene.material_ids[0]].albedo == (0.3, 0.3, 0.3) and scene.warnings == ()
+
+
+LIBRARY_LINES = ["a.mtl b b.mtl", '"b b.mtl" a.mtl', "B B.MTL\nmtllib A.mtl", "sub\\..\\b b.mtl a.mtl"]
+
+
+@pytest.mark.parametrize("line", LIBRARY_LINES)
+def test_lists_of_material_libraries(tmp_path: Path, line: str) -> None:
+    (tmp_path / "sub").mkdir()
+    written(tmp_path, "a.mtl", "newmtl one\nKd 0.1 0.1 0.1\n")
+    written(tmp_path, "b b.mtl", "newmtl two\nKd 0.2 0.2 0.2\n")
+    scene = load(tmp_path, f"mtllib {line}\n{TRIANGLE}usemtl one\nf 1 2 3\nusemtl two\nf 1 3 2\n")
+    assert [m.albedo[0] for m in scene.materials] == [0.1, 0.2] and scene.warnings == ()
+
+
+@pytest.mark.parametrize(
+    "file", ["TEX\\paint.PNG", '"tex/paint.png"', "C:\\old\\tex\\paint.png", "../tex/paint.png", "tex/#1.png"]
+)
+def test_pictures_are_found_however_they_are_named(tmp_path: Path, file: str) -> None:
+    for folder in ("tex", "lib"):
+        (tmp_path / folder).mkdir()
+    place = "lib" if file.startswith("C:") else "tex"
+    for name in ("paint.png", "#1.png"):
+        written(tmp_path / place, name, png([[[188, 188, 188]]]))
+    written(tmp_path / "lib", "m.mtl", f"newmtl paint\nmap_Kd {file}\n")
+    text = f"mtllib lib/m.mtl\n{TRIANGLE}usemtl paint\nf 1/1 2/2 3/3\n"
+    scene = load(tmp_path, text)
+    assert scene.materials[0].albedo_texture is not None and scene.warnings == ()
+    (tmp_path / place / "paint.png").unlink()
+    (tmp_path / place / "#1.png").unlink()
+    (note,) = load(tmp_path, text).warnings
+    assert note.startswith("1 picture could not be read ('") and file.strip('"') in note

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.errors import SceneError
-from app.scene.model import Camera, Material, Scene, Texture
+from app.scene.model import MOST_ALBEDO, Camera, Material, Scene, Texture
 from app.scene.validate import MAX_TRIANGLES, Part, check_triangle_count, has_area, validate
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
@@ -103,8 +103,8 @@ def test_too_many_triangles_are_refused_before_any_work() -> None:
 
 def test_albedo_and_emission_are_clamped() -> None:
     scene = made([Part(SQUARE, TRIANGLES)], [Material("m", (1.5, -0.5, 0.25), (-1.0, 0.0, 2.0))])
-    assert scene.materials[0].albedo == (1.0, 0.0, 0.25) and scene.materials[0].emission == (0.0, 0.0, 2.0)
-    assert len(scene.warnings) == 2
+    assert scene.materials[0].albedo == (MOST_ALBEDO, 0.0, 0.25) and scene.materials[0].emission == (0.0, 0.0, 2.0)
+    assert len(scene.warnings) == 3
 
 
 def test_names_become_single_printable_lines() -> None:
@@ -117,10 +117,10 @@ def test_names_become_single_printable_lines() -> None:
 def test_only_triangles_without_coordinates_lose_their_texture() -> None:
     texture = Texture("t", np.array([[[0, 0, 0], [1, 0.5, 0]]], np.float32))
     parts = [Part(SQUARE, TRIANGLES, uv0=SQUARE[:, :2]), Part(SQUARE + 2.0, TRIANGLES, 1)]
-    scene = made(parts, [Material("m", (1, 0.5, 1), albedo_texture=texture)])
+    scene = made(parts, [Material("m", (0.5, 0.5, 1), albedo_texture=texture)])
     assert [scene.materials[i].albedo_texture is not None for i in scene.material_ids] == [True, True, False, False]
     assert scene.warnings == ("2 textured triangles without texture coordinates: the picture's mean colour is used",)
-    assert scene.materials[scene.material_ids[2]].albedo == (0.5, 0.125, 0.0)
+    assert scene.materials[scene.material_ids[2]].albedo == (0.25, 0.125, 0.0)
     assert scene.uv0 is not None and np.isfinite(scene.uv0).all()
 
 

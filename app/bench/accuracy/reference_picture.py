@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.materials import look_up, texture_coordinates
+from app.atlas.materials import colours_at, look_up, texture_coordinates
 from app.atlas.points import Points, barycentric
 from app.atlas.sides import lit_sides
 from app.gpu import Gpu, Mesh, Pass
@@ -157,7 +157,7 @@ def _reflecting(scene: Scene, points: Points) -> NDArray[np.bool_]:
 
 
 def _colours(scene: Scene, points: Points, kind: str) -> F64:
-    """(n, 3) ``albedo`` or ``emission`` of the materials at points, textures included; the back of one side has none."""
+    """(n, 3) ``albedo`` or ``emission`` of the surfaces at points; the back of one side has none."""
     out = np.zeros((len(points), 3))
     used = scene.material_ids[points.triangle]
     for k in np.unique(used):
@@ -169,4 +169,6 @@ def _colours(scene: Scene, points: Points, kind: str) -> F64:
         if texture is not None and coordinates is not None:
             at = np.einsum("nk,nkc->nc", points.weights[mine], coordinates[points.triangle[mine]])
             out[mine] *= look_up(texture, texture.pixels, at)
+    if kind == "albedo" and scene.colours is not None:
+        out *= colours_at(scene, points.triangle, points.weights)
     return out

@@ -11,6 +11,7 @@ from imgui_bundle import imgui
 
 from app.lightmap.options import QUADTREE
 from app.render.tone_mapping import encode_srgb
+from app.scene.model import MOST_ALBEDO
 from app.ui import theme, widgets
 from app.ui.state import RGB, State
 
@@ -138,8 +139,8 @@ def _albedo(material: Any) -> RGB:
     widgets.labelled("Albedo ρ")
     imgui.set_next_item_width(-1)
     changed, value = imgui.color_edit3("##albedo", list(material.albedo), imgui.ColorEditFlags_.float)
-    widgets.tooltip("Diffuse reflectance, linear Rec.709, 0 to 1")
-    return rgb(min(max(float(v), 0.0), 1.0) for v in value) if changed else material.albedo
+    widgets.tooltip(f"Diffuse reflectance, linear Rec.709, 0 to {MOST_ALBEDO:g}")
+    return rgb(min(max(float(v), 0.0), MOST_ALBEDO) for v in value) if changed else material.albedo
 
 
 def _emission(state: State, material: Any) -> RGB:
