@@ -2,8 +2,9 @@
 
 Every node with a mesh becomes an object. Read: triangles, strips and fans, all component types, sparse accessors, node
 hierarchies, instances (also EXT_mesh_gpu_instancing), materials and their pictures (``gltf_materials``), TEXCOORD_0
-and 1, normals, COLOR_0 as a factor of the albedo, perspective cameras. Counted and left out: points and lines, punctual
-lights, the pose of skins.
+and 1, normals, COLOR_0 as a factor of the albedo, morph targets and skins as they
+stand (``gltf_pose``), perspective cameras. Counted and left out: points and lines, punctual lights, skins whose joints are in no
+scene.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 
 from app.scene.gltf_file import GltfFile
 from app.scene.gltf_materials import UNKNOWN_ALBEDO, read_materials
-from app.scene.gltf_schema import Node, Primitive
+from app.scene.gltf_pose import joint_matrices, morphed, skinning, turned_normals
+from app.scene.gltf_schema import Mesh, Node, Primitive
 from app.scene.model import F64, Camera, Material, Scene
 from app.scene.validate import Part, check_triangle_count, counted, validate
 
@@ -61,7 +63,8 @@ class _Reader:
         self.objects: list[str] = []
         self.cameras: list[Camera] = []
         self.used_materials: set[int] = set()
-        self._shapes: dict[int, list[_Shape]] = {}
+        self._worlds: dict[int, F64] = {}  # world-from-node of the scene's nodes, parents first
+        self._shapes: dict[tuple[int, int | None, tuple[float, ...]], list[_Shape]] = {}
         self._triangle_count = 0
         self.unpainted = 0  # primitives without material
         self._not_triangles = self._skinned = self._lights = self._not_pinholes = 0
@@ -71,7 +74,7 @@ class _Reader:
             (self._lights, "point light", "point lights", "ignored: only surfaces emit"),
             (self._not_triangles, "primitive", "primitives", "without triangles left out"),
             (self.unpainted, "primitive", "primitives", "without material: grey with albedo 0.5"),
-            (self._skinned, "skinned mesh", "skinned meshes", "shown without pose"),
+            (self._skinned, "skinned mesh", "skinned meshes", "without joints in the scene: shown without pose"),
             (self._not_pinholes, "camera", "cameras", "without perspective left out"),
         ]
         return [f"{counted(n, one, many)} {text}" for n, one, many, text in notes if n]
@@ -86,17 +89,16 @@ class _Reader:
             roots = [i for i in range(len(nodes)) if i not in children]
             if nodes and not roots:
                 raise self.file.error("the nodes form a cycle")
-        visited: set[int] = set()
         stack = [(root, np.eye(4)) for root in reversed(roots)]
         while stack:
             index, world_from_parent = stack.pop()
             node = self.file.pick(nodes, index, "node")
-            if index in visited:
+            if index in self._worlds:
                 raise self.file.error(f"node {index} is reached twice: the nodes form a cycle, or it has two parents")
-            visited.add(index)
-            world_from_node = world_from_parent @ _parent_from_node(node)
-            self._visit(index, node, world_from_node)
-            stack.extend((child, world_from_node) for child in reversed(node.children))
+            self._worlds[index] = world_from_parent @ _parent_from_node(node)
+            stack.extend((child, self._worlds[index]) for child in reversed(node.children))
+        for index, world_from_node in self._worlds.items():
+            self._visit(index, nodes[index], world_from_node)
 
     def _visit(self, index: int, node: Node, world_from_node: F64) -> None:
         self._lights += node.extensions.light is not None
@@ -110,13 +112,18 @@ class _Reader:
         if node.mesh is None:
             return
         mesh = self.file.pick(self.file.document.meshes, node.mesh, "mesh")
-        self._skinned += node.skin is not None
-        worlds = world_from_node @ self._instances(node)
+        joints = None
+        if node.skin is not None:
+            skin = self.file.pick(self.file.document.skins, node.skin, "skin")
+            joints = joint_matrices(self.file, skin, self._worlds)
+            self._skinned += joints is None
+        # Joints alone place a skin (glTF 2.0, 3.7.3.3).
+        worlds = np.eye(4)[None] if joints is not None else world_from_node @ self._instances(node)
         self.objects.append(node.name or mesh.name or f"node {index}")
-        if node.mesh not in self._shapes:
-            read = [self._shape(p, f"mesh {node.mesh} primitive {k}") for k, p in enumerate(mesh.primitives)]
-            self._shapes[node.mesh] = [shape for shape in read if shape is not None]
-        for shape in self._shapes[node.mesh]:
+        key = node.mesh, None if joints is None else node.skin, tuple(node.weights or mesh.weights)
+        if key not in self._shapes:
+            self._shapes[key] = self._read(mesh, f"mesh {node.mesh}", joints, key[2])
+        for shape in self._shapes[key]:
             self._triangle_count += len(worlds) * len(shape.triangles)
             check_triangle_count(self.file.path, self._triangle_count)
             material = len(self.file.document.materials) if shape.material is None else shape.material
@@ -139,7 +146,16 @@ class _Reader:
             values.get("SCALE", np.ones((k, 3))),
         )
 
-    def _shape(self, primitive: Primitive, where: str) -> _Shape | None:
+    def _read(self, mesh: Mesh, where: str, joints: F64 | None, weights: tuple[float, ...]) -> list[_Shape]:
+        """The shapes of a mesh's primitives, with these weights of their morph targets and these matrices of their joints."""
+        shapes = []
+        for k, primitive in enumerate(mesh.primitives):
+            shape = self._shape(primitive, f"{where} primitive {k}", joints, weights)
+            if shape is not None:
+                shapes.append(shape)
+        return shapes
+
+    def _shape(self, primitive: Primitive, where: str, joints: F64 | None, weights: tuple[float, ...]) -> _Shape | None:
         attributes = primitive.attributes
         if primitive.mode < TRIANGLES or "POSITION" not in attributes:
             self._not_triangles += 1
@@ -166,7 +182,19 @@ class _Reader:
         else:
             self.file.pick(self.file.document.materials, primitive.material, "material")
             self.used_materials.add(primitive.material)
-        return _compact(positions, _triangles(corners.astype(np.int64), primitive.mode), primitive.material, values)
+        positions = morphed(self.file, primitive, weights, "POSITION", positions, where)
+        uv0, uv1, normals, colours = values
+        if normals is not None:
+            normals = morphed(self.file, primitive, weights, "NORMAL", normals, where)
+        triangles = _triangles(corners.astype(np.int64), primitive.mode)
+        placing = None if joints is None else skinning(self.file, primitive, joints, count, where)
+        if placing is not None:
+            linear = placing[:, :3, :3]
+            positions = np.einsum("nij,nj->ni", linear, positions.astype(np.float64)) + placing[:, :3, 3]
+            normals = None if normals is None else turned_normals(linear, normals)
+            mirrored = (np.linalg.det(linear) < 0.0)[triangles].sum(axis=1) > 1
+            triangles = np.where(mirrored[:, None], triangles[:, [0, 2, 1]], triangles)
+        return _compact(positions, triangles, primitive.material, [uv0, uv1, normals, colours])
 
 
 def _compact(
@@ -227,10 +255,7 @@ def _placed(shape: _Shape, worlds: F64, object_id: int, material: int) -> Part:
     triangles = triangles + n * np.arange(k)[:, None, None]
     normals = None
     if shape.normals is not None:
-        # A normal turns with the cofactor matrix, which also exists for singular transforms.
-        cofactors = np.stack([np.cross(linear[:, (i + 1) % 3], linear[:, (i + 2) % 3]) for i in range(3)], axis=1)
-        cofactors = np.where(mirrored[:, None, None], -cofactors, cofactors)
-        normals = np.einsum("kij,nj->kni", cofactors, shape.normals.astype(np.float64)).reshape(-1, 3)
+        normals = turned_normals(linear[:, None], shape.normals).reshape(-1, 3)
     return Part(
         positions.reshape(-1, 3),
         triangles.reshape(k * m, 3),

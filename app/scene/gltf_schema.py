@@ -152,12 +152,19 @@ class Primitive(Model):
     attributes: dict[str, Index]
     indices: Index | None = None
     material: Index | None = None
+    targets: list[dict[str, Index]] = []
     mode: Annotated[int, Field(ge=0, le=6)] = 4
 
 
 class Mesh(Model):
     name: str = ""
     primitives: list[Primitive]
+    weights: list[float] = []
+
+
+class Skin(Model):
+    joints: list[Index]
+    inverse_bind_matrices: Index | None = None
 
 
 class Instancing(Model):
@@ -175,6 +182,7 @@ class Node(Model):
     mesh: Index | None = None
     camera: Index | None = None
     skin: Index | None = None
+    weights: list[float] = []
     matrix: Annotated[list[float], Field(min_length=16, max_length=16)] | None = None
     translation: Vec3 = (0.0, 0.0, 0.0)
     rotation: Vec4 = (0.0, 0.0, 0.0, 1.0)
@@ -206,6 +214,7 @@ class Document(Model):
     scenes: list[SceneNodes] = []
     nodes: list[Node] = []
     meshes: list[Mesh] = []
+    skins: list[Skin] = []
     cameras: list[Camera] = []
     materials: list[Material] = []
     textures: list[Texture] = []
