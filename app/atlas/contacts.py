@@ -106,7 +106,12 @@ def hidden_pieces(
     own, up = sides // 2, all_.normal[sides // 2] * np.where(sides % 2 == 1, -1.0, 1.0)[:, None]
     lids, left_out = _lids(all_, own, up, within, flat)
     pieces, owners = [np.empty((0, 3, 2))], [np.empty(0, np.int64)]
-    for one, lid in lids:
+    sheer = np.zeros(len(all_.members), bool)  # nothing that is not opaque hides what it lies on
+    sheer[facet] = ~np.array([m.opaque for m in scene.materials])[scene.material_ids]
+    for one, those in lids:
+        lid = those[~sheer[those]]
+        if not len(lid):
+            continue
         faces = faces_of[one]
         corners = all_.corners[face_triangle[faces]]
         axes = np.linalg.svd(up[one : one + 1])[2][1:].T  # (3, 2), of the plane

@@ -2,7 +2,7 @@
 
 A set is one material, so that another exitance of it scales the light it gives and costs no ray. Beyond so many, materials share
 a set, and shadow rays choose among them. Where a material has an image of what it emits, each shadow ray brings the light of the
-texel that it is sent to.
+texel that it is sent to. A lamp that is not opaque emits as much less all over.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def lamp_set(pool: TilePool, scene: Scene, materials: tuple[int, ...]) -> LampSe
     which = np.flatnonzero(np.isin(scene.material_ids, materials))
     corners = pool.space.local_from_world(scene.corners[which])
     of_material = np.zeros((len(scene.materials), 3))
-    of_material[list(materials)] = exitance
+    of_material[list(materials)] = exitance * np.array([[_there(pool, i)] for i in materials])
     relative = of_material[scene.material_ids[which]] / np.maximum(base, 1e-300)
     picture = any(scene.materials[i].emission_texture is not None for i in materials)
     rows = np.zeros((len(which), PICTURE if picture else PLAIN, 4), np.float32)
@@ -99,6 +99,18 @@ def lamp_set(pool: TilePool, scene: Scene, materials: tuple[int, ...]) -> LampSe
         rows[:, PLAIN:] = places_of(pool)[which]
         relative = relative * _means(pool, which)
     return LampSet(materials, base, rows, relative.mean(1))
+
+
+def _there(pool: TilePool, material: int) -> float:
+    """The share of a material's surfaces that is there."""
+    how = pool.scene.materials[material]
+    if how.opacity_texture is None:
+        return how.opacity
+    of = pool.scene.material_ids[pool.charts.face_triangle]
+    covered = pool.surfaces.face >= 0
+    area = pool.surfaces.area[covered][of[pool.surfaces.face[covered]] == material].sum()
+    whole = pool.scene.normals_areas[1][pool.charts.face_triangle[of == material]].sum()
+    return min(float(area / whole), 1.0) if whole > 0 else 1.0
 
 
 def _means(pool: TilePool, triangles: NDArray[np.int64]) -> F64:

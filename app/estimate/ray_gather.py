@@ -132,7 +132,7 @@ class RayGather:
         rows = np.zeros((self.rows, LINKS, CANDIDATES), np.float32)
         rows[: len(candidates)] = candidates
         self._textures["candidates"].write(rows.tobytes())
-        textures = {name: self._rays.textures[name] for name in ("t_bvh_nodes", "t_bvh_triangles")}
+        textures = {name: texture for name, texture in self._rays.textures.items() if name != "t_bvh_uv"}
         self._nearest.draw(
             self._targets["seen"],
             textures=textures | {"t_all_nodes": self._all_nodes, "t_candidates": self._textures["candidates"]},

@@ -9,17 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
-from app.atlas.materials import texel_colours
+from app.atlas.materials import texel_colours, texel_opacity
 from app.atlas.texels import Leaves, TexelSurfaces, texel_surfaces
 from app.scene.model import F32, Scene
 
+# Of a texel that is a hole all over, the share that counts as there: it holds light for pictures, which interpolate between
+# texels, and none that counts in any sum.
+LEAST_THERE = 1e-4
 FOLD = 1e-4  # of a texel's width: further off the plane of its leading face, a mean of faces is off the surface
 
 
 @dataclass(frozen=True, eq=False)
 class Tiles:
-    """n leaves, the surfaces of their texels, and their albedo and emission textures (n, t, t, 3), None where no material
-    has one."""
+    """n leaves, the surfaces of their texels, whose areas are what is there of them, and their albedo and emission textures
+    (n, t, t, 3), None where no material has one."""
 
     leaves: Leaves
     surfaces: TexelSurfaces
@@ -35,6 +38,9 @@ class Tiles:
         some = charts if faces is None else charts.with_faces(faces)
         surfaces = on_their_faces(scene, some, texel_surfaces(scene, some, leaves))
         albedo, emission = texel_colours(scene, some, leaves, surfaces)
+        opacity = texel_opacity(scene, some, leaves, surfaces)
+        if opacity is not None:
+            surfaces = dataclasses.replace(surfaces, area=surfaces.area * np.maximum(opacity, LEAST_THERE))
         if faces is not None:
             face = np.where(surfaces.face >= 0, faces[surfaces.face], -1).astype(np.int32)
             surfaces = dataclasses.replace(surfaces, face=face)

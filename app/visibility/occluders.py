@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from app.gpu import Gpu, Mesh, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.tile_pool import TilePool
+from app.visibility.opacity import Sheer, sheer_triangles
 
 NEAR = 0.25  # solver space: an eighth of the scene's diagonal
 TRIANGLES_A_ROW = 512  # see visibility/projections/triangles.glsl
@@ -40,23 +41,35 @@ CASTER_FORMAT = {"in_position": "3f", "in_sides": "2f", "in_normal": "3f"}
 
 @dataclass(frozen=True)
 class Casters:
-    """What one draw of the map needs: a mesh, or so many vertices that find their triangles in textures. triangles: drawn."""
+    """What one draw of the map needs: a mesh, or so many vertices that find their triangles in textures. triangles: drawn.
+    uniforms: where they are not opaque."""
 
     triangles: int
     mesh: Mesh | None = None
     vertices: int = 3
     textures: dict[str, Texture] = field(default_factory=dict)
+    uniforms: dict[str, int] = field(default_factory=dict)
+
+
+def occluders_of(gpu: Gpu, lightmap: Lightmap) -> list[Occluders]:
+    """All triangles of the scene: those that are opaque, and apart from them those that are not."""
+    sheer = sheer_triangles(lightmap.scene)
+    opaque = np.setdiff1d(np.arange(len(lightmap.scene.triangles)), sheer)
+    kinds = ((opaque, False), (sheer, True))
+    return [Occluders(gpu, lightmap.pool, triangles, sheer=some) for triangles, some in kinds if len(triangles)]
 
 
 class Occluders:
-    """The scene's triangles on the GPU. Whoever makes it releases it.
+    """Triangles of the scene on the GPU. Whoever makes it releases it.
 
-    count: of triangles; texture: three texels each, see visibility/projections/triangles.glsl.
+    count: of triangles; texture: three texels each, see visibility/projections/triangles.glsl; sheer: whether light may pass
+    them.
     """
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
-        self._gpu = gpu
-        vertices, triangles = occluders(lightmap.pool)
+    def __init__(self, gpu: Gpu, pool: TilePool, which: NDArray[np.int64], *, sheer: bool) -> None:
+        """which: the triangles (n,), in this order."""
+        self._gpu, self._pool, self._which, self.sheer = gpu, pool, which, sheer
+        vertices, triangles = occluders(pool, which)
         self._mesh = Mesh(gpu, vertices.tobytes(), OCCLUDER_FORMAT, indices=triangles.tobytes())
         self._corners: NDArray[np.float32] = vertices["in_position"][triangles]
         self._sides: NDArray[np.float32] = vertices["in_sides"][triangles[:, 2]]
@@ -66,53 +79,72 @@ class Occluders:
         texels[: self.count, :, :3] = self._corners
         texels[: self.count, :2, 3] = self._sides
         self.texture = gpu.texture((3 * TRIANGLES_A_ROW, rows), 4, "f4", texels.tobytes())
-        self._split: tuple[int, Mesh] | None = None
+        self._table = Sheer(gpu, pool, which) if sheer else None
+        self._split: tuple[int, Mesh, Sheer | None] | None = None
+
+    @property
+    def opacity(self) -> dict[str, Texture]:
+        """Of the triangles, to bind; none where they are opaque."""
+        return self._table.textures if self._table is not None else {}
 
     def whole(self, resolution: int) -> Casters:
         """The triangles as they are, indexed."""
-        return Casters(self.count, mesh=self._mesh)
+        return Casters(self.count, mesh=self._mesh, textures=self.opacity, uniforms=self._rows(self.count))
 
     def fetched(self, resolution: int) -> Casters:
         """Three vertices for each triangle, which fetch all of it."""
-        return Casters(self.count, vertices=3 * self.count, textures={"t_triangles": self.texture})
+        textures = {"t_triangles": self.texture} | self.opacity
+        return Casters(self.count, vertices=3 * self.count, textures=textures, uniforms=self._rows(self.count))
 
     def tessellated(self, resolution: int) -> Casters:
         """Triangles whose edges are short enough to be drawn straight in a map of this resolution."""
         if self._split is None or self._split[0] != resolution:
             self._drop_split()
-            vertices, indices = split_mesh(self._corners, self._sides, edge_limit(resolution))
-            self._split = resolution, Mesh(self._gpu, vertices.tobytes(), CASTER_FORMAT, indices=indices.tobytes())
+            vertices, indices, parent = split_mesh(self._corners, self._sides, edge_limit(resolution))
+            mesh = Mesh(self._gpu, vertices.tobytes(), CASTER_FORMAT, indices=indices.tobytes())
+            table = Sheer(self._gpu, self._pool, self._which[parent]) if self.sheer else None
+            self._split = resolution, mesh, table
             self._pieces = len(indices)
-        return Casters(self._pieces, mesh=self._split[1])
+        _, mesh, table = self._split
+        return Casters(self._pieces, mesh, textures=table.textures if table else {}, uniforms=self._rows(self._pieces))
+
+    def _rows(self, count: int) -> dict[str, int]:
+        return {"u_sheer": count} if self.sheer else {}
 
     def _drop_split(self) -> None:
         if self._split is not None:
-            self._split[1].release()
+            _, mesh, table = self._split
+            for part in (mesh, table):
+                if part is not None:
+                    part.release()
             self._split = None
 
     def release(self) -> None:
         self._drop_split()
         self._gpu.release_all(self._mesh, self.texture)
+        if self._table is not None:
+            self._table.release()
 
 
-def occluders(pool: TilePool) -> tuple[Any, NDArray[np.uint32]]:
-    """What a shooter sees: vertices (v,) OCCLUDER and triangles (m, 3) u32.
+def occluders(pool: TilePool, which: NDArray[np.int64]) -> tuple[Any, NDArray[np.uint32]]:
+    """What a shooter sees of triangles (m,): vertices (v,) OCCLUDER and triangles (m, 3) u32.
 
     in_sides: the items of front and back, facet from 1 or UNCHARTED, of the one triangle that has this vertex last (flat values
     come from there). The other two corners share any vertex in their place: one vertex per triangle, not three.
     """
-    scene, charts, count = pool.scene, pool.charts, len(pool.scene.triangles)
-    sides = np.full((count, 2), UNCHARTED, np.float32)
+    scene, charts, count = pool.scene, pool.charts, len(which)
+    sides = np.full((len(scene.triangles), 2), UNCHARTED, np.float32)
     sides[charts.face_triangle, charts.face_back.astype(int)] = charts.face_facet + 1
-    last = scene.triangles[:, 2]
+    corners = scene.triangles[which]
+    last = corners[:, 2]
     vertex_at = np.full(len(scene.positions), -1, np.int64)
     vertex_at[last] = np.arange(count)
-    bare = np.setdiff1d(scene.triangles, last)
+    bare = np.setdiff1d(corners, last)
     vertex_at[bare] = count + np.arange(len(bare))
     vertices = np.zeros(count + len(bare), OCCLUDER)
     vertices["in_position"] = pool.space.local_from_world(scene.positions[np.concatenate([last, bare])])
-    vertices["in_sides"][:count] = sides
-    triangles = np.column_stack([vertex_at[scene.triangles[:, :2]], np.arange(count)])
+    vertices["in_sides"][:count] = sides[which]
+    triangles = np.column_stack([vertex_at[corners[:, :2]], np.arange(count)])
     return vertices, triangles.astype(np.uint32)
 
 
@@ -144,8 +176,8 @@ def halved(corners: NDArray[np.float32], limit: float) -> tuple[NDArray[np.float
 
 def split_mesh(
     corners: NDArray[np.float32], sides: NDArray[np.float32], limit: float
-) -> tuple[NDArray[np.generic], NDArray[np.uint32]]:
-    """Triangles (m, 3, 3) with sides (m, 2) in pieces: vertices (v,) CASTER and indices (p, 3) u32. As in
+) -> tuple[NDArray[np.generic], NDArray[np.uint32], NDArray[np.int64]]:
+    """Triangles (m, 3, 3) with sides (m, 2) in pieces: vertices (v,) CASTER, indices (p, 3) u32, the triangle (p,) of each. As in
     ``occluders``, each piece ends in a vertex of its own, which holds its values."""
     pieces, parent = halved(corners, limit)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).astype(np.float64)
@@ -161,4 +193,4 @@ def split_mesh(
     vertices["in_position"] = np.concatenate([pieces[:, 2], points[bare]])
     vertices["in_sides"][:count] = sides[parent]
     vertices["in_normal"][:count] = normals[parent]
-    return vertices, np.column_stack([vertex_at[point[:, :2]], np.arange(count)]).astype(np.uint32)
+    return vertices, np.column_stack([vertex_at[point[:, :2]], np.arange(count)]).astype(np.uint32), parent

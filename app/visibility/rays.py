@@ -3,7 +3,8 @@
 All is in the solver space (radius 1), in tables of ENTRIES_A_ROW entries a row:
 
     t_bvh_nodes      RGBA32UI  two or four texels a node: boxes and names of both children, see bvh_table.py
-    t_bvh_triangles  RGBA32F   three texels a slot: the corners; a of the first: the triangle in the scene
+    t_bvh_triangles  RGBA32F   three texels a slot: the corners; a of the first: the triangle in the scene, of the second: its row
+                               in t_sheer, from 1, where it is not opaque, see opacity.py
     t_bvh_uv         RGBA32F   three texels a slot: place in the virtual atlas [texels of level 0] of each corner, on the front
                                and on the back; -1 where that side has no texels
 """
@@ -19,11 +20,13 @@ import numpy as np
 
 from app.errors import UserError
 from app.gpu import Gpu, Texture, glsl_constant
+from app.lightmap.textures import BYTES
 from app.lightmap.tile_pool import MAX_FACETS, TilePool
 from app.scene.model import F32, F64
 from app.visibility.bvh import Bvh
 from app.visibility.bvh_cache import FEWEST, bvh_of
 from app.visibility.bvh_table import Words, node_table
+from app.visibility.opacity import Sheer, sheer_triangles
 
 TELL_SECONDS = 0.05  # between two looks at a tree that another thread builds
 ENTRIES_A_ROW = 1 << int(glsl_constant("visibility/rays.glsl", "ROW_BITS"))
@@ -45,6 +48,10 @@ class RayScene:
         triangles = np.zeros((len(corners), 3, 4), np.float32)
         triangles[..., :3] = corners[self.bvh.order]
         triangles[:, 0, 3] = self.bvh.order
+        sheer = sheer_triangles(pool.scene)
+        rows = np.zeros(len(corners))
+        rows[sheer] = 1 + np.arange(len(sheer))
+        triangles[:, 1, 3] = rows[self.bvh.order]
         nodes, grid = node_table(self.bvh)
         tables: dict[str, F32 | Words] = {
             "t_bvh_nodes": nodes,
@@ -53,11 +60,14 @@ class RayScene:
         }
         self.textures: dict[str, Texture] = {name: _uploaded(gpu, table) for name, table in tables.items()}
         self.defines: dict[str, object] = {"STACK": self.bvh.depth, "BOX_GRID": grid}
+        if len(sheer):
+            self.textures |= Sheer(gpu, pool, sheer).textures
+            self.defines["OPACITY"] = True
 
     @property
     def memory(self) -> int:
         """Bytes on the GPU."""
-        return sum(16 * texture.width * texture.height for texture in self.textures.values())
+        return sum(BYTES[t.dtype] * t.components * t.width * t.height for t in self.textures.values())
 
     def release(self) -> None:
         self._gpu.release_all(*self.textures.values())

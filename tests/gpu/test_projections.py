@@ -144,7 +144,8 @@ def met(corners: F64, sides: F64, origin: F64, rays: F64, own: int) -> tuple[F64
 
 def met_from(solution: Solution, shot: Shot, weight: F64) -> tuple[F64, F64]:
     """What rays from a shooter through every texel of its map meet: item and distance; weight: see ``probed``."""
-    vertices, triangles = occluders(solution.lightmap.pool)
+    pool = solution.lightmap.pool
+    vertices, triangles = occluders(pool, np.arange(len(pool.scene.triangles)))
     corners = vertices["in_position"][triangles].astype(np.float64)
     sides = vertices["in_sides"][triangles[:, 2]]
     record = {name: shot.record[name].astype(np.float64) for name in ("origin", "normal", "edge_u", "facet")}

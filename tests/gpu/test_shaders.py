@@ -68,6 +68,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "INTEGER": FLAG,
     "ANY": FLAG,
     "BOX_GRID": FLAG,
+    "OPACITY": FLAG,
     "STACK": (DEEPEST,),
     "CLOSED_FORM": FLAG,
     "PASS": (PASS,),

@@ -14,7 +14,7 @@ from app.atlas.visible_mesh import VERTEX
 from app.bench.speed.ray_batch import RayBatch
 from app.gpu import Gpu
 from app.lightmap.tile_pool import SolverSpace
-from app.scene.model import F64
+from app.scene.model import F64, Material
 from app.visibility.rays import RayScene
 
 
@@ -32,7 +32,10 @@ def bare_pool(positions: F64, triangles: NDArray[np.integer]) -> Any:
     vertices["in_uv_front"] = vertices["in_uv_back"] = -1.0
     count = len(triangles)
     mesh = SimpleNamespace(vertices=vertices, corners=np.arange(3 * count).reshape(-1, 3), triangle=np.arange(count))
-    return BarePool(space=space, scene=SimpleNamespace(positions=positions, triangles=triangles), visible_mesh=mesh)
+    material = {"materials": (Material("grey"),), "material_ids": np.zeros(count, np.int32)}
+    return BarePool(
+        space=space, scene=SimpleNamespace(positions=positions, triangles=triangles, **material), visible_mesh=mesh
+    )
 
 
 @contextlib.contextmanager

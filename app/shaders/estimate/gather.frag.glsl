@@ -73,6 +73,10 @@ vec4 from_lamp(Node node, int ray) {
     if (seen.exitance == vec3(0.0) || any_hit(node.origin, away, 0.0, 1.0)) return vec4(0.0);
     float here = cosine / PI;
     vec3 E = seen.exitance * (here / (here + lamp_density(seen.strength, distance, dot(normal, away) / distance)));
+#if OPACITY
+    int row;
+    E *= opacity_of(slot, weights, row);
+#endif
     return vec4(E, dot(E, vec3(1.0 / 3.0)));
 }
 

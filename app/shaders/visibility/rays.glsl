@@ -1,17 +1,25 @@
 // What a ray meets first, or whether it meets anything: a walk through a bounding volume hierarchy, the near child first. See
 // app/visibility/rays.py for the textures. All is in the solver space; distances count in lengths of ``direction``, which may be
-// of any length near 1; 0 <= nearest < farthest < 1e30. Triangles block light with both sides.
+// of any length near 1; 0 <= nearest < farthest < 1e30. Triangles block light with both sides; those that are not opaque by chance,
+// each by itself: of many rays the right share passes.
 //
 // Watertight triangles [Woop13]: the triangle is seen along the ray, its corners projected to a plane, where the ray is the
 // origin. Edges are decided there by the sign of a difference of two products, which rounding can turn to zero, never to its
 // opposite, and which is the same but for its sign for both triangles of an edge; zero is inside. Boxes: a hit that the triangle
 // test finds may be three roundings outside of its box [Ize13]; BOX_FAR allows for eight.
 #define STACK    // entries: levels of inner nodes in the tree
+#define OPACITY 0  // 1: there are triangles that are not opaque
 #define BOX_GRID  // 1: boxes are of whole cells of a grid, in half the texels, 0: of floats
 
 uniform usampler2D t_bvh_nodes;     // one texel a child, or two, both children of a node in turn: see app/visibility/bvh_table.py
-uniform sampler2D t_bvh_triangles;  // three texels a slot: the corners; a of the first: the triangle in the scene
+uniform sampler2D t_bvh_triangles;  // three texels a slot: the corners; a of the first: the triangle in the scene, of
+                                    // the second: its row in t_sheer, from 1; 0 where it is opaque
 uniform sampler2D t_bvh_uv;         // three texels a slot: at each corner, place in the virtual atlas of the front and of the back
+
+#include "common/sequence.glsl"
+#if OPACITY
+#include "visibility/opacity.glsl"
+#endif
 
 struct Hit {
     float distance;
@@ -57,6 +65,24 @@ float edge(vec2 p, vec2 q) {
     return side;
 }
 
+#if OPACITY
+// Of a triangle that a ray meets there: how much of it is there, 1 where it is opaque.
+float opacity_of(int slot, vec2 weights, out int row) {
+    ivec2 px = entry_px(slot, 3);
+    vec4 second = texelFetch(t_bvh_triangles, px + ivec2(1, 0), 0);
+    row = int(second.w) - 1;
+    if (row < 0) return 1.0;
+    vec3 first = texelFetch(t_bvh_triangles, px, 0).xyz, third = texelFetch(t_bvh_triangles, px + ivec2(2, 0), 0).xyz;
+    return opacity_at(row, first + (second.xyz - first) * weights.x + (third - first) * weights.y);
+}
+
+bool passes(int slot, vec2 weights, vec3 origin, Shear shear) {
+    int row;
+    float opacity = opacity_of(slot, weights, row);
+    return row >= 0 && chance(origin, vec3(shear.slope, shear.inverse), row) >= opacity;
+}
+#endif
+
 // Replaces ``hit`` where the triangle of a slot is met after ``nearest`` and before it.
 void meet(inout Hit hit, int slot, vec3 origin, Shear shear, float nearest) {
     ivec2 px = entry_px(slot, 3);
@@ -69,7 +95,11 @@ void meet(inout Hit hit, int slot, vec3 origin, Shear shear, float nearest) {
     bool inside = sum != 0.0 && (least >= 0.0 || most <= 0.0);
     sides /= sum;
     float distance = dot(sides, vec3(a.z, b.z, c.z));
-    if (inside && distance >= nearest && distance < hit.distance)
+    bool met = inside && distance >= nearest && distance < hit.distance;
+#if OPACITY
+    met = met && !passes(slot, sides.yz, origin, shear);
+#endif
+    if (met)
         hit = Hit(distance, slot, sides.yz, (sum > 0.0) == (shear.inverse > 0.0));
 }
 

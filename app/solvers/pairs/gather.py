@@ -11,7 +11,7 @@ from app.solvers.pairs.kept import KeptPairs
 from app.solvers.pairs.occlusion import Occlusion, Scenes
 from app.solvers.pairs.options import PairsOptions
 from app.solvers.pairs.senders import Senders
-from app.visibility.occluders import Occluders
+from app.visibility.occluders import occluders_of
 from app.visibility.projections import PROJECTIONS
 
 CHOICES = {"monte-carlo": 1, "quadtree": 2}  # of CHOICE in gather.frag.glsl, else 0
@@ -86,18 +86,21 @@ class MapGather:
         self._gpu, self._lightmap = gpu, lightmap
         self._projection = PROJECTIONS["hemicube"]
         self.choices, self.most = senders.table.senders, MAPS
-        self._occluders = Occluders(gpu, lightmap)
+        self._occluders = occluders_of(gpu, lightmap)
         width, height = self._projection.size(MAP)
         self._items = gpu.texture((width, height * MAPS), 1, "f4")
         self._depth = gpu.depth_texture(self._items.size)
         self._maps = gpu.target(self._items, depth=self._depth)
         bits, pixels = lightmap.defines("MATERIAL_BITS"), {"RESOLUTION": MAP}
-        self._see = Pass(
-            gpu,
-            "solvers/pairs/map",
-            defines=bits | pixels | {"VIEWS": self._projection.views},
-            slots=self._projection.drawing,
-        )
+        self._see = {
+            some.sheer: Pass(
+                gpu,
+                "solvers/pairs/map",
+                defines=bits | pixels | {"VIEWS": self._projection.views} | ({"OPACITY": True} if some.sheer else {}),
+                slots=self._projection.drawing,
+            )
+            for some in self._occluders
+        }
         self._gather = Pass(
             gpu, "solvers/pairs/gather_maps", defines=bits | pixels, slots={"projection": self._projection.glsl}
         )
@@ -105,18 +108,19 @@ class MapGather:
     def draw(
         self, target: Framebuffer, sent: dict[str, Texture], area: Area, first: int, count: int, bounce: int
     ) -> None:
-        casters = self._projection.casters(self._occluders, MAP)
         self._maps.clear(OPEN, depth=1.0)
-        self._see.draw(
-            self._maps,
-            textures=casters.textures | {n: sent[n] for n in ("t_place", "t_facing")},
-            uniforms={"u_first": first, "u_maps": MAPS},
-            mesh=casters.mesh,
-            vertices=casters.vertices,
-            instances=self._projection.views * count,
-            depth=True,
-            clip_distances=self._projection.clip_distances,
-        )
+        for some in self._occluders:
+            casters = self._projection.casters(some, MAP)
+            self._see[some.sheer].draw(
+                self._maps,
+                textures=casters.textures | {n: sent[n] for n in ("t_place", "t_facing")},
+                uniforms={"u_first": first, "u_maps": MAPS} | casters.uniforms,
+                mesh=casters.mesh,
+                vertices=casters.vertices,
+                instances=self._projection.views * count,
+                depth=True,
+                clip_distances=self._projection.clip_distances,
+            )
         surfaces = self._lightmap.textures("t_position_area", "t_normal_ids", "t_facets")
         self._gather.draw(
             target,
@@ -127,7 +131,8 @@ class MapGather:
         )
 
     def release(self) -> None:
-        self._occluders.release()
+        for some in self._occluders:
+            some.release()
         self._gpu.release_all(self._maps, self._items, self._depth)
 
 

@@ -40,7 +40,7 @@ from app.solvers.shooting.replay import Replay
 from app.solvers.shooting.see import See, fitting_resolution
 from app.solvers.shooting.shooters import ShooterBatch
 from app.util.parts import run_to_end
-from app.visibility.projections import Occluders
+from app.visibility.occluders import occluders_of
 
 
 class Batch:
@@ -52,7 +52,7 @@ class Batch:
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool) -> None:
         self._gpu, self._lightmap, self.options = gpu, lightmap, options
         self.shooters, self.bins = ShooterBatch(gpu), Bins(gpu, lightmap)
-        self.occluders, self.receivers = Occluders(gpu, lightmap), Receivers(gpu, lightmap.pool)
+        self.occluders, self.receivers = occluders_of(gpu, lightmap), Receivers(gpu, lightmap.pool)
         self.ledger = Ledger(gpu, lightmap, self.shooters)
         self.ambient = Ambient(gpu, lightmap, self.shooters, self.ledger)
         self.marks = PatchMarks(gpu, lightmap)
@@ -238,6 +238,6 @@ class Batch:
         return passes
 
     def release(self) -> None:
-        parts = self.phases, self.see, self.marks, self.ambient, self.ledger, self.bins, self.receivers, self.occluders
-        for part in (*parts, self.shooters, *(() if self.replay is None else (self.replay,))):
+        parts = self.phases, self.see, self.marks, self.ambient, self.ledger, self.bins, self.receivers
+        for part in (*parts, *self.occluders, self.shooters, *(() if self.replay is None else (self.replay,))):
             part.release()

@@ -63,7 +63,7 @@ class See:
     """
 
     def __init__(
-        self, gpu: Gpu, occluders: Occluders, shooters: ShooterBatch, options: ShootingOptions, resolution: int
+        self, gpu: Gpu, occluders: list[Occluders], shooters: ShooterBatch, options: ShootingOptions, resolution: int
     ) -> None:
         self._gpu, self._occluders, self._shooters = gpu, occluders, shooters
         self._projection, self._visibility = PROJECTIONS[options.projection], options.visibility
@@ -74,15 +74,24 @@ class See:
         self._inspected: Maps | None = None
         pixels = {"RESOLUTION": resolution}
         slots = self.slots = {"projection": self._projection.glsl}
-        self._draw = Pass(
-            gpu,
-            "solvers/shooting/visibility",
-            defines=IN_BLOCKS | pixels | {"VIEWS": self._projection.views},
-            slots=RECORDS | self._projection.drawing,
-        )
-        self._draw_small, self._count_small = (
-            Pass(gpu, "solvers/shooting/small", defines=IN_BLOCKS | pixels | count, slots=RECORDS | slots)
-            for count in ({}, {"COUNT": 1})
+        kinds: dict[bool, dict[str, object]] = {
+            some.sheer: {"OPACITY": True} if some.sheer else {} for some in occluders
+        }
+        self._draw = {
+            sheer: Pass(
+                gpu,
+                "solvers/shooting/visibility",
+                defines=IN_BLOCKS | pixels | {"VIEWS": self._projection.views} | opacity,
+                slots=RECORDS | self._projection.drawing,
+            )
+            for sheer, opacity in kinds.items()
+        }
+        self._draw_small = {
+            sheer: Pass(gpu, "solvers/shooting/small", defines=IN_BLOCKS | pixels | opacity, slots=RECORDS | slots)
+            for sheer, opacity in kinds.items()
+        }
+        self._count_small = Pass(
+            gpu, "solvers/shooting/small", defines=IN_BLOCKS | pixels | {"COUNT": 1}, slots=RECORDS | slots
         )
         self._add_escaped = Pass(gpu, "solvers/shooting/escaped", defines={"BLOCK": ESCAPED_BLOCK})
         self._weights = gpu.texture((width // 4, height // 4), 4, "f4")  # see weights.frag.glsl
@@ -121,28 +130,30 @@ class See:
         """All views of so many maps in one draw; what is smaller than a sample in another."""
         used = None if shots == maps.count else (0, 0, maps.items.width, shots * maps.map_size[1])
         maps.target.clear(OPEN, depth=1.0, viewport=used)
-        casters = self._projection.casters(self._occluders, self.resolution)
-        self._draw.draw(
-            maps.target,
-            textures=casters.textures,
-            uniforms={"u_maps": maps.count, "u_first": first},
-            blocks=shooters,
-            mesh=casters.mesh,
-            vertices=casters.vertices,
-            instances=self._projection.views * shots,
-            depth=True,
-            clip_distances=self._projection.clip_distances,
-        )
-        self._draw_small.draw(
-            maps.target,
-            textures={"t_triangles": self._occluders.texture},
-            uniforms={"u_maps": maps.count, "u_first": first},
-            blocks=shooters,
-            vertices=self._occluders.count,
-            instances=shots,
-            points=True,
-            depth=True,
-        )
+        for some in self._occluders:
+            casters = self._projection.casters(some, self.resolution)
+            self._draw[some.sheer].draw(
+                maps.target,
+                textures=casters.textures,
+                uniforms={"u_maps": maps.count, "u_first": first} | casters.uniforms,
+                blocks=shooters,
+                mesh=casters.mesh,
+                vertices=casters.vertices,
+                instances=self._projection.views * shots,
+                depth=True,
+                clip_distances=self._projection.clip_distances,
+            )
+        for some in self._occluders:
+            self._draw_small[some.sheer].draw(
+                maps.target,
+                textures={"t_triangles": some.texture} | some.opacity,
+                uniforms={"u_maps": maps.count, "u_first": first},
+                blocks=shooters,
+                vertices=some.count,
+                instances=shots,
+                points=True,
+                depth=True,
+            )
 
     def add_escaped(self, first: int, shots: int) -> None:
         """Add up how much of what these shooters of the batch send out leaves the scene."""
@@ -159,15 +170,16 @@ class See:
         texture = self._gpu.texture((1, 1), 1, "f4")
         target = self._gpu.target(texture)
         target.clear()
-        self._count_small.draw(
-            target,
-            textures={"t_triangles": self._occluders.texture},
-            uniforms={"u_maps": 1, "u_first": 0},
-            blocks=self._shooters.alone(shot),
-            vertices=self._occluders.count,
-            points=True,
-            blend="add",
-        )
+        for some in self._occluders:
+            self._count_small.draw(
+                target,
+                textures={"t_triangles": some.texture},
+                uniforms={"u_maps": 1, "u_first": 0},
+                blocks=self._shooters.alone(shot),
+                vertices=some.count,
+                points=True,
+                blend="add",
+            )
         count = int(np.frombuffer(texture.read(), np.float32)[0])
         self._gpu.release_all(target, texture)
         return count

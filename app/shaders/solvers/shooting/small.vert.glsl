@@ -4,6 +4,10 @@
 #include "visibility/projections/triangles.glsl"
 #include "solvers/shooting/shooter_block.glsl"
 #define COUNT 0  // 1: all of a shot's into one texel, to be added up
+#define OPACITY 0
+#if OPACITY
+#include "visibility/opacity.glsl"
+#endif
 
 uniform int u_maps;
 uniform sampler2D t_triangles;
@@ -45,6 +49,11 @@ void main() {
     vec2 px = floor(px_from_view(view, view_from_local(view, middle))) + 0.5;
     vec4 plane = plane_of(t);
     float depth = plane.w / dot(plane.xyz, sight_from_px(view, px));
+#if OPACITY
+    vec3 at_local = local_from_view(view, sight_from_px(view, px) * clamp(depth, nearest, furthest));
+    vec3 place = s.origin + world_axes(s) * at_local;
+    if (chance_in_map(s.origin, ivec2(px), gl_VertexID) >= opacity_at(gl_VertexID, place)) return;
+#endif
     v_seen = vec2(plane_of(local).w < 0.0 ? t.sides.r : t.sides.g, clamp(depth, nearest, furthest));
     vec2 at = COUNT == 1 ? vec2(0.5) : px / MAP_PX;
     gl_Position = vec4(2.0 * vec2(at.x, (at.y + float(gl_InstanceID)) / float(u_maps)) - 1.0, 0.0, 1.0);

@@ -1,5 +1,6 @@
 // Draws the hemicube, fragment side. Depth is linear: a perspective one cannot tell a lamp from its ceiling.
 #include "common/item.glsl"
+#include "visibility/projections/hemicube.glsl"
 
 flat in vec2 v_sides;
 flat in float v_own;
