@@ -12,6 +12,7 @@ from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.options import Options, option
 from app.scene.model import Material
+from app.scene.sky import Sky
 from app.solvers import EnergyBalance, Family, Inspection, Progress
 
 SWEEPS = 3  # until it has converged by its defaults
@@ -38,6 +39,10 @@ class Constant:
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         self._lightmap.set_materials(materials)
+        self.reset()
+
+    def set_sky(self, sky: Sky | None) -> None:
+        self._lightmap.set_sky(sky)
         self.reset()
 
     def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:

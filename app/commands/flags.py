@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
+
+import numpy as np
 
 from app.atlas.options import AtlasOptions
 from app.lightmap.options import LightmapOptions
 from app.options import Options, add_flags, option, specs
+from app.scene.images import ImageError, linear_from_srgb
+from app.scene.sky import DEFAULT_SUN, Sky, Sun
+from app.scene.sky_image import SUFFIXES, read_sky_image
+from app.scene.validate import one_line
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
 
 DEFAULT_SCENE = "cornell-box"
@@ -62,6 +69,10 @@ def scene_flags(parser: Parser, *, optional: bool = False) -> None:
     else:
         parser.add_argument("scene", help=help)
     parser.add_argument("--light", action="store_true", help="add a ceiling light")
+    help = "the sky of a scene that has none: a map of it (.hdr .exr), clear, or an even colour #rrggbb"
+    parser.add_argument("--sky", type=_sky, metavar="FILE", help=help)
+    help = "where the sun stands, degrees from north over east and above the horizon (in a clear sky 135,40)"
+    parser.add_argument("--sun", type=_sun, metavar="AZIMUTH,HEIGHT", help=help)
     add_flags(parser, AtlasOptions)
 
 
@@ -109,6 +120,14 @@ def stop_flags(parser: Parser, family: Family) -> None:
         stop.add_argument(flag, type=positive(float), metavar="P", help=help)
 
 
+def sky_of(flags: argparse.Namespace) -> Sky | None:
+    """The sky that --sky and --sun ask for; a clear one with a sun alone."""
+    sky: Sky | None = flags.sky
+    if flags.sun is None:
+        return sky
+    return Sky("clear", sun=flags.sun) if sky is None else replace(sky, sun=flags.sun)
+
+
 # -- values ------------------------------------------------------------------------------------------------------------
 
 
@@ -123,6 +142,32 @@ def positive(kind: type[int] | type[float]) -> Callable[[str], float]:
         return value
 
     return read
+
+
+def _sky(text: str) -> Sky:
+    if text == "clear":
+        return Sky("clear", sun=DEFAULT_SUN)
+    if re.fullmatch(r"#[0-9a-fA-F]{6}", text):
+        encoded = np.frombuffer(bytes.fromhex(text[1:]), np.uint8).astype(np.float32) / np.float32(255)
+        red, green, blue = linear_from_srgb(encoded).tolist()
+        return Sky("uniform", (red, green, blue))
+    path = Path(text).expanduser()
+    if path.suffix.lower() not in SUFFIXES:
+        raise argparse.ArgumentTypeError(f"{text}: must be a file {' or '.join(SUFFIXES)}, clear, or #rrggbb")
+    try:
+        return Sky("image", image=read_sky_image(path), name=path.name)
+    except ImageError as error:
+        raise argparse.ArgumentTypeError(f"{text}: is not a readable sky: {one_line(str(error))}") from error
+
+
+def _sun(text: str) -> Sun:
+    try:
+        azimuth, height = map(float, text.split(","))
+    except ValueError:
+        azimuth = height = math.nan
+    if not (math.isfinite(azimuth) and 0 < height <= 90):
+        raise argparse.ArgumentTypeError(f"{text}: must be AZIMUTH,HEIGHT in degrees, the height above 0 and up to 90")
+    return Sun(azimuth % 360, height)
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -9,6 +9,7 @@ from typing import Any
 from app.atlas.charts import Charts
 from app.atlas.options import AtlasOptions
 from app.atlas.texels import texel_count, uniform_leaves
+from app.commands.flags import sky_of
 from app.lightmap.options import STORAGE, LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import TABLE_WIDTH
@@ -28,7 +29,9 @@ def info(flags: argparse.Namespace) -> int:
     console = Console(quiet=flags.json)
     with console.progress("reading") as tell:
         atlas, light = from_flags(AtlasOptions, flags), from_flags(LightmapOptions, flags)
-        scene, charts, _ = read_and_unfold(flags.scene, atlas, flags.light, tell, roots=light.adaptive)
+        scene, charts, _ = read_and_unfold(
+            flags.scene, atlas, flags.light, tell, sky=sky_of(flags), roots=light.adaptive
+        )
         leaves, slots, depth = uniform_leaves(charts), 0, 0
         if light.adaptive:
             tell("planting quadtrees", 0.6)
@@ -42,6 +45,7 @@ def info(flags: argparse.Namespace) -> int:
         "objects": len(scene.objects),
         "materials": len(scene.materials),
         "emitting_materials": sum(m.emits for m in scene.materials),
+        "sky": None if scene.sky is None else scene.sky.kind,
         "cameras": [c.name for c in scene.cameras],
         "size_m": [float(x) for x in upper - lower],
         "lit_sides": len(charts.face_triangle),

@@ -7,6 +7,7 @@ import time
 from typing import Any
 
 from app.atlas.options import AtlasOptions
+from app.commands.flags import sky_of
 from app.commands.report import notes
 from app.errors import UserError
 from app.lightmap.options import LightmapOptions
@@ -31,6 +32,7 @@ def session_options(flags: argparse.Namespace) -> dict[str, Any]:
         "atlas": from_flags(AtlasOptions, flags),
         "light": from_flags(LightmapOptions, flags),
         "default_light": flags.light,
+        "sky": sky_of(flags),
     }
 
 

@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 
 from app.direct_light.allocate import allocate
 from app.direct_light.lamps import LampSet, chances, lamp_sets
+from app.direct_light.sky_light import SkyLight, SkyLit
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import QUAD_FORMAT, quads, upload
 from app.lightmap.tile_pool import Moves
 from app.scene.model import F32, F64, Scene
+from app.scene.sky import Sky
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
@@ -46,6 +48,10 @@ class Lit:
     passes: NDArray[np.int64]
     passes_table: Texture
 
+    def release(self, gpu: Gpu) -> None:
+        optional = [] if self.unoccluded is None else [self.unoccluded]
+        gpu.release_all(self.target, self.seen, self.table, self.near, self.far, self.passes_table, *optional)
+
 
 class DirectLight:
     """On one lightmap: ``light`` holds it [stored units], and in its alpha the variance of the mean of RGB. Whoever makes it
@@ -56,7 +62,8 @@ class DirectLight:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, rays: RayScene, origins: Origins) -> None:
         self._gpu, self._lightmap, self._rays, self._origins = gpu, lightmap, rays, origins
-        self.sets: list[Lit] = []
+        self.sets: list[Lit | SkyLit] = []
+        self._sky: SkyLight | None = None  # where there has been a sky
         self.traced = self._streams = 0
         defines = lightmap.defines("MATERIAL_BITS", "TILE")
         self._shoot = {
@@ -104,9 +111,9 @@ class DirectLight:
     def _passes_table(self) -> Texture:
         return self._gpu.texture((self._lightmap.columns, self._lightmap.rows), 1, "f4")
 
-    def _look_unoccluded(self, lit: Lit, rects: F32) -> None:
+    def _look_unoccluded(self, lit: Lit | SkyLit, rects: F32) -> None:
         """Σ F of a set with a closed form, in these rectangles."""
-        if lit.unoccluded is not None:
+        if isinstance(lit, Lit) and lit.unoccluded is not None:
             target = self._gpu.target(lit.unoccluded)
             self._draw(
                 self._unoccluded, target, rects, {"t_lamps": lit.table}, {"u_lamps": len(lit.lamps.rows)}, blend=None
@@ -149,11 +156,10 @@ class DirectLight:
     def _everywhere(self) -> F32:
         return np.array([(0, 0, *self._lightmap.size, 0, 0)], np.float32)
 
-    def drop(self, lit: Lit) -> None:
+    def drop(self, lit: Lit | SkyLit) -> None:
         """Forget a set."""
         self.sets.remove(lit)
-        optional = [] if lit.unoccluded is None else [lit.unoccluded]
-        self._gpu.release_all(lit.target, lit.seen, lit.table, lit.near, lit.far, lit.passes_table, *optional)
+        lit.release(self._gpu)
 
     def shoot(self, count: int, gain: F64 | None = None) -> Generator[None, None, None]:
         """So many shadow rays more from each texel to each set, whole passes of them, in parts; with ``gain`` (slots,) that many
@@ -186,24 +192,31 @@ class DirectLight:
             np.asarray(np.min(counts, axis=0)) if counts else np.full(self._lightmap.pool.tiles, np.iinfo(np.int64).max)
         )
 
-    def _shoot_at(self, lit: Lit, slots: NDArray[np.int64], blend: str | None) -> None:
+    def _shoot_at(self, lit: Lit | SkyLit, slots: NDArray[np.int64], blend: str | None) -> None:
         """One pass of shadow rays from the texels of these slots to a set."""
         pool = self._lightmap.pool
-        textures = {"t_lamps": lit.table, "t_near": lit.near, "t_far": lit.far, "t_passes": lit.passes_table}
+        if isinstance(lit, SkyLit):
+            assert self._sky is not None
+            how, (textures, uniforms) = self._sky.shoot, self._sky.reads(lit)
+        else:
+            how, (textures, uniforms) = self._shoot[lit.lamps.closed_form, lit.lamps.picture], self._reads(lit)
         textures |= {name: texture for name, texture in self._rays.textures.items() if name != "t_bvh_uv"}
-        uniforms: dict[str, Any] = {"u_stream": lit.stream, "u_lamps": len(lit.lamps.rows)}
-        if lit.lamps.picture:
-            textures |= self._lightmap.textures("t_pages", "t_emission")
-            uniforms["u_pages"] = float(self._lightmap.columns), pool.pages_per_texel
         rects = quads(pool.corners(slots), pool.tile, pool.corners(slots))
-        self._draw(
-            self._shoot[lit.lamps.closed_form, lit.lamps.picture], lit.target, rects, textures, uniforms, blend=blend
-        )
+        self._draw(how, lit.target, rects, textures, uniforms, blend=blend)
         lit.passes[slots] += 1
         self._write_passes(lit)
         self.traced += PASS * int(pool.slot_texels[slots].sum())
 
-    def _write_passes(self, lit: Lit) -> None:
+    def _reads(self, lit: Lit) -> tuple[dict[str, Texture], dict[str, Any]]:
+        """Textures and uniforms that shadow rays to a set of lamps need, besides origins and rays."""
+        textures = {"t_lamps": lit.table, "t_near": lit.near, "t_far": lit.far, "t_passes": lit.passes_table}
+        uniforms: dict[str, Any] = {"u_stream": lit.stream, "u_lamps": len(lit.lamps.rows)}
+        if lit.lamps.picture:
+            textures |= self._lightmap.textures("t_pages", "t_emission")
+            uniforms["u_pages"] = float(self._lightmap.columns), self._lightmap.pool.pages_per_texel
+        return textures, uniforms
+
+    def _write_passes(self, lit: Lit | SkyLit) -> None:
         table = np.zeros(self._lightmap.columns * self._lightmap.rows, np.float32)
         table[: len(lit.passes)] = lit.passes
         lit.passes_table.write(table.tobytes())
@@ -215,7 +228,8 @@ class DirectLight:
         others = np.setdiff1d(np.flatnonzero(pool.used), slots)
         for lit in self.sets:
             self._look_unoccluded(lit, rects)
-            self._know_near(lit, slots)
+            if isinstance(lit, Lit):
+                self._know_near(lit, slots)
             known = lit.passes[others] if len(others) else lit.passes[slots]
             wanted = max(int(np.rint(known.mean())), 1)
             lit.passes[slots] = 0
@@ -233,25 +247,47 @@ class DirectLight:
     def resized(self, moves: Moves) -> None:
         """The tile pool has got another number of slots."""
         for lit in self.sets:
-            self._gpu.release_all(lit.target)
-            lit.seen = self._lightmap.moved(lit.seen, moves)
-            self._gpu.release_all(lit.near)
-            lit.near = folded(self._gpu, chances(self._lightmap.pool, lit.lamps).near.reshape(-1, 2))
-            lit.target = self._gpu.target(lit.seen)
+            if isinstance(lit, SkyLit):
+                assert self._sky is not None
+                self._sky.resized(lit, moves)
+            else:
+                self._resized(lit, moves)
             self._gpu.release_all(lit.passes_table)
             lit.passes, lit.passes_table = moves.array(lit.passes, 0), self._passes_table()
             self._write_passes(lit)
-            if lit.unoccluded is not None:
-                lit.unoccluded = self._lightmap.moved(lit.unoccluded, moves)
         self._gpu.release_all(self._target, self.light)
         self._fit()
 
+    def _resized(self, lit: Lit, moves: Moves) -> None:
+        self._gpu.release_all(lit.target)
+        lit.seen = self._lightmap.moved(lit.seen, moves)
+        self._gpu.release_all(lit.near)
+        lit.near = folded(self._gpu, chances(self._lightmap.pool, lit.lamps).near.reshape(-1, 2))
+        lit.target = self._gpu.target(lit.seen)
+        if lit.unoccluded is not None:
+            lit.unoccluded = self._lightmap.moved(lit.unoccluded, moves)
+
+    def _follow_sky(self, sky: Sky | None) -> None:
+        """Another sky. Of one that differs by its scale all is known."""
+        for lit in [lit for lit in self.sets if isinstance(lit, SkyLit)]:
+            if sky is not None and lit.sky.same_shape(sky):
+                lit.sky = sky
+                return
+            self.drop(lit)
+        if sky is not None:
+            if self._sky is None:
+                self._sky = SkyLight(self._gpu, self._lightmap, dict(self._rays.defines), PASS)
+            self._streams += 1
+            self.sets.append(self._sky.lit(sky, STREAM + self._streams, self._passes_table()))
+
     def follow(self, scene: Scene) -> None:
-        """Materials are others. Of a set that is one material all is known, whatever it emits, also nothing; another set is lit
-        anew when any of its lamps is another."""
-        alone = [lit.lamps.materials[0] for lit in self.sets if len(lit.lamps.materials) == 1]
+        """Materials, or the sky, are others. Of a set that is one material all is known, whatever it emits, also nothing; another
+        set is lit anew when any of its lamps is another."""
+        self._follow_sky(scene.sky if scene.lit_by_sky else None)
+        known = [lit for lit in self.sets if isinstance(lit, Lit)]
+        alone = [lit.lamps.materials[0] for lit in known if len(lit.lamps.materials) == 1]
         sets = lamp_sets(self._lightmap.pool, scene, alone)
-        for lit in [lit for lit in self.sets if len(lit.lamps.materials) > 1]:
+        for lit in [lit for lit in known if len(lit.lamps.materials) > 1]:
             if any(lit.lamps.same_light(lamps) for lamps in sets):
                 sets = [lamps for lamps in sets if not lit.lamps.same_light(lamps)]
             else:
@@ -271,7 +307,7 @@ class DirectLight:
 
     def sum(self, scene: Scene, slots: NDArray[np.int64] | None = None) -> None:
         """Bring ``light`` up to date, with what the lamps emit now; in these slots alone where they are given."""
-        lit_now = [lit for lit in self.sets if lit.passes.any() and lit.lamps.exitance_in(scene).any()]
+        lit_now = [lit for lit in self.sets if lit.passes.any() and _emits(lit, scene)]
         rects = self._everywhere
         if slots is None or not lit_now:
             self._target.clear()
@@ -280,16 +316,40 @@ class DirectLight:
             rects = quads(corners, self._lightmap.pool.tile, corners)
         mesh = Mesh(self._gpu, rects.tobytes(), QUAD_FORMAT, per_instance=True)
         for nth, lit in enumerate(lit_now):
-            exitance = lit.lamps.exitance_in(scene) / self._lightmap.unit
-            self._add[lit.lamps.closed_form].draw(
-                self._target,
-                textures={"t_shadow_rays": lit.seen, "t_passes": lit.passes_table}
-                | ({} if lit.unoccluded is None else {"t_unoccluded": lit.unoccluded}),
-                uniforms={"u_exitance": tuple(exitance.tolist()), "u_size": self._lightmap.size},
-                mesh=mesh,
-                blend="add" if nth else None,
-            )
+            self._add_light(lit, scene, self._target, mesh, "add" if nth else None)
         self._gpu.release_all(mesh)
+
+    def _add_light(self, lit: Lit | SkyLit, scene: Scene, target: Framebuffer, mesh: Mesh, blend: str | None) -> None:
+        """What one set brings."""
+        if isinstance(lit, SkyLit):
+            assert self._sky is not None
+            textures, uniforms = self._sky.sums(lit, self._origins.normals)
+            self._sky.add.draw(target, textures=textures, uniforms=uniforms, mesh=mesh, blend=blend)
+            return
+        exitance = lit.lamps.exitance_in(scene) / self._lightmap.unit
+        self._add[lit.lamps.closed_form].draw(
+            target,
+            textures={"t_shadow_rays": lit.seen, "t_passes": lit.passes_table}
+            | ({} if lit.unoccluded is None else {"t_unoccluded": lit.unoccluded}),
+            uniforms={"u_exitance": tuple(exitance.tolist()), "u_size": self._lightmap.size},
+            mesh=mesh,
+            blend=blend,
+        )
+
+    def from_sky(self) -> F64:
+        """Power that the sky sends to the texels, RGB [W]: its irradiance of them, as it is known. Waits for the GPU."""
+        lit = next((lit for lit in self.sets if isinstance(lit, SkyLit)), None)
+        if lit is None or not lit.passes.any():
+            return np.zeros(3)
+        gpu, pool = self._gpu, self._lightmap.pool
+        alone = gpu.texture(self._lightmap.size, 4, "f4")
+        target = gpu.target(alone)
+        mesh = Mesh(gpu, self._everywhere.tobytes(), QUAD_FORMAT, per_instance=True)
+        self._add_light(lit, self._lightmap.scene, target, mesh, None)
+        H = pool.tiles_from_image(np.frombuffer(alone.read(), np.float32).reshape(*self._lightmap.size[::-1], 4))
+        gpu.release_all(mesh, target, alone)
+        area = np.where(pool.surfaces.face >= 0, pool.surfaces.area, 0.0)
+        return np.asarray(np.einsum("tijc,tij->c", H[..., :3].astype(np.float64), area) * self._lightmap.unit)
 
     def forget(self) -> None:
         """No set is known."""
@@ -301,6 +361,10 @@ class DirectLight:
     def release(self) -> None:
         self.forget()
         self._gpu.release_all(self._target, self.light)
+
+
+def _emits(lit: Lit | SkyLit, scene: Scene) -> bool:
+    return isinstance(lit, SkyLit) or bool(lit.lamps.exitance_in(scene).any())
 
 
 def folded(gpu: Gpu, values: F32) -> Texture:

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.points import Points
+from app.direct_light.sky_map import SkyMap
 from app.gpu import Gpu, Pass, ReadBack, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import upload, write_table
 from app.scene.model import F32, F64
+from app.scene.sky import Sky
 from app.visibility.rays import ENTRIES_A_ROW, RayScene, corners_of
 
 RAYS = 512  # of a row, and as many to lamps
@@ -40,7 +42,7 @@ class Ends(NamedTuple):
 
 
 class RayGather:
-    """Looks from up to ``rows`` rows at once, into one lightmap. Whoever makes it releases it."""
+    """Looks from up to ``rows`` rows at once, into one lightmap and the sky that it has now. Whoever makes it releases it."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, rows: int) -> None:
         self._gpu, self._lightmap, self.rows = gpu, lightmap, rows
@@ -63,13 +65,16 @@ class RayGather:
         self._targets = {n: gpu.target(self._textures[n]) for n in ("samples", "sums", "hits", "albedo", "seen")}
         self._link_target = gpu.target(self._textures["hits"], self._textures["albedo"])
         light = lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE") | self._rays.defines
-        self._gather, self._links = (Pass(gpu, f"estimate/{name}", defines=light) for name in ("gather", "links"))
+        self._links = Pass(gpu, "estimate/links", defines=light)
+        self._light, self._gather = light, dict[bool, Pass]()
+        self._sky: tuple[Sky, SkyMap] | None = None
         self._add = Pass(gpu, "estimate/add", defines={"BLOCK": BLOCK})
         self._nearest = Pass(gpu, "estimate/nearest_seen", defines=self._rays.defines)
 
     def find_lamps(self) -> bool:
-        """Use the lamps of the scene as it is now. False where there are none."""
+        """Use the lamps and the sky of the scene as it is now. False where nothing sends light."""
         scene = self._lightmap.scene
+        self._find_sky(scene.sky if scene.lit_by_sky else None)
         power = np.array([np.mean(m.emission) for m in scene.materials])[scene.material_ids] * np.pi * self._area
         lamps = np.flatnonzero(power > 0)
         self._lamp_count, self._power = len(lamps), float(power.sum())
@@ -77,7 +82,16 @@ class RayGather:
         table[: len(lamps), 0] = np.cumsum(power[lamps]) / max(self._power, 1e-300)
         table[: len(lamps), 1] = self._slot[lamps]
         self._lamps = write_table(self._gpu, self._lamps, table.reshape(-1, LAMPS_A_ROW, 4))
-        return len(lamps) > 0
+        return len(lamps) > 0 or scene.lit_by_sky
+
+    def _find_sky(self, sky: Sky | None) -> None:
+        if self._sky is not None and self._sky[0] is not sky:
+            self._sky[1].release()
+            self._sky = None
+        if sky is not None and self._sky is None:
+            self._sky = sky, SkyMap(self._gpu, sky)
+        if (lit := sky is not None) not in self._gather:
+            self._gather[lit] = Pass(self._gpu, "estimate/gather", defines=self._light | {"SKY": lit})
 
     # -- light ---------------------------------------------------------------------------------------------------------
 
@@ -85,10 +99,13 @@ class RayGather:
         """What nodes receive now, on its way; ``irradiance`` reads it. position (n, 3) [m], normal (n, 3), shifts (n, SHIFTS)
         from 0 to 1; n at most ``rows``. rays: a multiple of BLOCK."""
         self._write_nodes(position, normal, shifts)
-        self._gather.draw(
+        sky, scale = dict[str, Texture](), dict[str, object]()
+        if self._sky is not None:
+            sky, scale = self._sky[1].textures, {"u_sky": tuple(self._sky[0].scale.tolist())}
+        self._gather[self._sky is not None].draw(
             self._targets["samples"],
-            textures={"t_nodes": self._textures["nodes"], "t_lamps": self._lamps} | self._seen_textures(),
-            uniforms={"u_lamps": self._lamp_count, "u_power": self._power} | self._uniforms(),
+            textures={"t_nodes": self._textures["nodes"], "t_lamps": self._lamps} | self._seen_textures() | sky,
+            uniforms={"u_lamps": self._lamp_count, "u_power": max(self._power, 1e-30)} | self._uniforms() | scale,
             viewport=(0, 0, rays, len(position)),
         )
         self._add.draw(self._targets["sums"], textures={"t_samples": self._textures["samples"]})
@@ -147,6 +164,8 @@ class RayGather:
 
     def release(self) -> None:
         self._rays.release()
+        if self._sky is not None:
+            self._sky[1].release()
         self._gpu.release_all(self._link_target, *self._targets.values())
         self._gpu.release_all(self._lamps, self._all_nodes, *self._textures.values())
 

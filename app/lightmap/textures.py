@@ -27,6 +27,7 @@ from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.lightmap.options import STORAGE
 from app.lightmap.tile_pool import Array, Moves, SolverSpace, TilePool
 from app.scene.model import F32, F64, Material
+from app.scene.sky import Sky
 
 LIGHT = ("t_irradiance", "t_residual")
 QUAD_FORMAT = {"in_rect": "4f", "in_from": "2f"}  # see common/rects.vert.glsl
@@ -101,9 +102,16 @@ class LightTextures:
         self.scene = self.scene.with_materials(materials)
         self._textures["t_materials"].write(self.pool.material_table(self.scene).tobytes())
 
+    def set_sky(self, sky: Sky | None) -> None:
+        """Have another sky from now on. The light stays as it is."""
+        self.scene = self.scene.with_sky(sky)
+
     def clear(self) -> None:
         """H = 0, r = E: nothing has been shot [Coombe03, 3]."""
-        self.unit = max((np.pi * max(m.emission) for m in self.scene.materials), default=0.0) or 1.0
+        strongest = max((np.pi * max(m.emission) for m in self.scene.materials), default=0.0)
+        if self.scene.sky is not None:
+            strongest = max(strongest, self.scene.sky.most_irradiance)
+        self.unit = strongest or 1.0
         self.light_target.clear()
         self.ambient_target.clear()
         self._emit.draw(

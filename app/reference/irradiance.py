@@ -129,6 +129,8 @@ def _closed_form(scene: Scene, samples: int, tell: Tell) -> ReferenceIrradiance:
 
 
 def _too_many_triangles(scene: Scene) -> str | None:
+    if scene.lit_by_sky:
+        return "its matrix knows no sky"
     count = len(scene.triangles)
     return None if count <= DENSE_TRIANGLES else f"{count:,} triangles are more than {DENSE_TRIANGLES}"
 

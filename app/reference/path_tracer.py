@@ -2,9 +2,10 @@
 
     E(x) = ∫ L(x, ω) cos θ dω = π · mean of L(x, ω) over directions with density cos θ / π
 
-L by a path of diffuse bounces. At each of its points a lamp is sampled too, and the two ways of finding light are weighed by the
-balance heuristic [Veach95]; Russian roulette ends paths without bias. Mitsuba 3 intersects rays, samples lamps and looks up
-textures; the scene is ours, sides and all. Works badly where light arrives only through small gaps or by way of a lit corner.
+L by a path of diffuse bounces. At each of its points a lamp or the sky is sampled too, and the two ways of finding light are
+weighed by the balance heuristic [Veach95]; Russian roulette ends paths without bias. Mitsuba 3 intersects rays, samples lamps
+and looks up textures; the scene is ours, sides and all. Works badly where light arrives only through small gaps or by way of a
+lit corner.
 """
 
 from __future__ import annotations
@@ -49,7 +50,8 @@ class Tracer:
             if (scene.material_ids == k).any()
             for shape in self._shapes(scene, k, material)
         ]
-        self._scene = mi.load_dict({"type": "scene"} | {f"shape{i}": shape for i, shape in enumerate(shapes)})
+        parts = {f"shape{i}": shape for i, shape in enumerate(shapes)} | _sky(scene)
+        self._scene = mi.load_dict({"type": "scene"} | parts)
         self._sampler = mi.load_dict({"type": "independent"})
 
     def irradiance(self, positions: F64, normals: F64, samples: int, seed: int) -> F64:
@@ -131,6 +133,24 @@ def _variant() -> str:
     return name
 
 
+def _sky(scene: Scene) -> dict[str, Any]:
+    """Emitters that lie beyond all surfaces; the sun is a point there."""
+    if scene.sky is None or not scene.lit_by_sky:
+        return {}
+    radiance = scene.sky.radiance
+    if radiance.shape[:2] == (1, 1):
+        emitters: dict[str, Any] = {"sky": {"type": "constant", "radiance": _colours(scene.sky.scale.tolist(), None)}}
+    else:
+        emitters = {
+            "sky": {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(radiance)), "mis_compensation": False}
+        }
+    if scene.sky.sun is not None:
+        away = (-scene.sky.sun.direction).tolist()
+        irradiance = _colours(scene.sky.sun_irradiance.tolist(), None)
+        emitters["sun"] = {"type": "directional", "direction": away, "irradiance": irradiance}
+    return emitters
+
+
 def _colours(factor: RGB, texture: Texture | None) -> dict[str, Any]:
     """A colour, or a picture times a factor, as mitsuba takes it."""
     if texture is None or max(factor) == 0.0:
@@ -177,21 +197,21 @@ def _trace(scene, sampler, x, n, u):  # type: ignore[no-untyped-def]  # runs on 
         lit = active & (lamp.pdf > 0) & (cosine > 0) & (dr.dot(n, towards) > 0)
         lit &= ~scene.ray_test(mi.Ray3f(origin, towards / distance, distance, 0.0, mi.Color0f()), lit)
         density = cosine / dr.pi
-        L[lit] += throughput * radiance * density * lamp.pdf / (lamp.pdf + density)
+        L[lit] += throughput * radiance * density * dr.select(lamp.delta, 1.0, lamp.pdf / (lamp.pdf + density))
 
         # A direction by its cosine
         local = mi.warp.square_to_cosine_hemisphere(u)
         direction = mi.Frame3f(n).to_world(local)
         hit = scene.ray_intersect(mi.Ray3f(origin, direction), active)
-        active &= hit.is_valid()
-        front = dr.dot(hit.n, direction) < 0
-        emitter = hit.emitter(scene, active)
+        emitter = hit.emitter(scene, active)  # the sky's, where it meets nothing
         glows = active & (emitter != None)  # noqa: E711  # an array of pointers
         other = scene.pdf_emitter_direction(here, mi.DirectionSample3f(scene, hit, here), glows)
         density = local.z / dr.pi
         L[glows] += throughput * emitter.eval(hit, glows) * density / (density + other)
 
         # What the surface there reflects
+        active &= hit.is_valid()
+        front = dr.dot(hit.n, direction) < 0
         bsdf = hit.bsdf()
         active &= front | mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
         throughput *= bsdf.eval_diffuse_reflectance(hit, active)

@@ -9,6 +9,7 @@ import numpy as np
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
 from app.render.atlas_image import AtlasImage
+from app.render.background import Background
 from app.render.camera import CameraView
 from app.render.false_colour import LAYER, Scale, false_colour_scale, measured
 from app.render.options import DisplayOptions
@@ -28,7 +29,7 @@ class FrameRenderer:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._background = Pass(gpu, "render/background", label="background")
+        self._background = Background(gpu)
         self._picker = Picker(gpu)
         self._atlas = AtlasImage(gpu)
         self._surfaces: Surfaces | None = None
@@ -93,7 +94,8 @@ class FrameRenderer:
             whole=whole,
         )
         self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
-        self._background.draw(picture.target, uniforms={"u_height_px": float(picture.size[1])}, depth=True)
+        sky = lightmap.scene.sky if layer == "combined" else None
+        self._background.draw(picture.target, view, size[0] / size[1], sky, display, scale)
         if rays is not None:
             rays.draw(picture.target, clip_from_local, picture.size, display, samples)
         if picture.own:
@@ -122,7 +124,7 @@ class FrameRenderer:
 
     def release(self) -> None:
         self.give_up()
-        for resource in (self._surfaces, self._picture, self._picker, self._atlas):
+        for resource in (self._surfaces, self._picture, self._picker, self._atlas, self._background):
             if resource is not None:
                 resource.release()
 

@@ -31,4 +31,8 @@ def arrays_of(scene: Scene) -> dict[str, NDArray[Any]]:
             if texture is not None:
                 arrays[f"{kind} {k} {texture.wrap} {texture.bilinear} {texture.texcoord}"] = texture.pixels
                 arrays[f"{kind} {k} transform"] = texture.uv_transform
+    if scene.sky is not None:
+        arrays["sky"] = scene.sky.radiance
+        if scene.sky.sun is not None:
+            arrays["sun"] = np.concatenate([scene.sky.sun.direction, scene.sky.sun_irradiance])
     return arrays

@@ -14,6 +14,11 @@
     [[procedural]]              # kind = "museum" | "grotto" | "village" | "icosphere" | "cylinder" and parameters:
                                 # procedural.py
     [[camera]]                  # name; position, target; yfov_deg = 45
+    [sky]                       # kind = "uniform" | "clear" | "image"; colour = [r, g, b] radiance L [W/(sr m²)] of a uniform
+                                # one, multiplies the others, and their sun; strength = 1; turbidity = 2.5, of clear air
+                                # sun = { azimuth = degrees from north, -z, over east, +x, height = degrees }
+                                #    or { time = 2026-06-21T18:30:00+02:00, latitude = degrees north, longitude = degrees east }
+                                # file = "map.hdr" beside the TOML (.hdr .exr), rotate = degrees, of an image
 
 Colours are linear Rec.709, or one number for grey. A texture multiplies the albedo, which is then 1 unless given; it
 fills each quad and each face of a box, ``repeat`` times. +y is up.
@@ -21,13 +26,14 @@ fills each quad and each face of a box, ``repeat`` times. +y is up.
 
 from __future__ import annotations
 
+import datetime
 import math
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from app.errors import SceneError
 from app.scene import shapes
@@ -38,6 +44,9 @@ from app.scene.images import ImageError, path_inside, read_image
 from app.scene.meshfile import load_meshfile
 from app.scene.model import Camera, Material, Scene, Texture
 from app.scene.procedural import Procedural
+from app.scene.sky import LEAST_TURBIDITY, MOST_TURBIDITY, TURBIDITY, Sky, SkyKind, Sun
+from app.scene.sky_image import SUFFIXES, read_sky_image
+from app.scene.sun_position import sun_at
 from app.scene.validate import Part, validate
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -163,6 +172,49 @@ class CameraTable(Table):
         return self
 
 
+class SunTable(Table):
+    azimuth: float | None = None
+    height: Annotated[float, Field(gt=0.0, le=90.0)] | None = None
+    time: AwareDatetime | None = None
+    latitude: Annotated[float, Field(ge=-90.0, le=90.0)] | None = None
+    longitude: Annotated[float, Field(ge=-180.0, le=360.0)] | None = None
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        angles = [self.azimuth is not None, self.height is not None]
+        place = [self.time is not None, self.latitude is not None, self.longitude is not None]
+        if not (all(angles) and not any(place)) and not (all(place) and not any(angles)):
+            raise ValueError("give either azimuth and height, or time, latitude and longitude")
+        if self.sun.height <= 0:
+            raise ValueError(f"the sun is {-self.sun.height:.1f} degrees below the horizon then")
+        return self
+
+    @property
+    def sun(self) -> Sun:
+        if self.azimuth is not None and self.height is not None:
+            return Sun(self.azimuth % 360, self.height)
+        assert self.time is not None and self.latitude is not None and self.longitude is not None
+        return sun_at(self.time.astimezone(datetime.UTC), self.latitude, self.longitude)
+
+
+class SkyTable(Table):
+    kind: SkyKind = "uniform"
+    colour: Light = (1.0, 1.0, 1.0)
+    strength: NotNegative = 1.0
+    turbidity: Annotated[float, Field(ge=LEAST_TURBIDITY, le=MOST_TURBIDITY)] = TURBIDITY
+    sun: SunTable | None = None
+    file: str | None = None
+    rotate: float = 0.0
+
+    @model_validator(mode="after")
+    def _what_the_kind_needs(self) -> Self:
+        if self.kind == "clear" and self.sun is None:
+            raise ValueError("a clear sky needs a sun")
+        if (self.kind == "image") != (self.file is not None):
+            raise ValueError("an image needs a file, and other kinds none")
+        return self
+
+
 class SceneFile(Table):
     """A whole TOML scene."""
 
@@ -173,6 +225,7 @@ class SceneFile(Table):
     mesh: list[MeshTable] = []
     procedural: list[Procedural] = []
     camera: list[CameraTable] = []
+    sky: SkyTable | None = None
 
 
 @np.errstate(all="ignore")
@@ -219,7 +272,8 @@ class _Builder:
             eye, target = (self.unit * np.array(p) for p in (camera.position, camera.target))
             self.cameras.append(Camera(camera.name, look_at(eye, target), math.radians(camera.yfov_deg)))
         name = self.table.scene.name or self.path.stem
-        return validate(self.path, name, self.parts, self.objects, self.materials, self.cameras, self.warnings)
+        scene = validate(self.path, name, self.parts, self.objects, self.materials, self.cameras, self.warnings)
+        return scene if self.table.sky is None else scene.with_sky(self._sky(self.table.sky))
 
     def _id(self, material: str, where: str) -> int:
         if material not in self.ids:
@@ -250,6 +304,22 @@ class _Builder:
             return Texture(table.image, read_image(found), uv_transform=scale)
         except ImageError as error:
             raise SceneError(self.path, f"{where}: '{table.image}' is not a readable picture: {error}") from error
+
+    def _sky(self, table: SkyTable) -> Sky:
+        image = None
+        if table.file is not None:
+            found = path_inside(self.path.parent, table.file)
+            if found is None:
+                raise SceneError(self.path, f"sky.file: there is no file '{table.file}' in the scene's folder")
+            if found.suffix.lower() not in SUFFIXES:
+                raise SceneError(self.path, f"sky.file: '{table.file}' is none of {', '.join(SUFFIXES)}")
+            try:
+                image = read_sky_image(found)
+            except ImageError as error:
+                raise SceneError(self.path, f"sky.file: '{table.file}' is not a readable sky: {error}") from error
+        sun = None if table.sun is None else table.sun.sun
+        name = table.file or ""
+        return Sky(table.kind, table.colour, table.strength, sun, table.turbidity, image, table.rotate, name)
 
     def _add(self, name: str, material: int, mesh: shapes.Mesh) -> None:
         self.parts.append(Part(mesh.positions * self.unit, mesh.triangles, len(self.objects), material, uv0=mesh.uv))

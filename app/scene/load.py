@@ -14,6 +14,7 @@ from app.scene.authored import MESH_LOADERS, load_authored
 from app.scene.cameras import default_camera
 from app.scene.library import scene_names, scene_path
 from app.scene.model import Material, Scene
+from app.scene.sky import Sky
 from app.scene.validate import one_line
 
 LOADERS = {**MESH_LOADERS, ".toml": load_authored}
@@ -21,13 +22,14 @@ LIGHT_SHARE = 0.25  # the ceiling light's edges, of the scene's extents
 LIGHT_GAP = 0.01  # below the top, of the scene's height
 SAME_PLANE = 1e-4  # of the scene's height, that surfaces of one plane may be apart
 MEAN_IRRADIANCE = 1.0  # W/m² that the ceiling light alone would give the whole ground plan
-NO_LIGHT = "nothing in the scene emits light: --light adds a ceiling light"
+NO_LIGHT = "nothing in the scene emits light: --light adds a ceiling light, --sky a sky"
 
 
-def load_scene(source: str | Path, *, default_light: bool = False) -> Scene:
+def load_scene(source: str | Path, *, default_light: bool = False, sky: Sky | None = None) -> Scene:
     """The Scene behind a name of ``scenes/`` or a file, with at least one camera.
 
-    A scene without emitter gets ``with_ceiling_light`` if ``default_light`` is set, else a warning that says so.
+    sky: of a scene that has none. A scene without emitter gets ``with_ceiling_light`` if ``default_light`` is set, else a
+    warning that says so.
     SceneError if there is no such file, its format is unknown or its content unusable.
     """
     path = scene_file(source)
@@ -37,6 +39,8 @@ def load_scene(source: str | Path, *, default_light: bool = False) -> Scene:
         raise SceneError(error.source, one_line(error.reason)) from error
     if not scene.cameras:
         scene = dataclasses.replace(scene, cameras=(default_camera(scene),))
+    if scene.sky is None and sky is not None:
+        scene = scene.with_sky(sky)
     if not scene.emits:
         if default_light:
             return with_ceiling_light(scene)

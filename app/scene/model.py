@@ -14,6 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from app.scene.sky import Sky
+
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
@@ -88,8 +90,8 @@ class Scene:
     into ``materials`` and ``objects`` (names). Per corner, where the file has them: uv0, uv1 (m, 3, 2) f32 with v = 0
     at the top, normals (m, 3, 3) f32 unit (kept for export; light transport uses geometric normals), colours (m, 3, 3)
     f32, linear Rec.709, in [0, 1], which multiply the albedo. What of the light is reflected is nowhere above MOST_ALBEDO.
-    ``warnings`` are one-line counted repairs and omissions. Every value is finite, every index in range, every triangle
-    has an area: ``validate`` guarantees it.
+    ``warnings`` are one-line counted repairs and omissions. sky: what is seen where no surface is; None is black. Every value
+    is finite, every index in range, every triangle has an area: ``validate`` guarantees it.
     """
 
     name: str
@@ -106,6 +108,7 @@ class Scene:
     colours: F32 | None = None
     warnings: tuple[str, ...] = ()
     source: Path | None = None
+    sky: Sky | None = None
 
     @functools.cached_property
     def corners(self) -> F64:
@@ -128,8 +131,13 @@ class Scene:
 
     @property
     def emits(self) -> bool:
-        """Whether any triangle has an emitting material."""
-        return any(self.materials[i].emits for i in np.unique(self.material_ids))
+        """Whether any triangle has an emitting material, or light comes from the sky."""
+        return self.lit_by_sky or any(self.materials[i].emits for i in np.unique(self.material_ids))
+
+    @property
+    def lit_by_sky(self) -> bool:
+        """Whether light comes from the sky."""
+        return self.sky is not None and self.sky.emits
 
     @property
     def sides(self) -> NDArray[np.bool_]:
@@ -138,3 +146,6 @@ class Scene:
 
     def with_materials(self, materials: tuple[Material, ...]) -> Scene:
         return dataclasses.replace(self, materials=materials)
+
+    def with_sky(self, sky: Sky | None) -> Scene:
+        return dataclasses.replace(self, sky=sky)

@@ -15,6 +15,7 @@ from app.lightmap.tile_pool import Array, TilePool
 from app.render.exposure import first_exposure
 from app.scene.load import load_scene
 from app.scene.model import Scene
+from app.scene.sky import Sky
 from app.session.ray_tree import SORTING
 from app.solvers import SOLVERS
 from app.util.background import BackgroundTask, Progress
@@ -35,13 +36,19 @@ class Loaded:
 
 
 def read_and_unfold(
-    source: str | Path | Scene, atlas: AtlasOptions, default_light: bool, tell: Progress, *, roots: bool = False
+    source: str | Path | Scene,
+    atlas: AtlasOptions,
+    default_light: bool,
+    tell: Progress,
+    *,
+    sky: Sky | None = None,
+    roots: bool = False,
 ) -> tuple[Scene, Charts, dict[str, float]]:
     """The scene, its charts, and the seconds of both stages. roots: whether texels are the coarsest of quadtrees. Raises
     UserError (SceneError)."""
     start = time.perf_counter()
     tell("reading", 0.0)
-    scene = source if isinstance(source, Scene) else load_scene(source, default_light=default_light)
+    scene = source if isinstance(source, Scene) else load_scene(source, default_light=default_light, sky=sky)
     middle = time.perf_counter()
     tell("unfolding", 0.1)
     charts = parametrize(
@@ -61,6 +68,7 @@ def load(
     options: LightmapOptions | None = None,
     *,
     default_light: bool = False,
+    sky: Sky | None = None,
     expose: bool = False,
     rays: bool = False,
     progress: Progress | None = None,
@@ -69,7 +77,7 @@ def load(
     build the tree that they walk. Raises UserError (SceneError)."""
     tell: Progress = progress or (lambda stage, share: None)
     options = options or LightmapOptions()
-    scene, charts, seconds = read_and_unfold(source, atlas, default_light, tell, roots=options.adaptive)
+    scene, charts, seconds = read_and_unfold(source, atlas, default_light, tell, sky=sky, roots=options.adaptive)
     start = time.perf_counter()
     tell("cutting into texels", 0.6)
     pool = quadtree_pool(scene, charts) if options.adaptive else TilePool(scene, charts)
@@ -95,11 +103,12 @@ class Loading(BackgroundTask[Loaded]):
         solver: str,
         *,
         default_light: bool = False,
+        sky: Sky | None = None,
         expose: bool = False,
     ) -> None:
         self.source, self.solver = source, solver
         more = {"default_light": default_light, "expose": expose, "rays": SOLVERS[solver].rays}
-        super().__init__("this scene", lambda tell: load(source, atlas, options, **more, progress=tell))
+        super().__init__("this scene", lambda tell: load(source, atlas, options, sky=sky, **more, progress=tell))
 
     @property
     def name(self) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from app.errors import UserError
 from app.gpu import Gpu
 from app.scene.model import Material
+from app.scene.sky import Sky
 from app.session.energy import Effort, EnergyWatch
 from app.session.history import History
 from app.session.pacing import Pacer
@@ -100,8 +101,15 @@ class Run:
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light that is there stays where the solver can solve for the difference."""
+        self._edit(lambda: self.solver.set_materials(materials))
+
+    def set_sky(self, sky: Sky | None) -> None:
+        """Another sky. Raises UserError."""
+        self._edit(lambda: self.solver.set_sky(sky))
+
+    def _edit(self, edit: Callable[[], None]) -> None:
         converged, counts = self.converged, self.solver.inspect().counts
-        self.solver.set_materials(materials)
+        edit()
         self.progress = self.solver.poll()
         if self.solver.issued == 0:
             self._begin_again()

@@ -20,6 +20,7 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
 from app.options import Options
 from app.scene.model import F64, Material, Scene
+from app.scene.sky import Sky
 from app.session.compared import Compared
 from app.session.error_estimate import SECONDS, RunningEstimate
 from app.session.flicker import flickering
@@ -50,12 +51,14 @@ class Session:
         atlas: AtlasOptions | None = None,
         light: LightmapOptions | None = None,
         default_light: bool = False,
+        sky: Sky | None = None,
         expose_on_open: bool = False,
     ) -> None:
-        """options: of that solver, its defaults if None; default_light: give scenes a ceiling light."""
+        """options: of that solver, its defaults if None; default_light: give scenes a ceiling light; sky: give it to scenes
+        that have none."""
         self.gpu, self._choice = gpu, SolverChoice(solver, options)
         self.atlas, self.light = atlas or AtlasOptions(), light or LightmapOptions()
-        self.default_light, self.expose_on_open = default_light, expose_on_open
+        self.default_light, self.sky, self.expose_on_open = default_light, sky, expose_on_open
         self.message: str | None = None
         self.load_seconds: dict[str, float] = {}
         self.run, self.compared, self.estimate = Run(gpu), Compared(gpu), RunningEstimate(gpu)
@@ -79,13 +82,13 @@ class Session:
         """Start to load in the background; ``poll`` swaps the scene when it is there. reference: a bake to open then."""
         self._then_reference = reference
         more = {"default_light": self.default_light, "expose": self.expose_on_open}
-        self._opening.begin(Loading(source, self.atlas, self.light, self.chosen_solver, **more))
+        self._opening.begin(Loading(source, self.atlas, self.light, self.chosen_solver, sky=self.sky, **more))
 
     def open_now(self, source: str | Path | Scene, progress: Callable[[str, float], None] | None = None) -> None:
         """Load and wait."""
         solver = self.chosen_solver
         more = {"default_light": self.default_light, "expose": self.expose_on_open, "rays": SOLVERS[solver].rays}
-        loaded = load(source, self.atlas, self.light, **more, progress=progress)
+        loaded = load(source, self.atlas, self.light, sky=self.sky, **more, progress=progress)
         self._take_over(self._opening.at_once(loaded, solver, self._choice.options))
 
     def cut_anew(self, atlas: AtlasOptions, *, adaptive: bool | None = None) -> None:
@@ -143,6 +146,7 @@ class Session:
         flickers = same_scene and self.flickers
         if same_scene and self.scene is not scene:
             lightmap.set_materials(self.materials)
+            lightmap.set_sky(self.scene.sky)
             solver.reset()
         self.close()
         self.lightmap, self.solver, self.unedited = lightmap, solver, scene
@@ -351,6 +355,14 @@ class Session:
         if self.solver.issued == 0:
             self._light_begins()
 
+    def set_sky(self, sky: Sky | None) -> None:
+        """Another sky, or none. Raises UserError where the solver cannot light by one."""
+        self.run.set_sky(sky)
+        if self._steady is not None:
+            self._steady = self._steady.with_sky(sky)
+        if self.solver.issued == 0:
+            self._light_begins()
+
     @property
     def flickers(self) -> bool:
         """Whether lamps flicker."""
@@ -441,4 +453,5 @@ class Session:
             "lightmap": self.light.as_dict(),
             "atlas": self.atlas.as_dict(),
             "light": self.default_light,
+            "sky": None if self.scene.sky is None else self.scene.sky.as_dict(),
         }

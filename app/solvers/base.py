@@ -13,6 +13,7 @@ from typing import Any, Protocol, TypeVar
 from app.gpu import Texture
 from app.options import Options
 from app.scene.model import F32, F64, Material
+from app.scene.sky import Sky
 
 Rect = tuple[float, float, float, float]  # (u, v, u, v) in the virtual atlas [texels of level 0]
 HEMISPHERE = "Hemisphere"  # caption of the picture that a view makes of the rays of an Inspection
@@ -126,6 +127,9 @@ class Solver(Protocol[OptionsT]):
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Use other albedos and emissions of the scene from the next piece of work on; solve for the difference where the method
         can."""
+
+    def set_sky(self, sky: Sky | None) -> None:
+        """Have another sky from the next piece of work on. Raises UserError."""
 
     def set_observer(self, position: F64) -> None:
         """The eye is at ``position`` (3,) [m]: what a solver does first, or alone, where the world is too large to solve at

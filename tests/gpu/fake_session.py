@@ -97,7 +97,9 @@ class FakeSession:
         self.expected = ErrorEstimate(0.016, -0.003, 0.006, 240)
         self.estimate = SimpleNamespace(share=1.0)
         cameras = (SimpleNamespace(name="front", world_from_camera=np.eye(4), yfov=0.7),)
-        self.scene = SimpleNamespace(materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras)
+        self.scene = SimpleNamespace(
+            materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras, sky=None
+        )
         self.unedited = self.scene
         self.charts = SimpleNamespace(density=40.0, tile=16, warnings=(), size=(160, 96))
         self.lightmap = SimpleNamespace(space=FakeSpace())

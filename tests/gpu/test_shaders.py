@@ -73,6 +73,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "CLOSED_FORM": FLAG,
     "PASS": (PASS,),
     "PICTURE": FLAG,
+    "SKY": FLAG,
     "TRACED": FLAG,
     "FINER": FLAG,
     "RADIUS": (0, 1, RADIUS),

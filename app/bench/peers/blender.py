@@ -82,6 +82,8 @@ def _described(scene: Scene, charts: Charts) -> dict[str, Any]:
     """What blender_worker.py reads: a triangle for each side, coordinates with v up. Raises UserError."""
     if scene.colours is not None:
         raise UserError("Cycles is not given vertex colours: compare with another")
+    if scene.lit_by_sky:
+        raise UserError("Cycles is not given the sky")
     double = np.array([m.double_sided for m in scene.materials])[scene.material_ids]
     triangle = np.concatenate([np.arange(len(double)), np.flatnonzero(double)])
     back = np.arange(len(triangle)) >= len(double)

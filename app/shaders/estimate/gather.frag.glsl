@@ -1,11 +1,16 @@
 // What a ray of a node brings of its irradiance [W/m²]: B of what it meets, and light of a point on a lamp,
 //
-//     H'(x) = ∫ B(y) cos θ dω / π     two estimates of what comes from lamps, weighed by the balance heuristic [Veach95]
+//     H'(x) = ∫ B(y) cos θ dω / π     two estimates of what comes from lamps and sky, weighed by the balance heuristic [Veach95]
 //
 // Lamps are chosen by the power of their triangles, points on them evenly.
+#define SKY 0
 #include "estimate/node.glsl"
 #include "estimate/surface.glsl"
 
+#if SKY
+#include "direct_light/sky_sample.glsl"
+uniform vec3 u_sky;  // scale of its map [W/(sr m²)]
+#endif
 uniform sampler2D t_lamps;  // a triangle each: share of the power up to it, slot
 uniform int u_lamps;
 uniform float u_power;  // Σ strength · area of them [W/m² · solver space]
@@ -45,10 +50,32 @@ float lamp_density(float strength, float distance, float cosine) {
     return strength / u_power * distance * distance / max(abs(cosine), 1e-9);
 }
 
+// The light of the sky from a direction that is chosen by the cosine, or by the sky's light: weighed as that of lamps is.
+vec4 from_beyond(Node node, vec3 direction) {
+#if SKY
+    vec2 uv = sky_uv(direction);
+    float cosine = dot(direction, node.normal);
+    vec3 E = u_sky * textureLod(t_sky, uv, 0.0).rgb * cosine / (cosine / PI + sky_density(direction, uv));
+    return vec4(E, dot(E, vec3(1.0 / 3.0)));
+#else
+    return vec4(0.0);
+#endif
+}
+
+vec4 from_sky(Node node, int ray) {
+#if SKY
+    vec3 direction = sky_direction(fract(node.lamp_shift.yz + float(ray) * R2));
+    if (dot(direction, node.normal) <= 0.0 || any_hit(node.origin, direction, 0.0, REACH)) return vec4(0.0);
+    return from_beyond(node, direction);
+#else
+    return vec4(0.0);
+#endif
+}
+
 vec4 along_cosine(Node node, int ray) {
     vec3 direction = direction_of(node, ray);
     Hit hit = closest_hit(node.origin, direction, 0.0, REACH);
-    if (hit.slot < 0) return vec4(0.0);
+    if (hit.slot < 0) return from_beyond(node, direction);
     Surface seen = surface_of(hit);
     float here = dot(direction, node.normal) / PI;
     float other = lamp_density(seen.strength, hit.distance, dot(normal_of(corners_of(hit.slot)), direction));
@@ -57,6 +84,7 @@ vec4 along_cosine(Node node, int ray) {
 }
 
 vec4 from_lamp(Node node, int ray) {
+    if (u_lamps == 0) return vec4(0.0);
     vec3 u = fract(node.lamp_shift + float(ray) * R3);
     int slot = lamp_slot(u.x);
     Corners t = corners_of(slot);
@@ -83,5 +111,5 @@ vec4 from_lamp(Node node, int ray) {
 void main() {
     Node node = node_of(int(gl_FragCoord.y));
     int ray = int(gl_FragCoord.x);
-    out_light = along_cosine(node, ray) + from_lamp(node, ray);
+    out_light = along_cosine(node, ray) + from_lamp(node, ray) + from_sky(node, ray);
 }

@@ -2,7 +2,8 @@
 
     emitted = absorbed + escaped + imbalance,    absorbed = Σ (1 - ρ) H A,    escaped = Σ B A (share of rays that hit nothing)
 
-Light is gathered, and never sent: nothing forces the books to close, so that the imbalance is an error of the solution.
+Of the sky, what arrives on texels is emitted. Light is gathered, and never sent: nothing forces the books to close, so that the
+imbalance is an error of the solution.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ class Balance:
         self._tiles = [self._gpu.texture(size, 4, "f4") for _ in range(4)]
         self._target = self._gpu.target(*self._tiles)
 
-    def measure(self, hits: Hits, direct: Texture, indirect: Texture) -> EnergyBalance:
-        """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
+    def measure(self, hits: Hits, direct: Texture, indirect: Texture, from_sky: F64) -> EnergyBalance:
+        """Where all light is now, RGB [W]. from_sky: what the sky sends to texels. Reads every texel and waits for the GPU."""
         lightmap, (lost, rays) = self._lightmap, hits.lost()
         reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_emission"
         self._sum.draw(
@@ -44,7 +45,7 @@ class Balance:
         ]
         area, square = sums[0][3], lightmap.space.scale**2
         absorbed, escaped, blackened = (s[:3] * lightmap.unit * square for s in sums[:3])
-        emitted = lightmap.emitted
+        emitted = lightmap.emitted + from_sky
         return EnergyBalance(
             emitted=emitted,
             absorbed=absorbed + blackened,

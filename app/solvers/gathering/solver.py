@@ -22,6 +22,7 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
 from app.lightmap.tile_pool import Moves, TilePool
 from app.scene.model import F64, Material
+from app.scene.sky import Sky
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.gathering.balance import Balance
 from app.solvers.gathering.bounces import Bounces, steps_to
@@ -235,7 +236,8 @@ class Gathering:
     def energy(self) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
         self._under_way.finish()
-        balance = self._balance.measure(self.hits, self.at_points.light, self._compose.indirect)
+        direct = self.at_points
+        balance = self._balance.measure(self.hits, direct.light, self._compose.indirect, direct.from_sky())
         self._progress = replace(self._progress, escaped=balance.escaped)
         return balance
 
@@ -286,6 +288,16 @@ class Gathering:
             self.reset()
             return
         self._set_materials()
+        self._edited = True
+
+    def set_sky(self, sky: Sky | None) -> None:
+        """Another sky: shadow rays to it are sent anew, but where only its strength or colour is another."""
+        self.lightmap.set_sky(sky)
+        if self.points is not self.lightmap:
+            self.points.set_sky(sky)
+        if not self.issued:
+            self.reset()
+            return
         self._edited = True
 
     def _set_materials(self) -> None:

@@ -22,6 +22,7 @@ from app.errors import UserError
 from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64, Material
+from app.scene.sky import Sky
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.local.balance import balance_of, matrix_error
 from app.solvers.local.form_factors import LocalSet
@@ -281,7 +282,7 @@ class Local:
     def energy(self) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
         self._under_way.finish()
-        balance = balance_of(self.lightmap, self.direct.light, self.patches, self.members)
+        balance = balance_of(self.lightmap, self.direct.light, self.direct.from_sky(), self.patches, self.members)
         self._look_for_error()
         if not self.issued and self.lightmap.scene.emits:
             return replace(balance, escaped=np.zeros(3), unshot=balance.emitted)
@@ -334,6 +335,15 @@ class Local:
             self.members.look_again()
             if self.options.bounces == "series":
                 self._fill_anew()  # paths with the old albedo would stay
+
+    def set_sky(self, sky: Sky | None) -> None:
+        """Another sky: its light with the next piece of work."""
+        self.lightmap.set_sky(sky)
+        if not self.issued:
+            self.reset()
+            return
+        self._edited = True
+        self._under_way.finish()
 
     def _fill_anew(self) -> None:
         """Take all nodes out: they enter with the next pieces of work."""

@@ -20,6 +20,7 @@ from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64, Material
+from app.scene.sky import Sky
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.pairs.books import Books
 from app.solvers.pairs.bounce import Bounce
@@ -30,6 +31,7 @@ from app.solvers.pairs.pace import PART, Pace
 from app.util.parts import is_running, run_to_end
 
 PIECE = 0.1  # seconds of a bounce that are one piece of work: a solve looks at its clock in between
+NO_SKY = "--solver pairs: texels gather from texels, and not from the sky; the other solvers do"
 LONG = 2.0  # seconds of a bounce, from which on it is said beforehand
 
 
@@ -42,6 +44,8 @@ class Pairs:
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: PairsOptions) -> None:
         if lightmap.pool.adaptive:
             raise UserError("--solver pairs: texels gather from texels of one size; not with --adaptive")
+        if lightmap.scene.lit_by_sky:
+            raise UserError(NO_SKY)
         check(options, lightmap.texel_count)
         self._gpu, self._lightmap, self.options = gpu, lightmap, options
         self._scenes, self._pace, self._books = Scenes(gpu, lightmap), Pace(gpu), Books(lightmap)
@@ -192,6 +196,12 @@ class Pairs:
             return
         self._drop_bounce()
         self._progress = self._judged(self._left)
+
+    def set_sky(self, sky: Sky | None) -> None:
+        """Only one that sends no light. Raises UserError."""
+        if sky is not None and sky.emits:
+            raise UserError(NO_SKY)
+        self._lightmap.set_sky(sky)
 
     @property
     def _left(self) -> float:

@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
 from app.lightmap.tile_pool import Moves
 from app.scene.model import F64, Material
+from app.scene.sky import Sky
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.shooting.audit import Audit
 from app.solvers.shooting.batch import Batch
@@ -31,6 +33,7 @@ from app.visibility.item_image import ItemImage
 LOOK_AFTER = 32  # shots, or a quarter of all, between two looks at leaves that did not change at the last
 SIGHT = "What the last shooter saw"
 PICTURES = {SIGHT: "All that the patch that shot last sees, one colour per surface"}
+NO_SKY = "--solver shooting: shoots no light of the sky: gathering and local do"
 CHANGES_PER_SHOT = 8  # leaves that split or merge, for each shot of a piece of work: bounded work for a frame
 
 
@@ -43,6 +46,8 @@ class Shooting:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool = True) -> None:
         """audits: whether strong shots are tried before they are made."""
+        if lightmap.scene.lit_by_sky:
+            raise UserError(NO_SKY)
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
         self.batch = Batch(gpu, lightmap, options, audits=audits)
         if lightmap.refinement is not None:
@@ -226,6 +231,12 @@ class Shooting:
             batch.groups.divide(batch.phases)
         self._progress = replace(self._progress, remaining=self._unshot_share())
         batch.ambient.update(batch.bins, shown=self.options.ambient)
+
+    def set_sky(self, sky: Sky | None) -> None:
+        """Only one that sends no light. Raises UserError."""
+        if sky is not None and sky.emits:
+            raise UserError(NO_SKY)
+        self.lightmap.set_sky(sky)
 
     # -- leaves that come and go, see app/lightmap/refinement.py -------------------------------------------------------
 

@@ -13,6 +13,7 @@ from app.lightmap.options import QUADTREE
 from app.render.tone_mapping import encode_srgb
 from app.scene.model import MOST_ALBEDO
 from app.ui import theme, widgets
+from app.ui.panels import sky
 from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 TALL_EM = 53.0  # a window in which the whole panel has room
 ROWS_SHOWN = 5  # of the material list before it scrolls
 SWATCH = int(imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop | imgui.ColorEditFlags_.no_border)
-PICKER = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label)
 STRONGEST = 1e5  # W/(sr m²), end of the slider: the sun's disc is brighter, lamps are not
 
 
@@ -34,6 +34,7 @@ def draw(view: View, state: State) -> None:
         _editor(view, state, view.session.materials[state.material])
     if view.session.family.relights:
         _flicker(view, state)
+    sky.draw(view, state)
     if widgets.fold("Texels", opened=has_room()):
         _atlas(view, state)
 
@@ -152,7 +153,7 @@ def _emission(state: State, material: Any) -> RGB:
         colour = rgb(v / strength for v in material.emission)
         state.emission_colours[index] = colour
     widgets.labelled("Emission L")
-    recoloured, value = imgui.color_edit3("##emission", list(colour), PICKER)
+    recoloured, value = imgui.color_edit3("##emission", list(colour), widgets.PICKER)
     imgui.same_line()
     imgui.set_next_item_width(-1)
     flags = widgets.SLIDER | widgets.LOGARITHMIC

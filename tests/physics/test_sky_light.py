@@ -1,0 +1,114 @@
+"""Light of the sky by every solver that knows it, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from solver_scenes import NOISE, Solution, begin, grey, quads_scene
+
+from app.gpu import Gpu
+from app.scene.model import F64, Scene
+from app.scene.sky import Sky
+
+SKIES = ("gathering", "local")
+EVERY_SKY_SOLVER = pytest.mark.parametrize("solver", SKIES)
+RAYS = 128
+FLOOR = [[0, 0, 2], [2, 0, 2], [2, 0, 0], [0, 0, 0]]  # faces up
+WALL = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]  # faces it, +z
+
+
+def solved(gpu: Gpu, scene: Scene, solver: str) -> Solution:
+    known: dict[str, object] = {
+        "gathering": {"density": 8, "smooth": False},
+        "local": {"density": 8, "shadow_rays": RAYS},
+    }
+    lit = begin(gpu, scene, solver=solver, **known[solver])  # type: ignore[arg-type]
+    if solver == "gathering":
+        lit.gather(RAYS)
+    else:
+        lit.settle()
+    return lit
+
+
+def wall_factor(points: F64) -> F64:
+    """F from points of the floor, at (x, 0, z), to the wall: of a small surface to a rectangle that stands on its plane at a
+    distance, to either side of a corner's foot [Cohen93, appendix; after Siegel & Howell, C-4]."""
+
+    def half(width: F64) -> F64:
+        z, b = points[:, 2], 2.0
+        X = np.hypot(z, b)
+        return np.asarray((np.arctan(width / z) - z / X * np.arctan(width / X)) / (2 * np.pi))
+
+    return half(points[:, 0]) + half(2 - points[:, 0])
+
+
+@EVERY_SKY_SOLVER
+def test_an_open_plane_receives_pi_times_the_radiance(gpu: Gpu, solver: str) -> None:
+    """Nothing stands before the sky: there is no noise, whatever the colour."""
+    scene = quads_scene([FLOOR], [grey(0.5)]).with_sky(Sky("uniform", (0.5, 1.0, 2.0), 3.0))
+    lit = solved(gpu, scene, solver)
+    assert np.allclose(lit.H, np.pi * 3 * np.array([0.5, 1, 2]), rtol=1e-4)
+    book = lit.book
+    assert np.allclose(book.emitted, 4 * np.pi * 3 * np.array([0.5, 1, 2]), rtol=1e-4)
+    assert np.allclose([book.absorbed, book.escaped], book.emitted / 2, rtol=1e-3)
+    lit.release()
+
+
+@EVERY_SKY_SOLVER
+def test_a_wall_takes_its_form_factor(gpu: Gpu, solver: str) -> None:
+    """H = πL (1 - F); by RAYS rays off by about √(F (1 - F) / RAYS) / (1 - F) at worst, and by chance rather less."""
+    scene = quads_scene([FLOOR, WALL], [grey(0.0, double_sided=True)]).with_sky(Sky())
+    lit = solved(gpu, scene, solver)
+    floor = (lit.object == 0) & (lit.normal[:, 1] > 0)
+    expected = np.pi * (1 - wall_factor(lit.position[floor]))
+    assert np.allclose(lit.H[floor].mean(1), expected, rtol=0.15)
+    assert np.average(lit.H[floor].mean(1) / expected, weights=lit.area[floor]) == pytest.approx(1, abs=2e-3)
+    lit.release()
+
+
+@EVERY_SKY_SOLVER
+def test_white_surfaces_under_a_white_sky_are_not_seen(gpu: Gpu, solver: str) -> None:
+    """All reflect all: H = πL wherever they stand, in corners too, as long as light finds a way out."""
+    scene = quads_scene([FLOOR, WALL], [grey(1.0, double_sided=True)]).with_sky(Sky())
+    lit = solved(gpu, scene, solver)
+    mean = np.average(lit.H.mean(1), weights=lit.area)
+    assert mean == pytest.approx(np.pi, rel=5e-3)
+    assert np.sqrt(np.average((lit.H.mean(1) / np.pi - 1) ** 2, weights=lit.area)) < 2 * NOISE
+    assert abs(lit.book.imbalance_share) < 5e-3
+    lit.release()
+
+
+@EVERY_SKY_SOLVER
+def test_a_bright_spot_of_the_sky_is_found(gpu: Gpu, solver: str) -> None:
+    """One pixel of 512 holds nearly all light. On open ground E is that of the pixels' cosines; the roof takes its own area
+    of it, wherever its shadow falls and however soft it is."""
+    image = np.full((16, 32, 3), 1e-3, np.float32)
+    image[3, 4] = 1000.0
+    roof = [[0.5, 0.25, 1.5], [1.5, 0.25, 1.5], [1.5, 0.25, 0.5], [0.5, 0.25, 0.5]]
+    scene = quads_scene([FLOOR, roof], [grey(0.0, double_sided=True)]).with_sky(Sky("image", image=image))
+    lit = solved(gpu, scene, solver)
+    assert scene.sky is not None
+    open_ = scene.sky.shape_irradiance(np.array([[0.0, 1.0, 0.0]]))[0]
+    upper = (lit.object == 1) & (lit.normal[:, 1] > 0)
+    assert np.allclose(lit.H[upper], open_, rtol=2e-3)
+    floor = (lit.object == 0) & (lit.normal[:, 1] > 0)
+    shade = lit.H[floor].mean(1) / open_.mean()
+    assert np.average(shade, weights=lit.area[floor]) == pytest.approx(0.75, abs=0.01)
+    assert shade.min() < 0.01
+    lit.release()
+
+
+def test_the_strength_of_a_sky_costs_no_ray(gpu: Gpu) -> None:
+    scene = quads_scene([FLOOR, WALL], [grey(0.5, double_sided=True)]).with_sky(Sky())
+    lit = solved(gpu, scene, "gathering")
+    before, traced = lit.H, lit.rays.traced
+    lit.rays.set_sky(Sky("uniform", (1.0, 0.5, 0.25), 4.0))
+    lit.step(8)
+    lit.rays.settle()
+    assert lit.rays.traced == traced
+    assert np.allclose(lit.H, before * [4, 2, 1], rtol=5e-3)
+    lit.rays.set_sky(None)
+    lit.step(8)
+    lit.rays.settle()
+    assert np.abs(lit.H).max() < 1e-3 * before.max()
+    lit.release()
