@@ -14,6 +14,7 @@ from app.bake import IRRADIANCE_NAME, REPORT_NAME, SCENE_NAME
 from app.errors import UserError
 from app.scene.load import load_scene
 from app.scene.model import F32, Scene
+from app.scene.options import FileOptions
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,7 @@ def read_bake(path: Path) -> Bake:
     missing = [name for name in (IRRADIANCE_NAME, SCENE_NAME) if not (folder / name).is_file()]
     if missing:
         raise UserError(f"{path}: is no bake, {' and '.join(missing)} missing: 'glowtree bake' writes one")
-    scene = load_scene(folder / SCENE_NAME)
+    scene = load_scene(folder / SCENE_NAME, FileOptions(unit="m", up="y"))
     if scene.uv1 is None:
         raise UserError(f"{folder / SCENE_NAME}: no second texture coordinates, which say where its light lies")
     return Bake(folder, scene, read_irradiance(folder / IRRADIANCE_NAME), _report(folder / REPORT_NAME))

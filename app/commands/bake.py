@@ -33,7 +33,7 @@ def bake(flags: argparse.Namespace) -> int:
     console = Console(quiet=flags.json)
     with _folder(flags.output), gpu_context() as gpu:
         session = Session(gpu, **session_options(flags))
-        open_scene(session, flags.scene, console)
+        open_scene(session, flags, console)
         failure = solve(session, flags, console)
         stopped = failure is not None or session.run.interrupted
         whole = stopped or estimate(session, flags, console)

@@ -17,6 +17,7 @@ from app.atlas.options import AtlasOptions
 from app.lightmap.options import LightmapOptions
 from app.options import Options, add_flags, option, specs
 from app.scene.images import ImageError, linear_from_srgb
+from app.scene.options import FileOptions
 from app.scene.sky import DEFAULT_SUN, Sky, Sun
 from app.scene.sky_image import SUFFIXES, read_sky_image
 from app.scene.validate import one_line
@@ -73,6 +74,7 @@ def scene_flags(parser: Parser, *, optional: bool = False) -> None:
     parser.add_argument("--sky", type=_sky, metavar="FILE", help=help)
     help = "where the sun stands, degrees from north over east and above the horizon (in a clear sky 135,40)"
     parser.add_argument("--sun", type=_sun, metavar="AZIMUTH,HEIGHT", help=help)
+    add_flags(parser, FileOptions)
     add_flags(parser, AtlasOptions)
 
 

@@ -15,6 +15,7 @@ from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import TABLE_WIDTH
 from app.options import from_flags
 from app.scene.model import Scene
+from app.scene.options import FileOptions
 from app.session.loading import read_and_unfold
 from app.util.console import Console
 
@@ -30,7 +31,13 @@ def info(flags: argparse.Namespace) -> int:
     with console.progress("reading") as tell:
         atlas, light = from_flags(AtlasOptions, flags), from_flags(LightmapOptions, flags)
         scene, charts, _ = read_and_unfold(
-            flags.scene, atlas, flags.light, tell, sky=sky_of(flags), roots=light.adaptive
+            flags.scene,
+            atlas,
+            flags.light,
+            tell,
+            file=from_flags(FileOptions, flags),
+            sky=sky_of(flags),
+            roots=light.adaptive,
         )
         leaves, slots, depth = uniform_leaves(charts), 0, 0
         if light.adaptive:

@@ -40,7 +40,7 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
         view = View(session, from_flags(DisplayOptions, flags))
         check_size(gpu, flags.size)
         shows_light = flags.ui or LAYER_SHADERS[view.display.layer].light is not None
-        open_scene(session, flags.scene, console, note, needs_light=shows_light)
+        open_scene(session, flags, console, note, needs_light=shows_light)
         if path is None:
             _choose_camera(view, flags.camera)
         else:

@@ -15,6 +15,7 @@ from app.options import Options, from_flags, specs
 from app.render.layers import LAYER_SHADERS, layers_with
 from app.render.options import DisplayOptions
 from app.scene.load import NO_LIGHT
+from app.scene.options import FileOptions
 from app.session.run import NotFiniteError, Stop
 from app.session.session import Session
 from app.session.stats import Stats
@@ -70,13 +71,13 @@ def check_display(flags: argparse.Namespace) -> None:
 
 
 def open_scene(
-    session: Session, scene: str, console: Console, note: str | None = None, *, needs_light: bool = True
+    session: Session, flags: argparse.Namespace, console: Console, note: str | None = None, *, needs_light: bool = True
 ) -> None:
-    """Load, and say what there is to say. Raises UserError for a scene that needs light and has none."""
+    """Load what the flags name, and say what there is to say. Raises UserError for a scene that needs light and has none."""
     with console.progress("loading") as tell:
-        session.open_now(scene, tell)
+        session.open_now(flags.scene, tell, from_flags(FileOptions, flags))
     if needs_light and not session.scene.emits:
-        raise UserError(f"{scene}: {NO_LIGHT}")
+        raise UserError(f"{flags.scene}: {NO_LIGHT}")
     for warning in (*([note] if note else []), *session.scene.warnings, *session.charts.warnings):
         console.warn(warning)
 

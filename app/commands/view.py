@@ -12,6 +12,7 @@ from app.commands.steps import check_display, session_options
 from app.errors import UserError
 from app.options import from_flags
 from app.render.options import DisplayOptions
+from app.scene.options import FileOptions
 from app.session.session import Session
 from app.session.view import View
 from app.util.console import Console
@@ -47,7 +48,7 @@ def view(flags: argparse.Namespace) -> int:
     def make_view(gpu: Any) -> View:
         session = Session(gpu, **session_options(flags), expose_on_open=flags.exposure is None)
         view = View(session, from_flags(DisplayOptions, flags))
-        session.open(flags.scene, reference=flags.reference)
+        session.open(flags.scene, from_flags(FileOptions, flags), reference=flags.reference)
         return view
 
     run_window(

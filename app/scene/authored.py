@@ -1,6 +1,7 @@
 """Scenes written by hand as TOML. Unknown keys are errors; an error names file, key and reason.
 
-    [scene]                     # name; unit = "m" | "cm" | "mm": what every length below is counted in
+    [scene]                     # name; unit = "m" | "cm" | "mm" | "in" | "ft": what every length below is
+                                # counted in, also in .obj, .ply and .stl files
     [[material]]                # name; albedo = [r, g, b]; double_sided = false; opacity = 1: light passes by 1 - opacity
                                 # emission = [r, g, b] radiance L [W/(sr m²)], or exitance = [r, g, b] πL [W/m²]
                                 # texture = { pattern = "checker" | "stripes", colors = [[r, g, b], [r, g, b]] }
@@ -43,13 +44,14 @@ from app.scene.gltf_file import first_problem
 from app.scene.images import ImageError, path_inside, read_image
 from app.scene.meshfile import load_meshfile
 from app.scene.model import Camera, Material, Scene, Texture
+from app.scene.options import UNITS
+from app.scene.orientation import WITHOUT_UNIT
 from app.scene.procedural import Procedural
 from app.scene.sky import LEAST_TURBIDITY, MOST_TURBIDITY, TURBIDITY, Sky, SkyKind, Sun
 from app.scene.sky_image import SUFFIXES, read_sky_image
 from app.scene.sun_position import sun_at
 from app.scene.validate import Part, validate
 
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 MESH_LOADERS = {
     ".glb": load_gltf,
     ".gltf": load_gltf,
@@ -78,7 +80,7 @@ class Table(BaseModel):
 
 class SceneTable(Table):
     name: str | None = None
-    unit: Literal["m", "cm", "mm"] = "m"
+    unit: Literal["m", "cm", "mm", "in", "ft"] = "m"
 
 
 class TextureTable(Table):
@@ -335,7 +337,8 @@ class _Builder:
             raise SceneError(self.path, f"{where}.file: '{table.file}' is none of {allowed}")
         part = MESH_LOADERS[found.suffix.lower()](found)
         matrix = shapes.transform(np.array(table.translate) * self.unit, table.rotate, table.scale)
-        positions = part.positions @ matrix[:3, :3].T + matrix[:3, 3]
+        unit = self.unit if found.suffix.lower() in WITHOUT_UNIT else 1.0
+        positions = unit * part.positions @ matrix[:3, :3].T + matrix[:3, 3]
         order = [0, 2, 1] if np.linalg.det(matrix[:3, :3]) < 0.0 else [0, 1, 2]
         material_ids = part.material_ids + len(self.materials)
         if table.material is not None:

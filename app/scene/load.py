@@ -14,6 +14,8 @@ from app.scene.authored import MESH_LOADERS, load_authored
 from app.scene.cameras import default_camera
 from app.scene.library import scene_names, scene_path
 from app.scene.model import Material, Scene
+from app.scene.options import FileOptions
+from app.scene.orientation import oriented
 from app.scene.sky import Sky
 from app.scene.validate import one_line
 
@@ -25,16 +27,19 @@ MEAN_IRRADIANCE = 1.0  # W/m² that the ceiling light alone would give the whole
 NO_LIGHT = "nothing in the scene emits light: --light adds a ceiling light, --sky a sky"
 
 
-def load_scene(source: str | Path, *, default_light: bool = False, sky: Sky | None = None) -> Scene:
+def load_scene(
+    source: str | Path, file: FileOptions | None = None, *, default_light: bool = False, sky: Sky | None = None
+) -> Scene:
     """The Scene behind a name of ``scenes/`` or a file, with at least one camera.
 
-    sky: of a scene that has none. A scene without emitter gets ``with_ceiling_light`` if ``default_light`` is set, else a
-    warning that says so.
+    file: its unit and axes, guessed if None. sky: of a scene that has none. A scene without emitter gets ``with_ceiling_light``
+    if ``default_light`` is set, else a warning that says so.
     SceneError if there is no such file, its format is unknown or its content unusable.
     """
     path = scene_file(source)
     try:
-        scene = LOADERS[path.suffix.lower()](path)
+        suffix = path.suffix.lower()
+        scene = oriented(LOADERS[suffix](path), suffix, file or FileOptions())
     except SceneError as error:  # its reason may quote the file, line breaks and all
         raise SceneError(error.source, one_line(error.reason)) from error
     if not scene.cameras:

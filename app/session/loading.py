@@ -15,6 +15,7 @@ from app.lightmap.tile_pool import Array, TilePool
 from app.render.exposure import first_exposure
 from app.scene.load import load_scene
 from app.scene.model import Scene
+from app.scene.options import FileOptions
 from app.scene.sky import Sky
 from app.session.ray_tree import SORTING
 from app.solvers import SOLVERS
@@ -41,14 +42,15 @@ def read_and_unfold(
     default_light: bool,
     tell: Progress,
     *,
+    file: FileOptions | None = None,
     sky: Sky | None = None,
     roots: bool = False,
 ) -> tuple[Scene, Charts, dict[str, float]]:
-    """The scene, its charts, and the seconds of both stages. roots: whether texels are the coarsest of quadtrees. Raises
-    UserError (SceneError)."""
+    """The scene, its charts, and the seconds of both stages. file: its unit and axes, guessed if None. roots: whether texels are
+    the coarsest of quadtrees. Raises UserError (SceneError)."""
     start = time.perf_counter()
     tell("reading", 0.0)
-    scene = source if isinstance(source, Scene) else load_scene(source, default_light=default_light, sky=sky)
+    scene = source if isinstance(source, Scene) else load_scene(source, file, default_light=default_light, sky=sky)
     middle = time.perf_counter()
     tell("unfolding", 0.1)
     charts = parametrize(
@@ -67,6 +69,7 @@ def load(
     atlas: AtlasOptions,
     options: LightmapOptions | None = None,
     *,
+    file: FileOptions | None = None,
     default_light: bool = False,
     sky: Sky | None = None,
     expose: bool = False,
@@ -74,10 +77,12 @@ def load(
     progress: Progress | None = None,
 ) -> Loaded:
     """Read a scene, or take one as it is; unfold it, cut it into texels, with ``expose`` find its exposure, and with ``rays``
-    build the tree that they walk. Raises UserError (SceneError)."""
+    build the tree that they walk. file: as of ``read_and_unfold``. Raises UserError (SceneError)."""
     tell: Progress = progress or (lambda stage, share: None)
     options = options or LightmapOptions()
-    scene, charts, seconds = read_and_unfold(source, atlas, default_light, tell, sky=sky, roots=options.adaptive)
+    scene, charts, seconds = read_and_unfold(
+        source, atlas, default_light, tell, file=file, sky=sky, roots=options.adaptive
+    )
     start = time.perf_counter()
     tell("cutting into texels", 0.6)
     pool = quadtree_pool(scene, charts) if options.adaptive else TilePool(scene, charts)
@@ -102,13 +107,16 @@ class Loading(BackgroundTask[Loaded]):
         options: LightmapOptions,
         solver: str,
         *,
+        file: FileOptions | None = None,
         default_light: bool = False,
         sky: Sky | None = None,
         expose: bool = False,
     ) -> None:
         self.source, self.solver = source, solver
         more = {"default_light": default_light, "expose": expose, "rays": SOLVERS[solver].rays}
-        super().__init__("this scene", lambda tell: load(source, atlas, options, sky=sky, **more, progress=tell))
+        super().__init__(
+            "this scene", lambda tell: load(source, atlas, options, file=file, sky=sky, **more, progress=tell)
+        )
 
     @property
     def name(self) -> str:

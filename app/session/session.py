@@ -20,6 +20,7 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
 from app.options import Options
 from app.scene.model import F64, Material, Scene
+from app.scene.options import FileOptions
 from app.scene.sky import Sky
 from app.session.compared import Compared
 from app.session.error_estimate import SECONDS, RunningEstimate
@@ -78,17 +79,25 @@ class Session:
 
     # -- opening -------------------------------------------------------------------------------------------------------
 
-    def open(self, source: str | Path, *, reference: Path | None = None) -> None:
-        """Start to load in the background; ``poll`` swaps the scene when it is there. reference: a bake to open then."""
+    def open(self, source: str | Path, file: FileOptions | None = None, *, reference: Path | None = None) -> None:
+        """Start to load in the background; ``poll`` swaps the scene when it is there. file: its unit and axes,
+        guessed if None. reference: a bake to open then."""
         self._then_reference = reference
         more = {"default_light": self.default_light, "expose": self.expose_on_open}
-        self._opening.begin(Loading(source, self.atlas, self.light, self.chosen_solver, sky=self.sky, **more))
+        self._opening.begin(
+            Loading(source, self.atlas, self.light, self.chosen_solver, file=file, sky=self.sky, **more)
+        )
 
-    def open_now(self, source: str | Path | Scene, progress: Callable[[str, float], None] | None = None) -> None:
-        """Load and wait."""
+    def open_now(
+        self,
+        source: str | Path | Scene,
+        progress: Callable[[str, float], None] | None = None,
+        file: FileOptions | None = None,
+    ) -> None:
+        """Load and wait. file: as of ``open``."""
         solver = self.chosen_solver
         more = {"default_light": self.default_light, "expose": self.expose_on_open, "rays": SOLVERS[solver].rays}
-        loaded = load(source, self.atlas, self.light, sky=self.sky, **more, progress=progress)
+        loaded = load(source, self.atlas, self.light, file=file, sky=self.sky, **more, progress=progress)
         self._take_over(self._opening.at_once(loaded, solver, self._choice.options))
 
     def cut_anew(self, atlas: AtlasOptions, *, adaptive: bool | None = None) -> None:

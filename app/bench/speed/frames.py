@@ -26,9 +26,11 @@ from app.commands.steps import session_options
 from app.errors import UserError
 from app.gpu import Gpu, gpu_context
 from app.lightmap.options import LightmapOptions
+from app.options import from_flags
 from app.render.camera import CameraView
 from app.render.camera_path import load_path
 from app.scene.model import Material
+from app.scene.options import FileOptions
 from app.session.pacing import Turns
 from app.session.session import Session
 from app.session.view import View
@@ -58,7 +60,7 @@ def bench_frames(flags: argparse.Namespace) -> int:
         session = Session(gpu, **session_options(flags), expose_on_open=True)
         view = View(session)
         tell(f"opening {flags.scene}", 0.0)
-        session.open(flags.scene)
+        session.open(flags.scene, from_flags(FileOptions, flags))
         viewer = _Viewer(gpu, view)
         try:
             if flags.walk:
