@@ -197,7 +197,7 @@ class DirectLight:
         pool = self._lightmap.pool
         if isinstance(lit, SkyLit):
             assert self._sky is not None
-            how, (textures, uniforms) = self._sky.shoot, self._sky.reads(lit)
+            how, (textures, uniforms) = self._sky.shoot[lit.is_sun], self._sky.reads(lit)
         else:
             how, (textures, uniforms) = self._shoot[lit.lamps.closed_form, lit.lamps.picture], self._reads(lit)
         textures |= {name: texture for name, texture in self._rays.textures.items() if name != "t_bvh_uv"}
@@ -268,17 +268,24 @@ class DirectLight:
             lit.unoccluded = self._lightmap.moved(lit.unoccluded, moves)
 
     def _follow_sky(self, sky: Sky | None) -> None:
-        """Another sky. Of one that differs by its scale all is known."""
+        """Another sky, and another sun. Of those that differ by their scale all is known."""
+        parts = (
+            set()
+            if sky is None
+            else {sun for sun, emits in ((False, sky.shines), (True, sky.sun is not None)) if emits}
+        )
         for lit in [lit for lit in self.sets if isinstance(lit, SkyLit)]:
-            if sky is not None and lit.sky.same_shape(sky):
+            if sky is not None and lit.is_sun in parts and lit.knows(sky):
                 lit.sky = sky
-                return
-            self.drop(lit)
-        if sky is not None:
+                parts.discard(lit.is_sun)
+            else:
+                self.drop(lit)
+        for sun in sorted(parts):
+            assert sky is not None
             if self._sky is None:
                 self._sky = SkyLight(self._gpu, self._lightmap, dict(self._rays.defines), PASS)
             self._streams += 1
-            self.sets.append(self._sky.lit(sky, STREAM + self._streams, self._passes_table()))
+            self.sets.append(self._sky.lit(sky, STREAM + self._streams, self._passes_table(), sun=sun))
 
     def follow(self, scene: Scene) -> None:
         """Materials, or the sky, are others. Of a set that is one material all is known, whatever it emits, also nothing; another
@@ -324,7 +331,7 @@ class DirectLight:
         if isinstance(lit, SkyLit):
             assert self._sky is not None
             textures, uniforms = self._sky.sums(lit, self._origins.normals)
-            self._sky.add.draw(target, textures=textures, uniforms=uniforms, mesh=mesh, blend=blend)
+            self._sky.add[lit.is_sun].draw(target, textures=textures, uniforms=uniforms, mesh=mesh, blend=blend)
             return
         exitance = lit.lamps.exitance_in(scene) / self._lightmap.unit
         self._add[lit.lamps.closed_form].draw(
@@ -337,15 +344,16 @@ class DirectLight:
         )
 
     def from_sky(self) -> F64:
-        """Power that the sky sends to the texels, RGB [W]: its irradiance of them, as it is known. Waits for the GPU."""
-        lit = next((lit for lit in self.sets if isinstance(lit, SkyLit)), None)
-        if lit is None or not lit.passes.any():
+        """Power that sky and sun send to the texels, RGB [W]: their irradiance, as it is known. Waits for the GPU."""
+        parts = [lit for lit in self.sets if isinstance(lit, SkyLit) and lit.passes.any()]
+        if not parts:
             return np.zeros(3)
         gpu, pool = self._gpu, self._lightmap.pool
         alone = gpu.texture(self._lightmap.size, 4, "f4")
         target = gpu.target(alone)
         mesh = Mesh(gpu, self._everywhere.tobytes(), QUAD_FORMAT, per_instance=True)
-        self._add_light(lit, self._lightmap.scene, target, mesh, None)
+        for nth, lit in enumerate(parts):
+            self._add_light(lit, self._lightmap.scene, target, mesh, "add" if nth else None)
         H = pool.tiles_from_image(np.frombuffer(alone.read(), np.float32).reshape(*self._lightmap.size[::-1], 4))
         gpu.release_all(mesh, target, alone)
         area = np.where(pool.surfaces.face >= 0, pool.surfaces.area, 0.0)

@@ -2,11 +2,13 @@
 
     H = U(n) Σ_k w_k V_k / Σ_k w_k,    w_k = L(ω_k) cos θ_k / p(ω_k),    p = c cos θ / π + (1 - c) p_sky(ω)
 
-With U, what the normal would receive unoccluded, beside it there is noise only where something stands before the sky.
+With U, what the normal would receive unoccluded, beside it there is noise only where something stands before the sky. The sun is
+a set of its own: rays to its disc, U = E cos θ.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,18 +20,19 @@ from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import upload
 from app.lightmap.tile_pool import Moves
-from app.scene.sky import Sky
+from app.scene.sky import SUN_ANGLE, Sky
 
 BY_COSINE = 0.5  # share of directions that are chosen by the cosine alone; all under a sky that is even
 
 
 @dataclass
 class SkyLit:
-    """What is known of the light of the sky. seen: Σ w V, RGB, and Σ over passes of V². all: Σ w. passes: of each slot."""
+    """What is known of the light of the sky, or of its sun. seen: Σ w V, RGB, and Σ over passes of V². all: Σ w. map,
+    unoccluded: of the sky alone. passes: of each slot."""
 
     sky: Sky
-    map: SkyMap
-    unoccluded: Texture
+    map: SkyMap | None
+    unoccluded: Texture | None
     seen: Texture
     all: Texture
     target: Framebuffer
@@ -37,47 +40,61 @@ class SkyLit:
     passes: NDArray[np.int64]
     passes_table: Texture
 
+    @property
+    def is_sun(self) -> bool:
+        return self.map is None
+
+    def knows(self, sky: Sky) -> bool:
+        """Whether all that is known holds for another sky as well, but for its scale."""
+        return self.sky.sun == sky.sun if self.is_sun else self.sky.same_shape(sky)
+
     def release(self, gpu: Gpu) -> None:
-        self.map.release()
-        gpu.release_all(self.target, self.seen, self.all, self.unoccluded, self.passes_table)
+        gpu.release_all(self.target, self.seen, self.all, self.passes_table)
+        if self.map is not None and self.unoccluded is not None:
+            self.map.release()
+            gpu.release_all(self.unoccluded)
 
 
 class SkyLight:
-    """Programs, and what they read, for the sky's light on one lightmap."""
+    """Programs, and what they read, for the light of sky and sun on one lightmap. shoot, add: by whether it is the sun."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, rays: dict[str, object], a_pass: int) -> None:
         """rays: defines of visibility/rays.glsl; a_pass: shadow rays in one."""
         self._gpu, self._lightmap = gpu, lightmap
         reads = lightmap.defines("MATERIAL_BITS", "TILE")
-        self.shoot = Pass(gpu, "direct_light/sky_rays", defines={"PASS": a_pass} | reads | rays, vertex="common/rects")
-        self.add = Pass(
-            gpu, "direct_light/sky_light", defines=lightmap.defines("MATERIAL_BITS", "TILE"), vertex="common/rects"
+        self.shoot, self.add = (
+            {sun: Pass(gpu, name, defines={"SUN": sun} | reads | more, vertex="common/rects") for sun in (False, True)}
+            for name, more in (("direct_light/sky_rays", {"PASS": a_pass} | rays), ("direct_light/sky_light", {}))
         )
 
-    def lit(self, sky: Sky, stream: int, passes_table: Texture) -> SkyLit:
-        """Of another sky, nothing of which is known yet."""
+    def lit(self, sky: Sky, stream: int, passes_table: Texture, *, sun: bool) -> SkyLit:
+        """Of another sky, or its sun, nothing of which is known yet."""
         gpu, size = self._gpu, self._lightmap.size
         seen, all_ = gpu.texture(size, 4, "f4"), gpu.texture(size, 4, "f4")
         target = gpu.target(seen, all_)
         target.clear()
+        passes = np.zeros(self._lightmap.pool.tiles, np.int64)
+        if sun:
+            return SkyLit(sky, None, None, seen, all_, target, stream, passes, passes_table)
         unoccluded = upload(gpu, irradiance_table(sky))
         unoccluded.filter = (gpu.ctx.LINEAR, gpu.ctx.LINEAR)
-        passes = np.zeros(self._lightmap.pool.tiles, np.int64)
         return SkyLit(sky, SkyMap(gpu, sky), unoccluded, seen, all_, target, stream, passes, passes_table)
 
     def reads(self, lit: SkyLit) -> tuple[dict[str, Texture], dict[str, Any]]:
         """Textures and uniforms of ``shoot``, besides origins and rays."""
-        share = 1.0 if lit.map.even else BY_COSINE
-        return lit.map.textures | {"t_passes": lit.passes_table}, {"u_stream": lit.stream, "u_by_cosine": share}
+        textures, uniforms = {"t_passes": lit.passes_table}, {"u_stream": lit.stream}
+        if lit.map is None:
+            return textures, uniforms | {"u_sun": sun_uniform(lit.sky)}
+        return textures | lit.map.textures, uniforms | {"u_by_cosine": 1.0 if lit.map.even else BY_COSINE}
 
     def sums(self, lit: SkyLit, normals: Texture) -> tuple[dict[str, Texture], dict[str, Any]]:
         """Textures and uniforms of ``add``."""
-        textures = {"t_seen": lit.seen, "t_all": lit.all, "t_unoccluded": lit.unoccluded}
-        scale = lit.sky.scale / self._lightmap.unit
-        return (
-            textures | {"t_passes": lit.passes_table, "t_origin_normal": normals},
-            {"u_scale": tuple(scale.tolist()), "u_size": self._lightmap.size},
-        )
+        textures = {"t_seen": lit.seen, "t_all": lit.all, "t_passes": lit.passes_table, "t_origin_normal": normals}
+        scale = (lit.sky.sun_irradiance if lit.is_sun else lit.sky.scale) / self._lightmap.unit
+        uniforms = {"u_scale": tuple(scale.tolist()), "u_size": self._lightmap.size}
+        if lit.unoccluded is None:
+            return textures, uniforms | {"u_sun": sun_uniform(lit.sky)[:3]}
+        return textures | {"t_unoccluded": lit.unoccluded}, uniforms
 
     def resized(self, lit: SkyLit, moves: Moves) -> None:
         """The tile pool has got another number of slots."""
@@ -86,4 +103,11 @@ class SkyLight:
         lit.target = self._gpu.target(lit.seen, lit.all)
 
 
-__all__ = ["SkyLight", "SkyLit"]
+def sun_uniform(sky: Sky) -> tuple[float, float, float, float]:
+    """As direct_light/sun.glsl has it."""
+    assert sky.sun is not None
+    x, y, z = sky.sun.direction.tolist()
+    return x, y, z, 2 * math.sin(SUN_ANGLE / 4) ** 2
+
+
+__all__ = ["SkyLight", "SkyLit", "sun_uniform"]

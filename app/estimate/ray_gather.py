@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.points import Points
+from app.direct_light.sky_light import sun_uniform
 from app.direct_light.sky_map import SkyMap
 from app.gpu import Gpu, Pass, ReadBack, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
@@ -101,7 +102,7 @@ class RayGather:
         self._write_nodes(position, normal, shifts)
         sky, scale = dict[str, Texture](), dict[str, object]()
         if self._sky is not None:
-            sky, scale = self._sky[1].textures, {"u_sky": tuple(self._sky[0].scale.tolist())}
+            sky, scale = self._sky[1].textures, sky_uniforms(self._sky[0])
         self._gather[self._sky is not None].draw(
             self._targets["samples"],
             textures={"t_nodes": self._textures["nodes"], "t_lamps": self._lamps} | self._seen_textures() | sky,
@@ -192,3 +193,9 @@ class RayGather:
 
     def _read(self, looked: ReadBack) -> F32:
         return np.frombuffer(looked.take(), np.float32).reshape(self.rows, -1, 4)
+
+
+def sky_uniforms(sky: Sky) -> dict[str, object]:
+    """See estimate/gather.frag.glsl."""
+    sun = (0.0, 1.0, 0.0, 0.0) if sky.sun is None else sun_uniform(sky)
+    return {"u_sky": tuple(sky.scale.tolist()), "u_facing_sun": tuple(sky.sun_irradiance.tolist()), "u_sun": sun}

@@ -122,7 +122,12 @@ class Sky:
     @property
     def emits(self) -> bool:
         """Whether any light comes from it."""
-        return bool(self.scale.max() > 0 and (self.sun is not None or self.shape.max() > 0))
+        return bool(self.scale.max() > 0 and (self.sun is not None or self.shines))
+
+    @property
+    def shines(self) -> bool:
+        """Whether any light would come from its map at another scale."""
+        return bool(self.shape.max() > 0)
 
     def as_dict(self) -> dict[str, Any]:
         """For reports."""

@@ -74,6 +74,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "PASS": (PASS,),
     "PICTURE": FLAG,
     "SKY": FLAG,
+    "SUN": FLAG,
     "TRACED": FLAG,
     "FINER": FLAG,
     "RADIUS": (0, 1, RADIUS),

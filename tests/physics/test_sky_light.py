@@ -8,7 +8,7 @@ from solver_scenes import NOISE, Solution, begin, grey, quads_scene
 
 from app.gpu import Gpu
 from app.scene.model import F64, Scene
-from app.scene.sky import Sky
+from app.scene.sky import Sky, Sun
 
 SKIES = ("gathering", "local")
 EVERY_SKY_SOLVER = pytest.mark.parametrize("solver", SKIES)
@@ -95,6 +95,26 @@ def test_a_bright_spot_of_the_sky_is_found(gpu: Gpu, solver: str) -> None:
     shade = lit.H[floor].mean(1) / open_.mean()
     assert np.average(shade, weights=lit.area[floor]) == pytest.approx(0.75, abs=0.01)
     assert shade.min() < 0.01
+    lit.release()
+
+
+@EVERY_SKY_SOLVER
+def test_the_sun_falls_on_a_floor_as_the_cosine(gpu: Gpu, solver: str) -> None:
+    """E cos θ, in one colour more than in another; in the shadow of a wall that stands in its way, nothing."""
+    sun = Sun(0.0, 30.0)  # behind the wall, whose shadow of 2 / tan 30° covers all of the floor
+    dark = np.zeros((2, 4, 3), np.float32)
+    sky = Sky("image", sun=sun, image=dark, strength=2.0)
+    floor = quads_scene([FLOOR], [grey(0.5)]).with_sky(sky)
+    lit = solved(gpu, floor, solver)
+    expected = 0.5 * sky.sun_irradiance
+    assert np.allclose(lit.H, expected, rtol=1e-3)
+    assert np.allclose(lit.book.emitted, 4 * expected, rtol=1e-3)
+    lit.release()
+    wide = [[-1, 0, 0], [3, 0, 0], [3, 2, 0], [-1, 2, 0]]
+    lit = solved(gpu, quads_scene([FLOOR, wide], [grey(0.0, double_sided=True)]).with_sky(sky), solver)
+    floor_, back = lit.normal[:, 1] > 0.5, lit.normal[:, 2] < -0.5
+    assert np.allclose(lit.H[floor_], 0.0, atol=1e-3 * expected.max())
+    assert np.allclose(lit.H[back], np.cos(np.radians(30)) * sky.sun_irradiance, rtol=1e-3)
     lit.release()
 
 

@@ -9,7 +9,9 @@
 
 #if SKY
 #include "direct_light/sky_sample.glsl"
-uniform vec3 u_sky;  // scale of its map [W/(sr m²)]
+#include "direct_light/sun.glsl"
+uniform vec3 u_sky;           // scale of its map [W/(sr m²)]
+uniform vec3 u_facing_sun;    // what faces the sun receives of it [W/m²]
 #endif
 uniform sampler2D t_lamps;  // a triangle each: share of the power up to it, slot
 uniform int u_lamps;
@@ -64,9 +66,14 @@ vec4 from_beyond(Node node, vec3 direction) {
 
 vec4 from_sky(Node node, int ray) {
 #if SKY
-    vec3 direction = sky_direction(fract(node.lamp_shift.yz + float(ray) * R2));
-    if (dot(direction, node.normal) <= 0.0 || any_hit(node.origin, direction, 0.0, REACH)) return vec4(0.0);
-    return from_beyond(node, direction);
+    vec2 share = fract(node.lamp_shift.yz + float(ray) * R2);
+    vec3 direction = sky_direction(share);
+    vec4 light = vec4(0.0);
+    if (dot(direction, node.normal) > 0.0 && !any_hit(node.origin, direction, 0.0, REACH)) light = from_beyond(node, direction);
+    vec3 to_sun = sun_direction(share);
+    float cosine = dot(to_sun, node.normal);
+    if (u_facing_sun == vec3(0.0) || cosine <= 0.0 || any_hit(node.origin, to_sun, 0.0, REACH)) return light;
+    return light + cosine * vec4(u_facing_sun, dot(u_facing_sun, vec3(1.0 / 3.0)));
 #else
     return vec4(0.0);
 #endif
