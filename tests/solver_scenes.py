@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -53,6 +53,12 @@ def quads_scene(quads: ArrayLike, materials: Sequence[Material], ids: Sequence[i
         objects=tuple(f"quad {k}" for k in range(count)),
         materials=tuple(materials),
     )
+
+
+def with_uv(scene: Scene) -> Scene:
+    """Quads with texture coordinates that fill each of them."""
+    uv = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32)[[(0, 1, 2), (0, 2, 3)]]
+    return replace(scene, uv0=np.tile(uv, (len(scene.objects), 1, 1)))
 
 
 def grey(albedo: float, exitance: float = 0.0, *, double_sided: bool = False) -> Material:

@@ -96,6 +96,9 @@ class FrameRenderer:
         self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
         sky = lightmap.scene.sky if layer == "combined" else None
         self._background.draw(picture.target, view, size[0] / size[1], sky, display, scale)
+        self._gpu.ctx.enable_direct(GL_DEPTH_CLAMP)
+        surfaces.draw_blended(picture.target)
+        self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
         if rays is not None:
             rays.draw(picture.target, clip_from_local, picture.size, display, samples)
         if picture.own:

@@ -38,6 +38,7 @@ class Picker:
     def __init__(self, gpu: Gpu) -> None:
         self._textures = [gpu.texture((1, 1), 2, "u4"), gpu.texture((1, 1), 4, "f4"), gpu.texture((1, 1), 4, "f4")]
         self._gpu, self._pass = gpu, Pass(gpu, "render/pick")
+        self._sheer_pass: Pass | None = None
         self._depth = gpu.depth_texture((1, 1))
         self._target = gpu.target(*self._textures, depth=self._depth)
 
@@ -55,13 +56,20 @@ class Picker:
             mesh=surfaces.mesh.seen(clip_from_local),
             depth=True,
         )
+        sheer = surfaces.mesh.sheer
+        if sheer is not None:
+            self._sheer_pass = self._sheer_pass or Pass(self._gpu, "render/pick", defines={"OPACITY": True})
+            for mesh in sheer.meshes:
+                uniforms = {"u_clip_from_local": uniform_matrix(clip_from_local)}
+                self._sheer_pass.draw(self._target, textures=sheer.textures, uniforms=uniforms, mesh=mesh, depth=True)
         ids, atlas, local = (
             np.frombuffer(texture.read(), dtype)
             for texture, dtype in zip(self._textures, (np.uint32, np.float32, np.float32), strict=True)
         )
         if ids[0] == 0:
             return None
-        lightmap, triangle, back = surfaces.lightmap, surfaces.mesh.triangle(int(ids[0]) - 1), bool(ids[1])
+        lightmap, nth, back = surfaces.lightmap, int(ids[0]) - 1, bool(ids[1] & 1)
+        triangle = int(sheer.triangles[nth]) if sheer is not None and ids[1] & 2 else surfaces.mesh.triangle(nth)
         x, y, z = lightmap.space.world_from_local(local[:3].astype(np.float64)).tolist()
         hit = PickHit(triangle, back, int(lightmap.scene.material_ids[triangle]), (x, y, z))
         charts = lightmap.charts

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from app.gpu import Framebuffer, Gpu, Pass, Texture
@@ -30,7 +30,8 @@ class Surfaces:
         self._texels = DisplayTexels(gpu, lightmap, self._ages, BORDER[interpolation])
         self._others: DisplayTexels | None = None  # of a reference's light
         self._sides = True, False  # whether the solution and the reference were shown last
-        self._passes = {(overlay, False): self._pass(overlay, bicubic=False) for overlay in (False, True)}
+        self._passes = {(overlay, False, False): self._pass(overlay, bicubic=False) for overlay in (False, True)}
+        self._blend: Callable[[Framebuffer], None] | None = None
         self._shown: dict[str, Texture] = {}
         self._live = False
 
@@ -78,12 +79,42 @@ class Surfaces:
         if overlay:
             uniforms |= {"u_grid": float(display.grid), "u_checker": layer.checker, "u_shooter": marked or NOWHERE}
             uniforms |= self._of_leaves
-        kind = overlay, layer.smooth and display.interpolation == "bicubic"
-        if kind not in self._passes:
-            self._passes[kind] = self._pass(*kind)
-        mesh = self.mesh.seen(clip_from_local)
+        bicubic = layer.smooth and display.interpolation == "bicubic"
+        program, mesh = self._pass_of(overlay, bicubic), self.mesh.seen(clip_from_local)
         for textures, part in shown:
-            self._passes[kind].draw(target, textures=textures, uniforms=uniforms, mesh=mesh, depth=True, scissor=part)
+            program.draw(target, textures=textures, uniforms=uniforms, mesh=mesh, depth=True, scissor=part)
+        if (sheer := self.mesh.sheer) is None:
+            return
+        program, cut_by = self._pass_of(overlay, bicubic, sheer=True), sheer.textures
+        if sheer.cut_out is not None:
+            for textures, part in shown:
+                program.draw(
+                    target, textures=textures | cut_by, uniforms=uniforms, mesh=sheer.cut_out, depth=True, scissor=part
+                )
+
+        def blend(target: Framebuffer) -> None:
+            mesh = sheer.from_far_to_near(clip_from_local)
+            if mesh is None:
+                return
+            target.depth_mask = False
+            for textures, part in shown:
+                program.draw(
+                    target,
+                    textures=textures | cut_by,
+                    uniforms=uniforms,
+                    mesh=mesh,
+                    depth=True,
+                    scissor=part,
+                    blend="over",
+                )
+            target.depth_mask = True
+
+        self._blend = blend
+
+    def draw_blended(self, target: Framebuffer) -> None:
+        """Those that are blended with what lies behind them, as ``draw`` drew the others, when all that is there."""
+        if self._blend is not None:
+            self._blend(target)
 
     def _fitting(self, texels: DisplayTexels | None, display: DisplayOptions) -> tuple[DisplayTexels, bool]:
         """These, or others of the size that is wanted; and whether they are new: a part of them would be black."""
@@ -125,8 +156,16 @@ class Surfaces:
         width, height = self._texels.size
         return 1.0 / width, 1.0 / height, self._shown["t_shown_pages"].width / self.lightmap.charts.size[0]
 
-    def _pass(self, overlay: bool, bicubic: bool) -> Pass:
-        defines = {"OVERLAY": overlay, "BICUBIC": bicubic, "PLACES_WIDTH": PLACES_WIDTH}
+    def _pass_of(self, overlay: bool, bicubic: bool, sheer: bool = False) -> Pass:
+        kind = overlay, bicubic, sheer
+        if kind not in self._passes:
+            self._passes[kind] = self._pass(*kind)
+        return self._passes[kind]
+
+    def _pass(self, overlay: bool, bicubic: bool, sheer: bool = False) -> Pass:
+        defines = {"OVERLAY": overlay, "BICUBIC": bicubic, "PLACES_WIDTH": PLACES_WIDTH} | (
+            {"OPACITY": True} if sheer else {}
+        )
         return Pass(self._gpu, "render/surfaces", defines=defines, label="surfaces")
 
     def release(self) -> None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from solver_scenes import EVERY_SOLVER, Solution, begin, grey, quads_scene, room
+from solver_scenes import EVERY_SOLVER, Solution, begin, grey, quads_scene, room, with_uv
 
 from app.atlas.parametrize import parametrize
 from app.gpu import Gpu
@@ -51,12 +51,6 @@ def board_scene(board: Material | None) -> Scene:
     """A black floor, a lamp that faces it, and a board between them that is wider than both."""
     quads = [square(0.0, 1.0), square(2.0, 0.5, down=True), *([] if board is None else [square(1.0, 1.5)])]
     return with_uv(quads_scene(quads, [grey(0.0), grey(0.0, 10.0), board or grey(0.5)], range(len(quads))))
-
-
-def with_uv(scene: Scene) -> Scene:
-    """Texture coordinates that fill each quad."""
-    uv = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32)[[(0, 1, 2), (0, 2, 3)]]
-    return replace(scene, uv0=np.tile(uv, (len(scene.objects), 1, 1)))
 
 
 LOCAL = {"patches": 1024, "patch_level": 0, "bits": 32, "rays": 256, "shadow_rays": 64, "missing": 0.0}
