@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.scene.gltf_draco import decompress
 from app.scene.gltf_file import GltfFile
 from app.scene.gltf_materials import UNKNOWN_ALBEDO, read_materials
 from app.scene.gltf_pose import joint_matrices, morphed, skinning, turned_normals
@@ -160,6 +161,7 @@ class _Reader:
         if primitive.mode < TRIANGLES or "POSITION" not in attributes:
             self._not_triangles += 1
             return None
+        decompress(self.file, primitive, where)
         positions = self.file.accessor(attributes["POSITION"], "VEC3")
         count = len(positions)
         values: list[NDArray[Any] | None] = []

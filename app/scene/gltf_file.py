@@ -25,10 +25,12 @@ T = TypeVar("T")
 
 GLB_MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
+UNCOMPRESSED = "write it uncompressed first, e.g. gltf-transform copy in.glb out.glb"
 # Extensions that a file may require: read here, or without effect on diffuse light.
 KNOWN_EXTENSIONS = {
     "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -46,10 +48,11 @@ KNOWN_EXTENSIONS = {
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 }
-COMPRESSIONS = {
-    "EXT_meshopt_compression": "meshopt",
-    "KHR_draco_mesh_compression": "Draco",
-    "KHR_meshopt_compression": "meshopt",
+COMPRESSIONS = {  # what compresses a file, and the way out where it cannot be read
+    "EXT_meshopt_compression": ("meshopt", UNCOMPRESSED),
+    "KHR_draco_mesh_compression": ("Draco", f"install what reads it, pip install 'glowtree[draco]', or {UNCOMPRESSED}"),
+    "KHR_meshopt_compression": ("meshopt", UNCOMPRESSED),
+    "KHR_texture_basisu": ("KTX2", "write its pictures as PNG first, e.g. gltf-transform ktxdecompress in.glb out.glb"),
 }
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -76,9 +79,15 @@ class GltfFile:
             raise self.error(first_problem(error)) from error
         self._check_versions()
         self._buffers: dict[int, memoryview] = {}
+        self._filled: dict[int, NDArray[Any]] = {}
 
     def error(self, reason: str) -> SceneError:
         return SceneError(self.path, reason)
+
+    def compressed(self, extension: str) -> SceneError:
+        """The error that this extension's data cannot be read here."""
+        what, way_out = COMPRESSIONS[extension]
+        return self.error(f"compressed with {what} ({extension}); {way_out}")
 
     def pick(self, things: Sequence[T], index: int, what: str) -> T:
         """``things[index]``, or the SceneError that there is no such thing."""
@@ -117,12 +126,9 @@ class GltfFile:
         if not self.document.asset.version.startswith("2."):
             raise self.error(f"glTF version {self.document.asset.version}: only 2.x can be read")
         for name in self.document.extensions_required:
-            if name in COMPRESSIONS:
-                raise self.error(
-                    f"compressed with {COMPRESSIONS[name]} ({name}); "
-                    "write it uncompressed first, e.g. gltf-transform copy in.glb out.glb"
-                )
             if name not in KNOWN_EXTENSIONS:
+                if name in COMPRESSIONS:
+                    raise self.compressed(name)
                 raise self.error(f"requires the extension {name}, which is not supported")
 
     def _buffer(self, index: int) -> memoryview:
@@ -136,6 +142,8 @@ class GltfFile:
 
     def _buffer_data(self, index: int, buffer: Buffer) -> bytes | memoryview:
         if buffer.uri is None:
+            if buffer.extensions.ext_meshopt is not None or buffer.extensions.khr_meshopt is not None:
+                raise self.compressed("EXT_meshopt_compression")
             if index != 0 or self._bin is None:
                 raise self.error(f"buffer {index} has no data")
             return self._bin
@@ -168,6 +176,20 @@ class GltfFile:
             raise self.error(f"bufferView {index} reaches past the end of buffer {view.buffer}")
         return buffer[view.byte_offset : view.byte_offset + view.byte_length]
 
+    def is_empty(self, index: int | None) -> bool:
+        """Whether an accessor holds zeros only: what extensions fill."""
+        if index is None or index >= len(self.document.accessors):
+            return False
+        accessor = self.document.accessors[index]
+        return accessor.buffer_view is None and accessor.sparse is None
+
+    def fill(self, index: int, values: NDArray[Any]) -> None:
+        """Let ``values`` (n, components) be those of an accessor."""
+        accessor = self.pick(self.document.accessors, index, "accessor")
+        if values.ndim != 2 or values.shape[1] != COMPONENTS.get(accessor.type):
+            raise self.error(f"accessor {index} is {accessor.type}: its compressed data are not")
+        self._filled[index] = values
+
     def accessor(self, index: int, *kinds: str) -> NDArray[Any]:
         """(count, components) values of an accessor of one of these types; normalized integers become f32."""
         accessor = self.pick(self.document.accessors, index, "accessor")
@@ -175,6 +197,9 @@ class GltfFile:
             raise self.error(f"accessor {index} is {accessor.type}: {' or '.join(kinds)} is needed")
         if accessor.count > MAX_ELEMENTS:
             raise self.error(f"accessor {index} has {accessor.count:,} elements: at most {MAX_ELEMENTS:,} are allowed")
+        if index in self._filled:
+            values = self._filled[index]
+            return _normalized(values) if accessor.normalized and values.dtype.kind in "iu" else values
         width, dtype = COMPONENTS[accessor.type], np.dtype(DTYPES[accessor.component_type])
         if accessor.buffer_view is None:
             values = np.zeros((accessor.count, width), dtype)

@@ -25,9 +25,19 @@ class Asset(Model):
     version: str
 
 
+class Empty(Model):
+    pass
+
+
+class BufferExtensions(Model):
+    ext_meshopt: Empty | None = Field(default=None, alias="EXT_meshopt_compression")
+    khr_meshopt: Empty | None = Field(default=None, alias="KHR_meshopt_compression")
+
+
 class Buffer(Model):
     uri: str | None = None
     byte_length: Size
+    extensions: BufferExtensions = BufferExtensions()
 
 
 class BufferView(Model):
@@ -126,10 +136,6 @@ class Transmission(Model):
     transmission_texture: TextureInfo | None = None
 
 
-class Empty(Model):
-    pass
-
-
 class MaterialExtensions(Model):
     emissive_strength: EmissiveStrength | None = Field(default=None, alias="KHR_materials_emissive_strength")
     specular_glossiness: SpecularGlossiness | None = Field(default=None, alias="KHR_materials_pbrSpecularGlossiness")
@@ -148,12 +154,22 @@ class Material(Model):
     extensions: MaterialExtensions = MaterialExtensions()
 
 
+class Draco(Model):
+    buffer_view: Index
+    attributes: dict[str, Index]
+
+
+class PrimitiveExtensions(Model):
+    draco: Draco | None = Field(default=None, alias="KHR_draco_mesh_compression")
+
+
 class Primitive(Model):
     attributes: dict[str, Index]
     indices: Index | None = None
     material: Index | None = None
     targets: list[dict[str, Index]] = []
     mode: Annotated[int, Field(ge=0, le=6)] = 4
+    extensions: PrimitiveExtensions = PrimitiveExtensions()
 
 
 class Mesh(Model):

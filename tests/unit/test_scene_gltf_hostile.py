@@ -118,8 +118,15 @@ HOSTILE: dict[str, tuple[Callable[[Gltf], None] | Gltf, str]] = {
     "long cycle": (lambda g: (merge("nodes.0.children", [1])(g), merge("nodes.1.children", [0])(g)) and None, "cycle"),
     "two parents": (merge("nodes.2", {"children": [0]}), "no triangles|twice"),
     "required extension": (merge("extensionsRequired", ["EXT_magic"]), "EXT_magic"),
-    "draco": (merge("extensionsRequired", ["KHR_draco_mesh_compression"]), "compressed with Draco"),
     "meshopt": (merge("extensionsRequired", ["EXT_meshopt_compression"]), "compressed with meshopt"),
+    "meshopt, not required": (
+        merge("buffers", [{"byteLength": 9, "extensions": {"EXT_meshopt_compression": {"fallback": True}}}]),
+        "compressed with meshopt (EXT_meshopt_compression); write it uncompressed",
+    ),
+    "KTX2": (
+        merge("extensionsRequired", ["KHR_texture_basisu"]),
+        "compressed with KTX2 (KHR_texture_basisu); write its",
+    ),
     "version 1": (merge("asset.version", "1.0"), "version 1.0"),
     "no asset": (merge("asset", {}), "asset.version"),
     "mesh": (merge("nodes.0.mesh", 7), "mesh 7 does not exist: there are 1"),
