@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from app.atlas.charts import DEFAULT_TILE
+from app.atlas.cuts import cut_at_contacts
 from app.atlas.parametrize import parametrize
 from app.errors import UserError
 from app.gpu import Gpu
@@ -248,7 +249,8 @@ def begin(
 ) -> Solution:
     """The scene before any work. options: of LightmapOptions, and of solvers, each of which takes its own. Where leaves come and
     go, texels and density are those of the roots, which uniform texels are as fine as, and shooting levels count from there."""
-    charts = parametrize(scene, texels=texels, density=density, tile=tile)
+    cut = cut_at_contacts(scene)
+    scene, charts = cut.scene, parametrize(cut.scene, texels=texels, density=density, tile=tile, ends=cut.ends)
     held = {spec.name: options.pop(spec.name) for spec in specs(LightmapOptions) if spec.name in options}
     gathers = {spec.name: options.pop(spec.name) for spec in specs(GatheringOptions) if spec.name in options}
     if solver == "local":

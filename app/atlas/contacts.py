@@ -115,12 +115,25 @@ def hidden_pieces(
         faces = faces_of[one]
         corners = all_.corners[face_triangle[faces]]
         axes = np.linalg.svd(up[one : one + 1])[2][1:].T  # (3, 2), of the plane
-        lying = shapely.polygons(np.concatenate([all_.corners[all_.members[k]] for k in lid]) @ axes)
-        cover = shapely.union_all(lying[shapely.area(lying) > 0])
-        piece, which = _cut(corners @ axes, cover)
+        piece, which = _cut(corners @ axes, _cover(all_, lid, axes))
         pieces.append(_on_faces(piece, corners[which] @ axes, face_uv[faces[which]]))
         owners.append(faces[which])
     return Hidden(np.concatenate(pieces), np.concatenate(owners), left_out)
+
+
+def covers(
+    points: F64, triangles: I32, facet: I32, double_sided: NDArray[np.bool_], own: I64, axes: F64, flat: float
+) -> tuple[dict[int, shapely.Geometry], dict[int, shapely.Geometry]]:
+    """What lies on the fronts of some facets, own (k,), and on their backs: by the place in ``own``, in axes (k, 3, 2) of their
+    planes. points (n, 3) from their least, triangles (m, 3): welded; facet (m,) of them, whether they have two sides (m,)."""
+    all_ = _Facets.of(points, triangles, facet, double_sided, flat)
+    up = all_.normal[own]
+    lids, _ = _lids(all_, np.tile(own, 2), np.concatenate([up, -up]), flat, flat)
+    found: tuple[dict[int, shapely.Geometry], dict[int, shapely.Geometry]] = {}, {}
+    for one, lid in lids:
+        back, nth = divmod(one, len(own))
+        found[back][nth] = _cover(all_, lid, axes[nth])
+    return found
 
 
 def hidden_points(scene: Scene, triangle: I32, back: NDArray[np.bool_], weights: F64) -> NDArray[np.bool_]:
@@ -198,6 +211,12 @@ def _boxes_that_meet(all_: _Facets, own: I64, lids: I64, axis: I64, within: floa
     side, lid = np.concatenate(sides), np.concatenate(others)
     order = np.argsort(side, kind="stable")
     return side[order], lid[order]
+
+
+def _cover(all_: _Facets, lid: I64, axes: F64) -> shapely.Geometry:
+    """All of these facets, in axes (3, 2) of their plane."""
+    lying = shapely.polygons(np.concatenate([all_.corners[all_.members[k]] for k in lid]) @ axes)
+    return shapely.union_all(lying[shapely.area(lying) > 0])
 
 
 def _cut(faces: F64, cover: shapely.Geometry) -> tuple[F64, I64]:

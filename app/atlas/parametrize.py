@@ -13,9 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from app.atlas.charts import ALIGN, DEFAULT_TILE, GAP, Charts
 from app.atlas.contacts import hidden_pieces
+from app.atlas.cuts import GOES_ON
 from app.atlas.packing import MAX_SIDE, outlines, pack
 from app.atlas.rectangles import Rectangles, find_rectangles
 from app.atlas.sides import Sides, distinct_rows, facets, lit_sides, scene_size, totals, weld
@@ -58,6 +61,7 @@ def parametrize(
     texels: int | None = None,
     tile: int = DEFAULT_TILE,
     roots: bool = False,
+    ends: NDArray[np.uint8] | None = None,
     progress: Progress | None = None,
     time_limit: float | None = None,
 ) -> Charts:
@@ -78,7 +82,7 @@ def parametrize(
     report("weld", 0.0)
     points, corners = weld(scene)
     facet = facets(points, corners, scene.material_ids, scene_size(scene))
-    layout, method, warnings = _unfold(scene, lit, points, corners, facet, time_limit, progress)
+    layout, method, warnings = _unfold(scene, lit, points, corners, facet, ends, time_limit, progress)
     report("pack", 0.0)
     if density is None:
         aim = texels if texels is not None else default_texels(len(lit.triangle), roots)
@@ -137,6 +141,7 @@ def _unfold(
     points: F64,
     corners: I32,
     facet: I32,
+    ends: NDArray[np.uint8] | None,
     time_limit: float | None,
     progress: Progress | None,
 ) -> tuple[Layout, str, tuple[str, ...]]:
@@ -164,7 +169,41 @@ def _unfold(
     flat = int(unfolded.chart.max(initial=-1)) + 1 - unfolded.by_xatlas
     kinds = ((count, "rectangles"), (unfolded.by_xatlas, "xatlas charts"), (flat, "flat pieces"))
     method = ", ".join(f"{number} {kind}" for number, kind in kinds if number)
-    return _measured(chart, uv, rectangles.size, lit), method, unfolded.warnings
+    size = rectangles.size
+    if ends is not None:
+        chart, uv, size = _parted(chart, uv, size, corners, ends)
+    return _measured(chart, uv, size, lit), method, unfolded.warnings
+
+
+def _parted(
+    chart: I32, uv: F64, rectangle_size: F64, corners: I32, ends: NDArray[np.uint8]
+) -> tuple[I32, F64, NDArray[np.float64]]:
+    """Charts in the pieces that are joined at edges where they go on: chart, uv, and the sizes of those that are pieces of
+    rectangles, which come first."""
+    some = np.flatnonzero((chart >= 0) & np.isin(chart, chart[ends.any(1)]))
+    start, end = corners[some].reshape(-1), np.roll(corners[some], -1, axis=1).reshape(-1)
+    owner = np.repeat(chart[some], 3)
+    edge = distinct_rows(owner, np.minimum(start, end), np.maximum(start, end))[1]
+    joins = np.flatnonzero(ends[some].reshape(-1) == GOES_ON)
+    size = len(some) + len(edge)
+    graph = coo_array((np.ones(len(joins), bool), (joins // 3, len(some) + edge[joins])), shape=(size, size))
+    label = np.zeros(len(chart), np.int32)
+    label[some] = connected_components(graph, directed=False)[1][: len(some)]
+    used = np.flatnonzero(chart >= 0)
+    first, piece, _ = distinct_rows(chart[used], label[used])
+    of = chart[used[first]]
+    pieces = np.full(len(chart), -1, np.int32)
+    pieces[used] = piece
+    count = int((of < len(rectangle_size)).sum())
+    low, high = np.zeros((count, 2)), rectangle_size[of[:count]]
+    parted = np.isin(of[:count], chart[some])
+    low[parted], high[parted] = np.inf, -np.inf
+    mine = some[pieces[some] < count]
+    np.minimum.at(low, pieces[mine], uv[mine].min(axis=1))
+    np.maximum.at(high, pieces[mine], uv[mine].max(axis=1))
+    moved = uv.copy()
+    moved[mine] -= low[pieces[mine]][:, None]
+    return pieces, moved, high - low
 
 
 def _in_rectangle(corners: F64, rectangles: Rectangles, chart: I32) -> F64:

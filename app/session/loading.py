@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.atlas.charts import Charts
+from app.atlas.cuts import cut_at_contacts
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
 from app.lightmap.options import LightmapOptions
@@ -46,22 +47,24 @@ def read_and_unfold(
     sky: Sky | None = None,
     roots: bool = False,
 ) -> tuple[Scene, Charts, dict[str, float]]:
-    """The scene, its charts, and the seconds of both stages. file: its unit and axes, guessed if None. roots: whether texels are
-    the coarsest of quadtrees. Raises UserError (SceneError)."""
+    """The scene, cut where its surfaces meet, its charts, and the seconds of both stages. file: its unit and axes, guessed if
+    None. roots: whether texels are the coarsest of quadtrees. Raises UserError (SceneError)."""
     start = time.perf_counter()
     tell("reading", 0.0)
     scene = source if isinstance(source, Scene) else load_scene(source, file, default_light=default_light, sky=sky)
     middle = time.perf_counter()
     tell("unfolding", 0.1)
+    cut = cut_at_contacts(scene)
     charts = parametrize(
-        scene,
+        cut.scene,
+        ends=cut.ends,
         density=atlas.density,
         texels=atlas.texels,
         tile=atlas.tile,
         roots=roots,
         progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share),
     )
-    return scene, charts, {"read": middle - start, "unfold": time.perf_counter() - middle}
+    return cut.scene, charts, {"read": middle - start, "unfold": time.perf_counter() - middle}
 
 
 def load(

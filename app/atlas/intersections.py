@@ -1,0 +1,153 @@
+"""Where triangles of different surfaces meet: segments in which they touch or pierce each other.
+
+Lengths are over the scene's size. Triangles that are joined edge by edge are one surface, and not looked at.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from app.atlas.sides import FLAT, FLAT_ANGLE
+from app.scene.model import F64, I32
+
+NEAR = 4 * FLAT  # what is no farther apart is in one place
+MOST_PAIRS = 1 << 24  # of triangles whose boxes meet, beyond which none is looked at: soups of loose triangles
+DENSE = 256  # triangles of a surface, from which on it is looked at by itself
+BLOCK = 1 << 16  # pairs of triangles that are looked at at once
+
+I64 = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Where other triangles meet some: triangle (k,), ends (k, 2, 3); whether the other one reaches to its front, and to its
+    back (k,)."""
+
+    triangle: I64
+    ends: F64
+    front: Mask
+    back: Mask
+
+    def only(self, which: Mask | I64) -> Contacts:
+        return Contacts(self.triangle[which], self.ends[which], self.front[which], self.back[which])
+
+
+def surfaces(triangles: I32) -> I64:
+    """(m,) the number of the surface of each triangle: those that share an edge, two and no more, are of one."""
+    count = len(triangles)
+    start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
+    order = np.lexsort((np.maximum(start, end), np.minimum(start, end)))
+    low, high = np.minimum(start, end)[order], np.maximum(start, end)[order]
+    first = np.flatnonzero(np.r_[True, (low[1:] != low[:-1]) | (high[1:] != high[:-1])])
+    two = first[np.diff(np.r_[first, 3 * count]) == 2]
+    pairs = order[two] // 3, order[two + 1] // 3
+    graph = coo_array((np.ones(len(two), bool), pairs), shape=(count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def contacts(corners: F64, surface: I64) -> tuple[Contacts, bool]:
+    """Where triangles (m, 3, 3) of different surfaces meet; whether there are too many to say."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
+    found = [Contacts(np.empty(0, np.int64), np.empty((0, 2, 3)), np.empty(0, bool), np.empty(0, bool))]
+    pairs = 0
+    for one, other in _pairs_that_meet(corners.min(1) - FLAT, corners.max(1) + FLAT, surface):
+        pairs += len(one)
+        if pairs > MOST_PAIRS:
+            return found[0], True
+        for first in range(0, len(one), BLOCK):
+            block = slice(first, first + BLOCK)
+            found += _meeting(corners, normals, one[block], other[block])
+    return Contacts(
+        *(np.concatenate([getattr(f, name.name) for f in found]) for name in dataclasses.fields(Contacts))
+    ), False
+
+
+def _pairs_that_meet(low: F64, high: F64, surface: I64) -> Iterator[tuple[I64, I64]]:
+    """Pairs of triangles of different surfaces whose boxes meet, in blocks."""
+    order = np.argsort(surface, kind="stable")
+    first = np.flatnonzero(np.diff(surface[order], prepend=-1))
+    if len(first) < 2:
+        return
+    lows, highs = np.minimum.reduceat(low[order], first), np.maximum.reduceat(high[order], first)
+    x, y, z = np.argsort(-np.ptp(np.concatenate([low, high]), axis=0))
+    boxes = shapely.box(low[:, x], low[:, y], high[:, x], high[:, y])
+    whole = shapely.STRtree(shapely.box(lows[:, x], lows[:, y], highs[:, x], highs[:, y]))
+    near, beside = [], []
+    for start in range(0, len(low), BLOCK):
+        one, other = whole.query(boxes[start : start + BLOCK])
+        one = one + start
+        meets = (surface[one] != other) & (low[one, z] <= highs[other, z]) & (high[one, z] >= lows[other, z])
+        near.append(one[meets])
+        beside.append(other[meets])
+    # a surface of many triangles is looked at by itself, or most pairs would be its own neighbours
+    group = np.where(np.diff(np.append(first, len(low))) > DENSE, np.arange(len(first)), -1)
+    mine, theirs = np.concatenate(near), group[np.concatenate(beside)]
+    at = np.argsort(theirs, kind="stable")
+    for those in np.split(at, np.flatnonzero(np.diff(theirs[at])) + 1) if len(at) else ():
+        asked, members = np.unique(mine[those]), np.flatnonzero(group[surface] == theirs[those[0]])
+        tree = shapely.STRtree(boxes[members])
+        for start in range(0, len(asked), BLOCK):
+            one, other = tree.query(boxes[asked[start : start + BLOCK]])
+            one, other = asked[one + start], members[other]
+            meets = (one < other) & (surface[one] != surface[other])  # each is asked for the other
+            meets &= (low[one, z] <= high[other, z]) & (high[one, z] >= low[other, z])
+            yield one[meets], other[meets]
+
+
+def _meeting(corners: F64, normals: F64, one: I64, other: I64) -> list[Contacts]:
+    """Where pairs of triangles meet in a segment: those of each first one, and of each other one."""
+    heights = [
+        _heights(corners, normals, a, b) for a, b in ((one, other), (other, one))
+    ]  # of b's corners over a's plane
+    along = np.cross(normals[one], normals[other])
+    slope = np.linalg.norm(along, axis=1)
+    maybe = slope > FLAT_ANGLE
+    for h in heights:
+        maybe &= (h.min(1) <= 0) & (h.max(1) >= 0)
+    one, other = one[maybe], other[maybe]
+    over_one, over_other = (h[maybe] for h in heights)
+    along = along[maybe] / slope[maybe, None]
+    low, start, high, end = [], [], [], []
+    for triangle, h in ((one, over_other), (other, over_one)):
+        least, first, most, last = _span(corners[triangle], h, along)
+        low.append(least)
+        start.append(first)
+        high.append(most)
+        end.append(last)
+    later, sooner = low[0] >= low[1], high[0] <= high[1]
+    ends = np.stack([np.where(later[:, None], *start), np.where(sooner[:, None], *end)], axis=1)
+    long = np.where(sooner, *high) - np.where(later, *low) > NEAR
+    found = []
+    for triangle, h in ((one, over_one), (other, over_other)):
+        found.append(Contacts(triangle[long], ends[long], h.max(1)[long] > 0, h.min(1)[long] < 0))
+    return found
+
+
+def _heights(corners: F64, normals: F64, a: I64, b: I64) -> F64:
+    """(p, 3) of the corners of triangles b over the planes of triangles a; 0 where they lie in them."""
+    h = np.einsum("pck,pk->pc", corners[b] - corners[a, :1], normals[a])
+    return np.where(np.abs(h) <= FLAT, 0.0, h)
+
+
+def _span(corners: F64, heights: F64, along: F64) -> tuple[F64, F64, F64, F64]:
+    """How far triangles (p, 3, 3) reach along a line that their plane has with another one: least, and there; most, and there.
+    heights (p, 3): over the other one."""
+    following, h = np.roll(corners, -1, axis=1), np.roll(heights, -1, axis=1)
+    crosses = heights * h < 0
+    share = heights / np.where(crosses, heights - h, 1.0)
+    places = np.concatenate([corners, corners + share[..., None] * (following - corners)], axis=1)
+    there = np.concatenate([heights == 0, crosses], axis=1)
+    t = np.einsum("pck,pk->pc", places, along)
+    least, most = np.where(there, t, np.inf), np.where(there, t, -np.inf)
+    row = np.arange(len(t))
+    return least.min(1), places[row, least.argmin(1)], most.max(1), places[row, most.argmax(1)]
