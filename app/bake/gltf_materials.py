@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import math
 from typing import Any
@@ -24,6 +25,7 @@ class MaterialWriter:
         self._glb, self._materials, self._lightmap = glb, materials, lightmap
         self._written: dict[tuple[int, bool, bool], int] = {}
         self._images: dict[int, int] = {}
+        self._with_alpha = [_with_alpha(material) for material in materials]
         self._samplers: dict[tuple[int, int, bool], int] = {}
         self._textures: dict[tuple[int, int], int] = {}
 
@@ -33,7 +35,7 @@ class MaterialWriter:
         TEXCOORD_1 is the lightmap's. A second set moves to 0 if its material needs no other, else to 2 where it is lit.
         """
         m = self._materials[material]
-        used = {t.texcoord for t in (m.albedo_texture, m.emission_texture) if t is not None}
+        used = {t.texcoord for t in (self._with_alpha[material][0], m.emission_texture) if t is not None}
         if used == {1}:
             return {1: 0}
         return {0: 0, 1: 2 if lit else 1} if 1 in used else {0: 0}
@@ -47,14 +49,19 @@ class MaterialWriter:
 
     def _material(self, material: int, double_sided: bool, lit: bool) -> dict[str, Any]:
         m, slots = self._materials[material], self.texcoords(material, lit=lit)
+        texture, opacity = self._with_alpha[material]
         surface: dict[str, Any] = {
-            "baseColorFactor": [*m.albedo, 1.0],
+            "baseColorFactor": [*m.albedo, opacity],
             "metallicFactor": 0.0,
             "roughnessFactor": 1.0,
         }
-        if m.albedo_texture is not None:
-            surface["baseColorTexture"] = self._texture_info(m.albedo_texture, slots)
+        if texture is not None:
+            surface["baseColorTexture"] = self._texture_info(texture, slots)
         item: dict[str, Any] = {"name": m.name, "pbrMetallicRoughness": surface, "doubleSided": double_sided}
+        if m.opacity_cutoff is not None:
+            item |= {"alphaMode": "MASK", "alphaCutoff": m.opacity_cutoff}
+        elif not m.opaque:
+            item["alphaMode"] = "BLEND"
         extensions: dict[str, Any] = {}
         if m.emits:
             strength = max(1.0, *m.emission)
@@ -94,10 +101,34 @@ class MaterialWriter:
         return self._textures[image, sampler]
 
 
+def _with_alpha(material: Material) -> tuple[Texture | None, float]:
+    """The texture of the base colour, with the opacity's as its alpha, and the alpha factor. Where both have other texture
+    coordinates, which glTF has no way to say, the opacity's mean is in the factor."""
+    albedo, opacity = material.albedo_texture, material.opacity_texture
+    if opacity is None:
+        return albedo, material.opacity
+    if albedo is None:
+        white = np.ones((*opacity.pixels.shape[:2], 3), np.float32)
+        return dataclasses.replace(opacity, pixels=np.concatenate([white, opacity.pixels], 2)), material.opacity
+    if albedo.texcoord != opacity.texcoord or not np.array_equal(albedo.uv_transform, opacity.uv_transform):
+        return albedo, material.opacity * float(opacity.pixels.mean())
+    shape = np.maximum(albedo.pixels.shape[:2], opacity.pixels.shape[:2])
+    pixels = np.concatenate([_enlarged(albedo.pixels, shape), _enlarged(opacity.pixels, shape)], 2)
+    return dataclasses.replace(albedo, pixels=pixels), material.opacity
+
+
+def _enlarged(pixels: F32, shape: NDArray[np.int64]) -> F32:
+    """A picture with that many rows and columns, by its nearest pixels."""
+    rows, columns = (np.arange(now) * old // now for now, old in zip(shape, pixels.shape, strict=False))
+    return np.asarray(pixels[rows[:, None], columns])
+
+
 def png_bytes(pixels: F32) -> bytes:
-    """A linear picture (h, w, 3) in [0, 1] as an 8-bit sRGB PNG."""
+    """A linear picture (h, w, 3) in [0, 1], or with an alpha (h, w, 4), as an 8-bit sRGB PNG."""
     out = io.BytesIO()
-    Image.fromarray(srgb8_from_linear(pixels)).save(out, "PNG")
+    colours = srgb8_from_linear(pixels[..., :3])
+    alpha = np.round(255.0 * np.clip(pixels[..., 3:], 0.0, 1.0)).astype(np.uint8)
+    Image.fromarray(np.concatenate([colours, alpha], 2)).save(out, "PNG")
     return out.getvalue()
 
 

@@ -163,6 +163,33 @@ def test_materials_come_back(tmp_path):
                     assert (theirs.wrap, theirs.bilinear) == (ours.wrap, ours.bilinear)
 
 
+def test_opacity_comes_back(tmp_path):
+    """Of pictures the alpha, to 8 bits: beside a picture of colours, or alone."""
+    scene = sides_scene()
+    plaster, lamp, paper, dark = scene.materials
+    coloured = plaster.albedo_texture
+    alpha = dataclasses.replace(coloured, pixels=np.round(coloured.pixels[..., :1] * 255) / np.float32(255))
+    given = (
+        dataclasses.replace(plaster, opacity_texture=alpha, opacity_cutoff=0.25),
+        dataclasses.replace(lamp, opacity_texture=alpha),
+        dataclasses.replace(paper, opacity=0.25),
+        dark,
+    )
+    scene = scene.with_materials(given)
+    again = load_gltf(baked(tmp_path, scene, sides_charts(scene)).scene)
+    for before in given[:3]:
+        found = [material for material in again.materials if material.name == before.name]
+        assert found
+        for after in found:
+            assert (after.opacity, after.opacity_cutoff) == (before.opacity, before.opacity_cutoff)
+            assert after.albedo == pytest.approx(before.albedo)
+            if before.opacity_texture is None:
+                assert after.opacity_texture is None
+            else:
+                assert np.allclose(after.opacity_texture.pixels, before.opacity_texture.pixels, atol=1e-6)
+                assert np.allclose(after.opacity_texture.uv_transform, before.opacity_texture.uv_transform)
+
+
 def test_cameras_come_back(tmp_path):
     scene = sides_scene()
     read = load_gltf(baked(tmp_path, scene, sides_charts(scene)).scene)
