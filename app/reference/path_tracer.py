@@ -10,13 +10,15 @@ lit corner.
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
-from app.atlas.materials import texture_coordinates
+from app.atlas.materials import look_up, texture_coordinates
 from app.atlas.sides import scene_size
 from app.errors import UserError
 from app.scene.model import F64, RGB, Material, Scene, Texture
@@ -27,6 +29,10 @@ LLVM = (16, 0, 0)  # older ones end the process at minima and maxima of single f
 SIZE = 100.0  # diagonal of the scene as it is traced
 GAP = 5e-6  # share of the diagonal by which rays start above their surface: 40 units in the last place at the scene's edge
 RAYS = 1 << 20  # at a time
+FINER, FINEST = (
+    4,
+    4096,
+)  # pixels along each of a cut-out's, that an interpolated one is drawn with, and along the edge at most
 ROULETTE = 5  # bounces, after which paths may end by chance
 SURVIVES = 0.95  # at most, then
 PAINT = "vertex_paint"  # the name of vertex colours in mitsuba
@@ -53,6 +59,7 @@ class Tracer:
         parts = {f"shape{i}": shape for i, shape in enumerate(shapes)} | _sky(scene)
         self._scene = mi.load_dict({"type": "scene"} | parts)
         self._sampler = mi.load_dict({"type": "independent"})
+        self._sheer = not all(scene.materials[k].opaque for k in np.unique(scene.material_ids))
 
     def irradiance(self, positions: F64, normals: F64, samples: int, seed: int) -> F64:
         """(n, 3) [W/m²]: the mean of so many paths from each point (n, 3) [m] with normal (n, 3); the first directions of a
@@ -74,7 +81,7 @@ class Tracer:
             corner = mi.Point2f(mi.Float(path % across), mi.Float(path // across % across))
             u = (corner + self._sampler.next_2d()) / mi.Float(across)
             dr.eval(x, n, u)
-            L = _trace(self._scene, self._sampler, x, n, u)
+            L = _trace(self._scene, self._sampler, x, n, u, self._sheer)
             dr.eval(L)
             for k, component in enumerate((L.x, L.y, L.z)):
                 estimates = np.array(component, np.float64).reshape(count, samples)
@@ -99,8 +106,13 @@ class Tracer:
         reflectance = _colours(material.albedo, material.albedo_texture)
         if painted:
             reflectance = {"type": "mesh_attribute", "name": PAINT}
-        bsdf = {"type": "diffuse", "reflectance": reflectance}
-        props["bsdf"] = mi.load_dict({"type": "twosided", "bsdf": bsdf} if double_sided else bsdf)
+        bsdf: dict[str, Any] = {"type": "diffuse", "reflectance": reflectance}
+        bsdf = {"type": "twosided", "bsdf": bsdf} if double_sided else bsdf
+        if not material.opaque:
+            bsdf = {"type": "mask", "opacity": _opacity(material), "bsdf": bsdf}
+        props["bsdf"] = mi.load_dict(bsdf)
+        if material.emits and not material.opaque:
+            raise UserError(f"material {material.name}: paths are not traced to lamps that are not opaque")
         if material.emits:
             radiance = _colours(material.emission, material.emission_texture)
             props["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
@@ -155,20 +167,43 @@ def _colours(factor: RGB, texture: Texture | None) -> dict[str, Any]:
     """A colour, or a picture times a factor, as mitsuba takes it."""
     if texture is None or max(factor) == 0.0:
         return {"type": "rgb", "value": [float(x) for x in factor]}
+    return _picture(texture, texture.pixels * np.array(factor))
+
+
+def _picture(texture: Texture, pixels: NDArray[Any]) -> dict[str, Any]:
+    """Other pixels in place of a texture's own."""
     if texture.wrap[0] != texture.wrap[1]:
         raise UserError(f"texture {texture.name}: mitsuba repeats along u as along v, not {' and '.join(texture.wrap)}")
     return {
         "type": "bitmap",
-        "bitmap": mi.Bitmap(np.ascontiguousarray(texture.pixels * np.array(factor), np.float32)),
+        "bitmap": mi.Bitmap(np.ascontiguousarray(pixels, np.float32)),
         "raw": True,
         "wrap_mode": texture.wrap[0],
         "filter_type": "bilinear" if texture.bilinear else "nearest",
     }
 
 
+def _opacity(material: Material) -> float | dict[str, Any]:
+    """How much of a material is there, as mitsuba takes it; where it has a cutoff, of finer pixels whether they are there."""
+    texture, cutoff = material.opacity_texture, material.opacity_cutoff
+    if texture is None:
+        return material.opacity
+    pixels = texture.pixels * np.float32(material.opacity)
+    finer = 1 if cutoff is None or not texture.bilinear else max(1, min(FINER, FINEST // max(pixels.shape)))
+    if finer > 1:
+        height, width = finer * pixels.shape[0], finer * pixels.shape[1]
+        rows, columns = (np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width
+        at = np.stack(np.meshgrid(columns, rows), -1).reshape(-1, 2)
+        pixels = look_up(texture, pixels, at).reshape(height, width, 1)
+    if cutoff is not None:
+        pixels = (pixels >= cutoff).astype(np.float32)
+        texture = dataclasses.replace(texture, bilinear=False)
+    return _picture(texture, pixels)
+
+
 def _texcoords(scene: Scene, material: Material) -> F64:
     """(m, 3, 2), v = 0 at a picture's top."""
-    used = [t for t in (material.albedo_texture, material.emission_texture) if t is not None]
+    used = material.textures
     if not used:
         return np.zeros((len(scene.triangles), 3, 2))
     if any((t.uv_transform != used[0].uv_transform).any() or t.texcoord != used[0].texcoord for t in used):
@@ -178,9 +213,33 @@ def _texcoords(scene: Scene, material: Material) -> F64:
     return coordinates
 
 
+def _ray(start: Any, direction: Any, reach: Any) -> Any:
+    ray: Any = mi.Ray3f(start, direction)
+    ray.maxt = reach
+    return ray
+
+
 @dr.syntax
-def _trace(scene, sampler, x, n, u):  # type: ignore[no-untyped-def]  # runs on arrays that only mitsuba has types for
-    """Estimates of E/π at points x with normals n; u: what chooses the first direction."""
+def _first_hit(scene: Any, sampler: Any, origin: Any, direction: Any, reach: Any, active: Any) -> Any:
+    """What rays meet before they are as long as ``reach``; what is not opaque stops them by chance."""
+    start, left = mi.Point3f(origin), mi.Float(reach)
+    hit = scene.ray_intersect(_ray(start, direction, left), active)
+    passes = active & hit.is_valid() & (sampler.next_1d(active) < hit.bsdf().eval_null_transmission(hit, active).x)
+    while passes:
+        start = mi.Point3f(hit.p + mi.Vector3f(direction) * (GAP * SIZE))
+        left[passes] -= hit.t + GAP * SIZE
+        passes &= left > 0
+        further = scene.ray_intersect(_ray(start, direction, left), passes)
+        hit = dr.select(passes | (left <= 0), further, hit)
+        chance = sampler.next_1d(passes) < further.bsdf().eval_null_transmission(further, passes).x
+        passes &= further.is_valid() & chance
+    return hit
+
+
+@dr.syntax
+def _trace(scene: Any, sampler: Any, x: Any, n: Any, u: Any, sheer: bool) -> Any:
+    """Estimates of E/π at points x with normals n; u: what chooses the first direction; sheer: whether there is what is not
+    opaque."""
     L, throughput = mi.Color3f(0), mi.Color3f(1)
     x, n, u = mi.Point3f(x), mi.Normal3f(n), mi.Point2f(u)
     bounces, active = mi.UInt32(0), mi.Bool(True)
@@ -195,14 +254,21 @@ def _trace(scene, sampler, x, n, u):  # type: ignore[no-untyped-def]  # runs on 
         distance = dr.norm(towards)
         cosine = dr.dot(n, lamp.d)
         lit = active & (lamp.pdf > 0) & (cosine > 0) & (dr.dot(n, towards) > 0)
-        lit &= ~scene.ray_test(mi.Ray3f(origin, towards / distance, distance, 0.0, mi.Color0f()), lit)
+        if dr.hint(sheer, mode="scalar"):
+            lit &= ~_first_hit(scene, sampler, origin, towards / distance, distance, lit).is_valid()
+        else:
+            lit &= ~scene.ray_test(_ray(origin, towards / distance, distance), lit)
         density = cosine / dr.pi
         L[lit] += throughput * radiance * density * dr.select(lamp.delta, 1.0, lamp.pdf / (lamp.pdf + density))
 
         # A direction by its cosine
         local = mi.warp.square_to_cosine_hemisphere(u)
         direction = mi.Frame3f(n).to_world(local)
-        hit = scene.ray_intersect(mi.Ray3f(origin, direction), active)
+        hit = dr.zeros(mi.SurfaceInteraction3f)
+        if dr.hint(sheer, mode="scalar"):
+            hit = _first_hit(scene, sampler, origin, direction, 4 * SIZE, active)
+        else:
+            hit = scene.ray_intersect(mi.Ray3f(origin, direction), active)
         emitter = hit.emitter(scene, active)  # the sky's, where it meets nothing
         glows = active & (emitter != None)  # noqa: E711  # an array of pointers
         other = scene.pdf_emitter_direction(here, mi.DirectionSample3f(scene, hit, here), glows)

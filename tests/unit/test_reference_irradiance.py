@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from solver_scenes import grey, quads_scene, room
+from solver_scenes import grey, quads_scene, room, with_uv
 
 from app.atlas.points import random_points
 from app.reference import irradiance
@@ -148,6 +148,29 @@ def test_a_lamp_that_shines_both_ways(tracer: Any) -> None:
     # C-11's element in the middle: 4 / 2π · 2 · (x / √(1 + x²)) atan(x / √(1 + x²)), x = 1/2
     x = 0.5 / np.sqrt(1.25)
     assert E == pytest.approx(4 / np.pi * x * np.arctan(x), rel=0.02)
+
+
+@pytest.mark.parametrize("cutoff", [None, 0.6])
+def test_paths_pass_what_is_not_opaque(tracer: Any, cutoff: float | None) -> None:
+    """Under a lamp behind two black sheets without a rim, one half of each there: a quarter of what it gives; of sheets that are
+    cut out in stripes, one over the holes of the other, nothing."""
+    stripes = Texture("stripes", np.array([[[0.5], [0.7]]], np.float32), bilinear=False)
+    over = replace(stripes, uv_transform=np.array([[1, 0, 0.5], [0, 1, 0]]))
+    sheet = replace(grey(0.0, double_sided=True), opacity=0.5)
+    if cutoff is not None:
+        sheet = replace(sheet, opacity=1.0, opacity_texture=stripes, opacity_cutoff=cutoff)
+    other = sheet if cutoff is None else replace(sheet, opacity_texture=over)
+    wide = np.array([[-50.0, 0, -50], [-50, 0, 50], [50, 0, 50], [50, 0, -50]])
+    lamp = np.array([[-1.0, 3, -1], [1, 3, -1], [1, 3, 1], [-1, 3, 1]])
+    place = np.array([[0.0, 0, 0]]), np.array([[0.0, 1, 0]])
+    lit = []
+    for sheets in ([], [sheet], [sheet, other]):
+        quads = [lamp, *(wide + np.array([0, 1 + 1e-3 * k, 0]) for k in range(len(sheets)))]
+        scene = with_uv(quads_scene(quads, [grey(0.0, 1.0), *sheets], range(len(quads))))
+        lit.append(float(tracer.Tracer(scene).irradiance(*place, 16384, 1).mean()))
+    # of 16384 rays to the lamp the share that comes through is right to 1 %
+    assert lit[1] == pytest.approx(lit[0] / 2, rel=0.04)
+    assert lit[2] == pytest.approx(lit[0] / 4 if cutoff is None else 0.0, rel=0.04, abs=1e-3 * lit[0])
 
 
 @pytest.mark.parametrize("channel", ["emission", "albedo"])
