@@ -427,6 +427,7 @@ def _joined(scene: Scene, nodes: _Nodes, corners: I32, made: list[_Made], origin
         object_ids=scene.object_ids[source],
         uv0=shared(scene.uv0),
         uv1=shared(scene.uv1),
+        colours=shared(scene.colours),
         normals=normals,
     )
     return Cut(cut, np.concatenate([np.zeros((len(kept), 3), np.uint8), ends])[order])

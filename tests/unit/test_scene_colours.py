@@ -11,12 +11,14 @@ import trimesh
 from atlas_scenes import box_room, own_cache, scene_of
 from scene_files import QUAD, QUAD_INDICES, QUAD_UV, quad_gltf, written
 
+from app.atlas.cuts import cut_at_contacts
 from app.atlas.materials import texel_colours
 from app.atlas.parametrize import parametrize
 from app.atlas.texels import texel_surfaces, uniform_leaves
 from app.bake.gltf_writer import glb_bytes
 from app.reference.closed_form import no_furnace
 from app.reference.patches import make_patches
+from app.scene import shapes
 from app.scene.arrays import arrays_of
 from app.scene.gltf import load_gltf
 from app.scene.load import load_scene, with_ceiling_light
@@ -156,3 +158,13 @@ def test_colours_out_of_range_are_clamped_and_counted() -> None:
     scene = _held([GREY], colours)
     assert scene.warnings == ("2 triangles with vertex colours outside 0 to 1: clamped",)
     assert scene.colours is not None and scene.colours[0].tolist() == [[0, 0.5, 0.5], [0.5, 0.5, 1], [0.5, 1, 0.5]]
+
+
+def test_cut_triangles_keep_their_colours() -> None:
+    wall = shapes.quad((0, -2, -2), (0, 3, 0), (0, 0, 4))
+    scene = scene_of([box_room((4, 4, 4)), wall], [GREY, GREY])
+    low = scene.bounds[0][0]
+    red = ((scene.corners[..., 0] - low) / 4).astype(np.float32)
+    cut = cut_at_contacts(dataclasses.replace(scene, colours=np.stack([red, red, red], axis=2))).scene
+    assert len(cut.triangles) > len(scene.triangles) and cut.colours is not None
+    assert np.allclose(cut.colours[..., 0], (cut.corners[..., 0] - low) / 4, atol=1e-6)
