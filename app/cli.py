@@ -159,6 +159,8 @@ def _shot_flags(shot: Parser, family: Family) -> None:
 def _bake_flags(bake: Parser, family: Family) -> None:
     scene_flags(bake)
     output_flag(bake, "DIR", "the folder to write")
+    help = "lay the lightmap out anew, also where the file has a layout for it (TEXCOORD_1 within 0 to 1, without overlaps)"
+    bake.add_argument("--unwrap", action="store_true", help=help)
     json_flag(bake)
     solver_flags(bake, family, default=SOLVER_OF["bake"])
     stop_flags(bake, family)

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from app.bake import prepare_directory, write_bake
+from app.bake.own_layout import Laid, laid_out, why_not_kept
 from app.commands.report import report, summary
 from app.commands.steps import estimate, open_scene, session_options, solve
 from app.errors import UserError
@@ -45,7 +46,17 @@ def bake(flags: argparse.Namespace) -> int:
         lost = int((covered & ~finite).sum())
         result = report(session) | {"texels_not_finite": lost}
         irradiance = np.where(finite[..., None], np.maximum(irradiance, 0), np.float32(0))  # no light is still owed
-        files = write_bake(flags.output, session.scene, session.charts, irradiance, covered & finite, result)
+        laid = Laid(session.charts, irradiance, covered & finite)
+        if not flags.unwrap and session.scene.uv1 is not None:
+            against = why_not_kept(session.scene, laid.charts)
+            if against is None:
+                laid = laid_out(session.scene, laid)
+                result["atlas"] = list(laid.charts.size)
+            else:
+                note = f"the file's own layout, TEXCOORD_1, is not kept: {against}"
+                console.warn(note)
+                result["warnings"].append(note)
+        files = write_bake(flags.output, session.scene, laid.charts, laid.irradiance, laid.covered, result)
         line = summary(session, result)
         session.release()
     if failure is not None:
