@@ -51,9 +51,9 @@ def chances(shape: F32) -> tuple[F32, F32]:
 
 
 def _as_interpolated(light: F64) -> F64:
-    """(h, w) the mean over each pixel of what lies linearly between the middles of pixels: none that reaches into a pixel may be
-    missed there, where directions lie far apart."""
-    rows = np.pad(light, ((1, 1), (0, 0)), mode="edge")
+    """(h, w) the mean over each pixel of what lies linearly between the middles of pixels: none that reaches into a pixel may
+    be missed there, where directions lie far apart."""
+    rows = np.concatenate([light[:1], light, light[-1:]])
     light = 0.125 * (rows[:-2] + rows[2:]) + 0.75 * light
     return np.asarray(0.125 * (np.roll(light, 1, 1) + np.roll(light, -1, 1)) + 0.75 * light)
 

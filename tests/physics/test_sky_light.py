@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 from solver_scenes import NOISE, Solution, begin, grey, quads_scene
 
+from app.atlas.parametrize import parametrize
+from app.errors import UserError
 from app.gpu import Gpu
+from app.lightmap.lightmap import Lightmap
+from app.lightmap.tile_pool import TilePool
 from app.scene.model import F64, Scene
 from app.scene.sky import Sky, Sun
+from app.solvers.pairs.options import PairsOptions
+from app.solvers.pairs.solver import Pairs
 
-SKIES = ("gathering", "local")
+SKIES = ("shooting", "gathering", "local")
 EVERY_SKY_SOLVER = pytest.mark.parametrize("solver", SKIES)
 RAYS = 128
 FLOOR = [[0, 0, 2], [2, 0, 2], [2, 0, 0], [0, 0, 0]]  # faces up
@@ -19,8 +25,9 @@ WALL = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]  # faces it, +z
 
 def solved(gpu: Gpu, scene: Scene, solver: str) -> Solution:
     known: dict[str, object] = {
+        "shooting": {"density": 8},
         "gathering": {"density": 8, "smooth": False},
-        "local": {"density": 8, "shadow_rays": RAYS},
+        "local": {"density": 4, "shadow_rays": RAYS},
     }
     lit = begin(gpu, scene, solver=solver, **known[solver])  # type: ignore[arg-type]
     if solver == "gathering":
@@ -132,3 +139,42 @@ def test_the_strength_of_a_sky_costs_no_ray(gpu: Gpu) -> None:
     lit.rays.settle()
     assert np.abs(lit.H).max() < 1e-3 * before.max()
     lit.release()
+
+
+@pytest.mark.parametrize("solver", ["shooting", "gathering", "local"])
+def test_another_sky_ends_where_a_fresh_solve_ends(gpu: Gpu, solver: str) -> None:
+    """Also when it comes while the last one is still being shot, and when it is dark; albedos change meanwhile."""
+    scene = quads_scene([FLOOR, WALL], [grey(0.5, double_sided=True)]).with_sky(Sky("clear", sun=Sun(60, 30)))
+    lit = solved(gpu, scene, solver)
+    for sky in (Sky("uniform", strength=5.0), Sky("clear", sun=Sun(170, 50)), Sky(sun=Sun(100, 20))):
+        lit.solver.set_sky(sky)
+        lit.step(8)
+    lit.solver.set_materials((grey(0.3, double_sided=True),))
+    lit.solver.set_sky(Sky("clear", sun=Sun(120, 40)))
+    if solver == "gathering":
+        lit.gather(RAYS + 64)
+    else:
+        lit.settle()
+    again = quads_scene([FLOOR, WALL], [grey(0.3, double_sided=True)]).with_sky(Sky("clear", sun=Sun(120, 40)))
+    fresh = solved(gpu, again, solver)
+    off = np.abs(lit.H - fresh.H).mean(1)
+    assert np.average(off, weights=lit.area) < 0.01 * np.average(fresh.H.mean(1), weights=lit.area)
+    assert np.allclose(lit.book.emitted, fresh.book.emitted, rtol=0.01)
+    assert abs(lit.book.imbalance_share) < 0.01
+    lit.solver.set_sky(None)
+    lit.step(8)
+    if solver == "gathering":
+        lit.rays.settle()
+    else:
+        lit.settle()
+    assert np.abs(lit.H).mean() < 5e-3 * fresh.H.mean()
+    lit.release()
+    fresh.release()
+
+
+def test_what_cannot_follow_a_sky_says_so(gpu: Gpu) -> None:
+    scene = quads_scene([FLOOR], [grey(0.5)]).with_sky(Sky())
+    with pytest.raises(UserError, match="quadtrees"):
+        begin(gpu, scene, density=2, adaptive=True)
+    with pytest.raises(UserError, match="pairs"):
+        Pairs(gpu, Lightmap(gpu, TilePool(scene, parametrize(scene, density=2))), PairsOptions())

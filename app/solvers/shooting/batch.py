@@ -185,7 +185,7 @@ class Batch:
 
     def leaves_changed(self, change: Change) -> None:
         """Follow leaves that have split, or merged."""
-        self.ledger.emitted = self._lightmap.emitted
+        self.ledger.emitted = self._lightmap.emitted + self.ledger.from_sky
         self.auditor.forget()
         self.marks.follow(change)
         self.receivers.follow()

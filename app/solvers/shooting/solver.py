@@ -27,13 +27,14 @@ from app.solvers.shooting.material_edits import MaterialEdits, needs_restart
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.records import BATCH, Shot, powers_of, shot_of, sizes_of
 from app.solvers.shooting.reports import Reports
+from app.solvers.shooting.sky_shots import SkyShots
 from app.util.parts import UnderWay, run_to_end
 from app.visibility.item_image import ItemImage
 
 LOOK_AFTER = 32  # shots, or a quarter of all, between two looks at leaves that did not change at the last
 SIGHT = "What the last shooter saw"
 PICTURES = {SIGHT: "All that the patch that shot last sees, one colour per surface"}
-NO_SKY = "--solver shooting: shoots no light of the sky: gathering and local do"
+NO_SKY = "--solver shooting: quadtrees do not follow the light of the sky; uniform texels do, and --solver gathering"
 CHANGES_PER_SHOT = 8  # leaves that split or merge, for each shot of a piece of work: bounded work for a frame
 
 
@@ -46,8 +47,7 @@ class Shooting:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool = True) -> None:
         """audits: whether strong shots are tried before they are made."""
-        if lightmap.scene.lit_by_sky:
-            raise UserError(NO_SKY)
+        _check_sky(lightmap, lightmap.scene.sky)
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
         self.batch = Batch(gpu, lightmap, options, audits=audits)
         if lightmap.refinement is not None:
@@ -58,6 +58,8 @@ class Shooting:
         self._look_at = 0  # shots in the log at which leaves are looked at again
         self.issued = 0
         self.last_shot: Shot | None = None
+        self._sky: SkyShots | None = None  # where there has been a sky
+        self._before_sky = np.zeros(3)  # what texels had received when it began to shoot, RGB [W]
         self.reset()
 
     # -- work ----------------------------------------------------------------------------------------------------------
@@ -67,6 +69,8 @@ class Shooting:
         batch, those too weak beside its best are left for later, and not counted once ``poll`` has the report of it."""
         self._under_way.finish()
         shots = min(amount, BATCH)
+        if self._sky_left:
+            return self._under_way.begin(self._shoot_sky(shots, bands))
         parts = self._shoot(shots, bands) if self.batch.replay is None else self._follow_leaves(shots, bands)
         return self._under_way.begin(parts)
 
@@ -77,6 +81,61 @@ class Shooting:
         self.issued += made
         self._reports.send(choice, self.batch.bins, self.batch.ledger, self.batch.shooters)
         return made
+
+    # -- the sky, see sky_shots.py -------------------------------------------------------------------------------------
+
+    @property
+    def _sky_left(self) -> bool:
+        """Whether light of the sky is still to be shot."""
+        return self._sky is not None and self._sky.left > 0
+
+    def _shoot_sky(self, shots: int, bands: int) -> Generator[None, None, int]:
+        """The next directions of the sky; after the last, what it gave is known, and patches go on."""
+        assert self._sky is not None
+        made = yield from self._sky.shoot(shots, bands)
+        self.issued += made
+        self._progress = replace(self._progress, done=self.issued, remaining=self._sky.share_left)
+        if not self._sky.left:
+            self._enter_sky()
+            self.batch.weigh()
+            self._progress = replace(self._progress, remaining=self._share(self.batch.unshot()))
+            self.batch.ambient.update(self.batch.bins, shown=self.options.ambient)
+        return made
+
+    def _enter_sky(self) -> None:
+        """Enter in the ledger what texels have got from the sky since it began to shoot, and begin anew with that."""
+        received = self._received()
+        ledger = self.batch.ledger
+        ledger.from_sky = ledger.from_sky + received - self._before_sky
+        ledger.emitted = self.lightmap.emitted + ledger.from_sky
+        self._before_sky = received
+
+    def _received(self) -> F64:
+        """What texels have received so far, with the emission of lamps, RGB [W]: it does not follow albedos. Waits for the
+        GPU."""
+        absorbed, unshot, _ = self.batch.ledger.tile_sums()
+        return absorbed[:3] + unshot[:3]
+
+    def set_sky(self, sky: Sky | None) -> None:
+        """Another sky: the difference is shot. Begins again where nothing is left to emit, and where the storage holds no
+        negative light. Raises UserError."""
+        _check_sky(self.lightmap, sky)
+        self._under_way.finish()
+        self.lightmap.set_sky(sky)
+        lit = self._sky is not None and self.issued > 0 and self.lightmap.scene.emits
+        if self._sky is None or not lit or self.lightmap.storage != "rgba32f":
+            self.reset()
+            return
+        self.poll(wait=True)
+        if self._sky_left:
+            self._enter_sky()
+        self._sky.change(sky)
+        self._before_sky = self._received()
+        self.batch.phases.begin()
+        self.batch.auditor.begin()
+        self._progress = replace(self._progress, remaining=1.0)
+
+    # -- leaves of quadtrees -------------------------------------------------------------------------------------------
 
     def _follow_leaves(self, shots: int, bands: int) -> Generator[None, None, int]:
         """On quadtrees: first what there is to do for fresh leaves, a batch of earlier shots at a time, then shots while light is
@@ -136,7 +195,8 @@ class Shooting:
             if finer:
                 self.batch.shoot_finer()
         escaped = report["escaped"].astype(np.float64) * self.batch.ledger.watt
-        self._progress = Progress(int(report["shots"]), unshot, escaped)
+        from_sky = 0 if self._sky is None else self._sky.made
+        self._progress = Progress(int(report["shots"]) + from_sky, unshot, escaped)
         if sizes_of(shooter):
             self.last_shot = shot_of(self.lightmap, shooter)
         if self.batch.replay is not None and choice is self.batch.phases.now:
@@ -155,7 +215,8 @@ class Shooting:
     @property
     def _all_shot(self) -> bool:
         """Whether the finest patches have shot, and no more is unshot than asked for."""
-        return self.batch.phases.even and self._progress.remaining <= self.options.residual
+        even = self.batch.phases.even and not self._sky_left
+        return even and self._progress.remaining <= self.options.residual
 
     @property
     def _refining(self) -> bool:
@@ -169,12 +230,18 @@ class Shooting:
     def settle(self) -> Progress:
         """End the work under way, and measure what is unshot."""
         self.poll(wait=True)
-        self._progress = replace(self._progress, remaining=self._unshot_share())
+        to_come = 0.0
+        if self._sky is not None and self._sky_left:
+            self._enter_sky()
+            to_come = self._sky.share_left
+        self._progress = replace(self._progress, remaining=max(self._unshot_share(), to_come))
         return self.poll()
 
     def energy(self) -> EnergyBalance:
         """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
         self._under_way.finish()
+        if self._sky_left:
+            self._enter_sky()
         return self.batch.ledger.balance()
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
@@ -187,9 +254,16 @@ class Shooting:
         self._look_at = 0
         self._reports.drop()
         self.lightmap.clear()
+        self.batch.ledger.from_sky = np.zeros(3)
         self.batch.begin()
         self.issued, self.last_shot = 0, None
-        self._progress = Progress(0, 1.0 if self.batch.ledger.emitted.sum() > 0 else 0.0, np.zeros(3))
+        if self.lightmap.scene.lit_by_sky and self._sky is None:
+            self._sky = SkyShots(self.gpu, self.lightmap, self.batch.occluders)
+        if self._sky is not None:
+            self._sky.begin(self.lightmap.scene.sky)
+            self._before_sky = self._received()
+        lit = self._sky_left or self.batch.ledger.emitted.sum() > 0
+        self._progress = Progress(0, 1.0 if lit else 0.0, np.zeros(3))
 
     def set_options(self, options: ShootingOptions) -> None:
         """Use other knobs from the next shot on."""
@@ -223,7 +297,10 @@ class Shooting:
         if self.lightmap.refinement is not None:
             self.lightmap.refinement.begin_again()
             self._look_at = 0
-        factor, before = self.lightmap.common_factor(materials), self.lightmap.scene.materials
+        if self._sky_left:
+            self._enter_sky()
+        scaled = np.ones(3) if self._sky is not None else self.lightmap.common_factor(materials)  # not the sky's
+        factor, before = scaled, self.lightmap.scene.materials
         batch.scale(self._edits, factor)
         self._edits.enter(materials, factor)
         batch.weigh(at_least=batch.groups.settled * float(factor.max()))
@@ -231,12 +308,8 @@ class Shooting:
             batch.groups.divide(batch.phases)
         self._progress = replace(self._progress, remaining=self._unshot_share())
         batch.ambient.update(batch.bins, shown=self.options.ambient)
-
-    def set_sky(self, sky: Sky | None) -> None:
-        """Only one that sends no light. Raises UserError."""
-        if sky is not None and sky.emits:
-            raise UserError(NO_SKY)
-        self.lightmap.set_sky(sky)
+        if self._sky_left:
+            self._before_sky = self._received()
 
     # -- leaves that come and go, see app/lightmap/refinement.py -------------------------------------------------------
 
@@ -317,6 +390,9 @@ class Shooting:
             run()
             self.gpu.ctx.finish()
             yield
+        if self._sky is not None:
+            run_to_end(self._sky.shoot(1, 1))
+            yield
         for choice in self.batch.phases.choices[1:]:
             run_to_end(self.batch.choose_once(choice, 1))
             self.gpu.ctx.finish()
@@ -326,8 +402,14 @@ class Shooting:
         refinement = self.lightmap.refinement
         if refinement is not None and refinement.follower is self:
             refinement.follower = None
-        for part in (self._reports, self._picture, self.batch):
+        for part in (self._reports, self._picture, self.batch, *(() if self._sky is None else (self._sky,))):
             part.release()
+
+
+def _check_sky(lightmap: Lightmap, sky: Sky | None) -> None:
+    """Raise UserError for a sky whose light cannot be shot."""
+    if lightmap.refinement is not None and sky is not None and sky.emits:
+        raise UserError(NO_SKY)
 
 
 __all__ = ["Shooting"]

@@ -1,0 +1,103 @@
+"""The directions from which the sky is shot: stratified by its power, so many that open surfaces receive what they should."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from app.scene.model import F64
+from app.scene.sky import SUN_ANGLE, Sky, solid_angles
+
+COUNTS = (64, 128, 256, 512, 1024)
+ERROR = (
+    2.5e-3  # of the most that any surface receives, by which what one receives may be off where nothing hides the sky
+)
+SUN_SHOTS = 8  # over the sun's disc
+GOLDEN = (5**0.5 - 1) / 2
+NORMALS = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) != (0, 0, 0)])
+
+
+class Directions(NamedTuple):
+    """towards (n, 3): unit, to the sky. irradiance (n, 3): of each, on what faces it, RGB [W/m²]."""
+
+    towards: F64
+    irradiance: F64
+
+    def on(self, normals: F64) -> F64:
+        """(m, 3) what surfaces with these normals (m, 3) receive of all, unoccluded."""
+        return np.asarray(np.maximum(normals @ self.towards.T, 0) @ self.irradiance)
+
+
+def directions_of(sky: Sky | None) -> Directions:
+    """Of the sun first, then of the sky, such that some of the first are spread over all of it."""
+    parts = [] if sky is None else [_sun(sky), _sky(sky)]
+    towards, irradiance = (np.concatenate([np.empty((0, 3)), *(part[i] for part in parts)]) for i in (0, 1))
+    lit = irradiance.any(1)
+    return Directions(towards[lit], irradiance[lit])
+
+
+def _sun(sky: Sky) -> Directions:
+    """Evenly over its disc [Vogel79]."""
+    if sky.sun is None:
+        return Directions(np.empty((0, 3)), np.empty((0, 3)))
+    nth = np.arange(SUN_SHOTS)
+    radius, turn = np.sin(SUN_ANGLE / 2) * np.sqrt((nth + 0.5) / SUN_SHOTS), 2 * np.pi * GOLDEN * nth
+    x, y = axes_of(sky.sun.direction)
+    towards = sky.sun.direction + (radius * np.cos(turn))[:, None] * x + (radius * np.sin(turn))[:, None] * y
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    return Directions(towards, np.tile(sky.sun_irradiance / SUN_SHOTS, (SUN_SHOTS, 1)))
+
+
+def _sky(sky: Sky) -> Directions:
+    """As few as are right to ERROR, or the most."""
+    if not sky.shines:
+        return Directions(np.empty((0, 3)), np.empty((0, 3)))
+    normals = NORMALS / np.linalg.norm(NORMALS, axis=1, keepdims=True)
+    right = sky.scale * sky.shape_irradiance(normals)
+    for count in COUNTS:
+        found = _stratified(sky, count)
+        if np.abs(found.on(normals) - right).max() <= ERROR * right.max():
+            break
+    return found
+
+
+def _stratified(sky: Sky, count: int) -> Directions:
+    """So many of equal power: rows of the map by the steps of a count, places in them by the golden ratio."""
+    light = sky.shape.astype(np.float64)
+    height, width, _ = light.shape
+    weight = light * solid_angles(width, height)[..., None]
+    power = weight.mean(2)
+    nth = np.argsort(np.arange(count) * GOLDEN % 1)  # neighbours in the sky far apart in order
+    down, row = _place(np.cumsum(power.sum(1)), (nth + 0.5) / count)
+    edges = np.cos(np.linspace(0, np.pi, height + 1))
+    up = edges[row] + down * (edges[row + 1] - edges[row])
+    across, column = np.empty(count), np.empty(count, np.int64)
+    for at in np.unique(row).tolist():
+        mine = row == at
+        across[mine], column[mine] = _place(np.cumsum(power[at]), nth[mine] * GOLDEN % 1)
+    azimuth = (column + across) / width * 2 * np.pi
+    level = np.sqrt(np.maximum(1 - up**2, 0))
+    towards = np.stack([level * np.sin(azimuth), up, -level * np.cos(azimuth)], axis=1)
+    colour = light[row, column] / light[row, column].mean(1, keepdims=True)
+    whole = sky.scale * weight.sum((0, 1))
+    return Directions(towards, colour * (whole / np.maximum(colour.sum(0), 1e-300)))
+
+
+def _place(summed: F64, share: F64) -> tuple[F64, np.ndarray[tuple[int, ...], np.dtype[np.int64]]]:
+    """Where in an entry of a sum, and in which one, shares of it lie."""
+    at = share * summed[-1]
+    entry = np.minimum(np.searchsorted(summed, at, side="right"), len(summed) - 1)
+    before = np.where(entry > 0, summed[entry - 1], 0.0)
+    return np.clip((at - before) / np.maximum(summed[entry] - before, 1e-300), 0, 1), entry
+
+
+def axes_of(towards: F64) -> tuple[F64, F64]:
+    """x and y such that x, y and the direction are a right-handed frame."""
+    aside = np.array([1.0, 0.0, 0.0]) if abs(towards[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    x = np.cross(aside, towards)
+    x /= np.linalg.norm(x)
+    return x, np.cross(towards, x)
+
+
+__all__ = ["Directions", "axes_of", "directions_of"]
