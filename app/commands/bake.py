@@ -48,12 +48,14 @@ def bake(flags: argparse.Namespace) -> int:
         irradiance = np.where(finite[..., None], np.maximum(irradiance, 0), np.float32(0))  # no light is still owed
         laid = Laid(session.charts, irradiance, covered & finite)
         if not flags.unwrap and session.scene.uv1 is not None:
-            against = why_not_kept(session.scene, laid.charts)
+            against = why_not_kept(session.scene, laid)
             if against is None:
                 laid = laid_out(session.scene, laid)
                 result["atlas"] = list(laid.charts.size)
+                note = f"the squares that {laid.squares} objects have in TEXCOORD_1 are placed side by side"
             else:
                 note = f"the file's own layout, TEXCOORD_1, is not kept: {against}"
+            if against is not None or laid.squares > 1:
                 console.warn(note)
                 result["warnings"].append(note)
         files = write_bake(flags.output, session.scene, laid.charts, laid.irradiance, laid.covered, result)
