@@ -93,8 +93,11 @@ def by_pairs(gpu: Gpu, scene: Scene, options: PairsOptions) -> NDArray[np.float6
 
 
 def check(free: NDArray[np.float64], closed: NDArray[np.float64], through: NDArray[np.float64], there: float) -> None:
-    """Within 3 %, the noise of rays and of maps; of pairs, that of a ray between two texels."""
-    assert through[FLOOR] == pytest.approx((1 - there) * free[FLOOR], rel=0.03)
+    """Within 3 %, the noise of rays and of maps; of pairs, that of a ray between two texels. A sheet of which little is there is
+    as much better."""
+    assert through[FLOOR] == pytest.approx(
+        (1 - there) * free[FLOOR], abs=0.03 * there * free[FLOOR] + 0.002 * free[FLOOR]
+    )
     assert through[BOARD] == pytest.approx(there * closed[BOARD], rel=0.03)
     assert closed[FLOOR] < 1e-3 * free[FLOOR]
 
