@@ -11,6 +11,7 @@ import numpy as np
 from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.options import Options, option
+from app.scene.lights import Light
 from app.scene.model import Material
 from app.scene.sky import Sky
 from app.solvers import EnergyBalance, Family, Inspection, Progress
@@ -43,6 +44,10 @@ class Constant:
 
     def set_sky(self, sky: Sky | None) -> None:
         self._lightmap.set_sky(sky)
+        self.reset()
+
+    def set_lights(self, lights: tuple[Light, ...]) -> None:
+        self._lightmap.set_lights(lights)
         self.reset()
 
     def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:

@@ -47,8 +47,8 @@ def scene_size(scene: Scene) -> float:
 def lit_sides(scene: Scene) -> Sides:
     """Every front, and every back of a double-sided material, that has something in front of it.
 
-    All where there is a sky; and where no side has (a lone sheet, a convex body seen from outside): there is then no light to
-    save texels for, but still a surface to show.
+    All where there is a sky, or a lamp without area, which may hang or shine from outside; and where no side has (a lone sheet,
+    a convex body seen from outside): there is then no light to save texels for, but still a surface to show.
     """
     size = scene_size(scene)
     low, high = scene.bounds
@@ -66,7 +66,7 @@ def lit_sides(scene: Scene) -> Sides:
     fronts = reach_front > FLAT
     two_sided = scene.sides
     backs = two_sided & (reach_back > FLAT)
-    if scene.sky is not None or (not fronts.any() and not backs.any()):
+    if scene.sky is not None or scene.lights or (not fronts.any() and not backs.any()):
         fronts, backs = np.ones_like(fronts), two_sided
     triangle = np.concatenate([np.flatnonzero(fronts), np.flatnonzero(backs)]).astype(np.int32)
     back = np.arange(len(triangle)) >= np.count_nonzero(fronts)

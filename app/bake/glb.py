@@ -30,6 +30,13 @@ class GlbBuilder:
         items.append(item)
         return len(items) - 1
 
+    def add_light(self, item: dict[str, Any]) -> int:
+        """A light of KHR_lights_punctual; returns its index."""
+        self.use_extension("KHR_lights_punctual")
+        lights = self.document.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {"lights": []})["lights"]
+        lights.append(item)
+        return len(lights) - 1
+
     def use_extension(self, name: str) -> None:
         self._extensions.add(name)
 

@@ -15,6 +15,7 @@ Every triangle has its own lightmap area:
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +26,8 @@ from app import __version__
 from app.atlas.charts import Charts
 from app.bake.glb import GlbBuilder
 from app.bake.gltf_materials import MaterialWriter
+from app.scene.cameras import look_at
+from app.scene.lights import LUMENS_PER_WATT, Light
 from app.scene.model import F32, F64, Camera, Scene
 
 # Positions are 32-bit floats: beyond this distance from the origin, in radii of the scene, nodes carry the offset, so
@@ -57,6 +60,7 @@ def glb_bytes(scene: Scene, charts: Charts, lightmap_uri: str) -> bytes:
     offset = centre if np.linalg.norm(centre) > FAR * radius else np.zeros(3)
     nodes = _add_objects(glb, scene, _sides(scene, charts), materials, offset)
     nodes += [_add_camera(glb, camera, NEAR_PLANE * radius) for camera in scene.cameras]
+    nodes += [_add_light(glb, light) for light in scene.lights if light.emits]
     about = {"file": lightmap_uri, "quantity": "irradiance", "unit": "W/m2", "texCoord": 1, "firstRow": "v = 0"}
     glb.add("scenes", {"name": scene.name, "nodes": nodes, "extras": {"lightmap": about}})
     glb.document["scene"] = 0
@@ -153,3 +157,23 @@ def _add_camera(glb: GlbBuilder, camera: Camera, near: float) -> int:
     index = glb.add("cameras", {"name": camera.name, "type": "perspective", "perspective": perspective})
     matrix = camera.world_from_camera.T.reshape(-1).tolist()
     return glb.add("nodes", {"name": camera.name, "camera": index, "matrix": matrix})
+
+
+def _add_light(glb: GlbBuilder, light: Light) -> int:
+    """A node with the light in cd or lx (KHR_lights_punctual)."""
+    strength = max(light.intensity)
+    item: dict[str, Any] = {
+        "name": light.name,
+        "type": light.kind,
+        "color": [c / strength for c in light.intensity],
+        "intensity": strength * LUMENS_PER_WATT,
+    }
+    if light.kind == "spot":
+        item["spot"] = {"innerConeAngle": light.inner, "outerConeAngle": light.outer}
+    if not light.from_afar and math.isfinite(light.range):
+        item["range"] = light.range
+    if light.radius or light.angle:
+        item["extras"] = {"radius": light.radius, "angle": light.angle}
+    matrix = look_at(np.array(light.position), np.array(light.position) + np.array(light.direction))
+    extension = {"KHR_lights_punctual": {"light": glb.add_light(item)}}
+    return glb.add("nodes", {"name": light.name, "matrix": matrix.T.reshape(-1).tolist(), "extensions": extension})

@@ -52,6 +52,7 @@ def info(flags: argparse.Namespace) -> int:
         "objects": len(scene.objects),
         "materials": len(scene.materials),
         "emitting_materials": sum(m.emits for m in scene.materials),
+        "lights": [f"{light.name} ({light.kind})" for light in scene.lights],
         "sky": None if scene.sky is None else scene.sky.kind,
         "cameras": [c.name for c in scene.cameras],
         "size_m": [float(x) for x in upper - lower],

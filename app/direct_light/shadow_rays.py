@@ -8,7 +8,7 @@ there is noise in half-shadows only. What is kept is Σ F V, so that another exi
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 
 from app.direct_light.allocate import allocate
 from app.direct_light.lamps import LampSet, chances, lamp_sets
+from app.direct_light.punctual import LightLit, PunctualLight, light_sets
 from app.direct_light.sky_light import SkyLight, SkyLit
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import QUAD_FORMAT, quads, upload
 from app.lightmap.tile_pool import Moves
+from app.scene.lights import Light
 from app.scene.model import F32, F64, Scene
 from app.scene.sky import Sky
 from app.visibility.origins import Origins
@@ -53,6 +55,9 @@ class Lit:
         gpu.release_all(self.target, self.seen, self.table, self.near, self.far, self.passes_table, *optional)
 
 
+AnyLit = Lit | SkyLit | LightLit
+
+
 class DirectLight:
     """On one lightmap: ``light`` holds it [stored units], and in its alpha the variance of the mean of RGB. Whoever makes it
     releases it.
@@ -62,8 +67,9 @@ class DirectLight:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, rays: RayScene, origins: Origins) -> None:
         self._gpu, self._lightmap, self._rays, self._origins = gpu, lightmap, rays, origins
-        self.sets: list[Lit | SkyLit] = []
+        self.sets: list[AnyLit] = []
         self._sky: SkyLight | None = None  # where there has been a sky
+        self._punctual: PunctualLight | None = None  # where there have been lamps without area
         self.traced = self._streams = 0
         defines = lightmap.defines("MATERIAL_BITS", "TILE")
         self._shoot = {
@@ -111,7 +117,7 @@ class DirectLight:
     def _passes_table(self) -> Texture:
         return self._gpu.texture((self._lightmap.columns, self._lightmap.rows), 1, "f4")
 
-    def _look_unoccluded(self, lit: Lit | SkyLit, rects: F32) -> None:
+    def _look_unoccluded(self, lit: AnyLit, rects: F32) -> None:
         """Σ F of a set with a closed form, in these rectangles."""
         if isinstance(lit, Lit) and lit.unoccluded is not None:
             target = self._gpu.target(lit.unoccluded)
@@ -156,7 +162,7 @@ class DirectLight:
     def _everywhere(self) -> F32:
         return np.array([(0, 0, *self._lightmap.size, 0, 0)], np.float32)
 
-    def drop(self, lit: Lit | SkyLit) -> None:
+    def drop(self, lit: AnyLit) -> None:
         """Forget a set."""
         self.sets.remove(lit)
         lit.release(self._gpu)
@@ -192,14 +198,10 @@ class DirectLight:
             np.asarray(np.min(counts, axis=0)) if counts else np.full(self._lightmap.pool.tiles, np.iinfo(np.int64).max)
         )
 
-    def _shoot_at(self, lit: Lit | SkyLit, slots: NDArray[np.int64], blend: str | None) -> None:
+    def _shoot_at(self, lit: AnyLit, slots: NDArray[np.int64], blend: str | None) -> None:
         """One pass of shadow rays from the texels of these slots to a set."""
         pool = self._lightmap.pool
-        if isinstance(lit, SkyLit):
-            assert self._sky is not None
-            how, (textures, uniforms) = self._sky.shoot[lit.is_sun], self._sky.reads(lit)
-        else:
-            how, (textures, uniforms) = self._shoot[lit.lamps.closed_form, lit.lamps.picture], self._reads(lit)
+        how, textures, uniforms = self._shooting(lit)
         textures |= {name: texture for name, texture in self._rays.textures.items() if name != "t_bvh_uv"}
         rects = quads(pool.corners(slots), pool.tile, pool.corners(slots))
         self._draw(how, lit.target, rects, textures, uniforms, blend=blend)
@@ -207,16 +209,22 @@ class DirectLight:
         self._write_passes(lit)
         self.traced += PASS * int(pool.slot_texels[slots].sum())
 
-    def _reads(self, lit: Lit) -> tuple[dict[str, Texture], dict[str, Any]]:
-        """Textures and uniforms that shadow rays to a set of lamps need, besides origins and rays."""
+    def _shooting(self, lit: AnyLit) -> tuple[Pass, dict[str, Texture], dict[str, Any]]:
+        """The program of shadow rays to a set, and what it reads besides origins and rays."""
+        if isinstance(lit, SkyLit):
+            assert self._sky is not None
+            return self._sky.shooting(lit)
+        if isinstance(lit, LightLit):
+            assert self._punctual is not None
+            return self._punctual.shooting(lit)
         textures = {"t_lamps": lit.table, "t_near": lit.near, "t_far": lit.far, "t_passes": lit.passes_table}
         uniforms: dict[str, Any] = {"u_stream": lit.stream, "u_lamps": len(lit.lamps.rows)}
         if lit.lamps.picture:
             textures |= self._lightmap.textures("t_pages", "t_emission")
             uniforms["u_pages"] = float(self._lightmap.columns), self._lightmap.pool.pages_per_texel
-        return textures, uniforms
+        return self._shoot[lit.lamps.closed_form, lit.lamps.picture], textures, uniforms
 
-    def _write_passes(self, lit: Lit | SkyLit) -> None:
+    def _write_passes(self, lit: AnyLit) -> None:
         table = np.zeros(self._lightmap.columns * self._lightmap.rows, np.float32)
         table[: len(lit.passes)] = lit.passes
         lit.passes_table.write(table.tobytes())
@@ -250,6 +258,9 @@ class DirectLight:
             if isinstance(lit, SkyLit):
                 assert self._sky is not None
                 self._sky.resized(lit, moves)
+            elif isinstance(lit, LightLit):
+                assert self._punctual is not None
+                self._punctual.resized(lit, moves)
             else:
                 self._resized(lit, moves)
             self._gpu.release_all(lit.passes_table)
@@ -287,10 +298,27 @@ class DirectLight:
             self._streams += 1
             self.sets.append(self._sky.lit(sky, STREAM + self._streams, self._passes_table(), sun=sun))
 
+    def _follow_lights(self, lights: tuple[Light, ...]) -> None:
+        """Other lamps without area. Of one that differs by its strength or colour all is known."""
+        wanted = light_sets(lights)
+        for lit in [lit for lit in self.sets if isinstance(lit, LightLit)]:
+            same = next((some for some in wanted if lit.knows(some)), None)
+            if same is None:
+                self.drop(lit)
+            else:
+                lit.lights = same
+                wanted.remove(same)
+        for some in wanted:
+            if self._punctual is None:
+                self._punctual = PunctualLight(self._gpu, self._lightmap, dict(self._rays.defines), PASS)
+            self._streams += 1
+            self.sets.append(self._punctual.lit(some, STREAM + self._streams, self._passes_table()))
+
     def follow(self, scene: Scene) -> None:
-        """Materials, or the sky, are others. Of a set that is one material all is known, whatever it emits, also nothing; another
-        set is lit anew when any of its lamps is another."""
+        """Materials, the sky, or lamps without area are others. Of a set that is one material all is known, whatever it emits,
+        also nothing; another set is lit anew when any of its lamps is another."""
         self._follow_sky(scene.sky if scene.lit_by_sky else None)
+        self._follow_lights(scene.lights)
         known = [lit for lit in self.sets if isinstance(lit, Lit)]
         alone = [lit.lamps.materials[0] for lit in known if len(lit.lamps.materials) == 1]
         sets = lamp_sets(self._lightmap.pool, scene, alone)
@@ -326,12 +354,16 @@ class DirectLight:
             self._add_light(lit, scene, self._target, mesh, "add" if nth else None)
         self._gpu.release_all(mesh)
 
-    def _add_light(self, lit: Lit | SkyLit, scene: Scene, target: Framebuffer, mesh: Mesh, blend: str | None) -> None:
+    def _add_light(self, lit: AnyLit, scene: Scene, target: Framebuffer, mesh: Mesh, blend: str | None) -> None:
         """What one set brings."""
-        if isinstance(lit, SkyLit):
-            assert self._sky is not None
-            textures, uniforms = self._sky.sums(lit, self._origins.normals)
-            self._sky.add[lit.is_sun].draw(target, textures=textures, uniforms=uniforms, mesh=mesh, blend=blend)
+        if not isinstance(lit, Lit):
+            if isinstance(lit, SkyLit):
+                assert self._sky is not None
+                how, textures, uniforms = self._sky.adding(lit, self._origins.normals)
+            else:
+                assert self._punctual is not None
+                how, textures, uniforms = self._punctual.adding(lit)
+            how.draw(target, textures=textures, uniforms=uniforms, mesh=mesh, blend=blend)
             return
         exitance = lit.lamps.exitance_in(scene) / self._lightmap.unit
         self._add[lit.lamps.closed_form].draw(
@@ -343,9 +375,19 @@ class DirectLight:
             blend=blend,
         )
 
-    def from_sky(self) -> F64:
-        """Power that sky and sun send to the texels, RGB [W]: their irradiance, as it is known. Waits for the GPU."""
-        parts = [lit for lit in self.sets if isinstance(lit, SkyLit) and lit.passes.any()]
+    def from_outside(self) -> F64:
+        """Power that the sky, the sun and directional lights send to the texels, RGB [W]: their irradiance, as it is known. Waits
+        for the GPU."""
+        return self._received(
+            [s for s in self.sets if isinstance(s, SkyLit) or (isinstance(s, LightLit) and s.from_afar)]
+        )
+
+    def from_points(self) -> F64:
+        """The same of point and spot lights."""
+        return self._received([lit for lit in self.sets if isinstance(lit, LightLit) and not lit.from_afar])
+
+    def _received(self, sets: Sequence[AnyLit]) -> F64:
+        parts = [lit for lit in sets if lit.passes.any() and _emits(lit, self._lightmap.scene)]
         if not parts:
             return np.zeros(3)
         gpu, pool = self._gpu, self._lightmap.pool
@@ -371,7 +413,9 @@ class DirectLight:
         self._gpu.release_all(self._target, self.light)
 
 
-def _emits(lit: Lit | SkyLit, scene: Scene) -> bool:
+def _emits(lit: AnyLit, scene: Scene) -> bool:
+    if isinstance(lit, LightLit):
+        return any(light.emits for light in lit.lights)
     return isinstance(lit, SkyLit) or bool(lit.lamps.exitance_in(scene).any())
 
 

@@ -56,13 +56,13 @@ class SkyLit:
 
 
 class SkyLight:
-    """Programs, and what they read, for the light of sky and sun on one lightmap. shoot, add: by whether it is the sun."""
+    """Programs, and what they read, for the light of sky and sun on one lightmap."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, rays: dict[str, object], a_pass: int) -> None:
         """rays: defines of visibility/rays.glsl; a_pass: shadow rays in one."""
         self._gpu, self._lightmap = gpu, lightmap
         reads = lightmap.defines("MATERIAL_BITS", "TILE")
-        self.shoot, self.add = (
+        self._shoot, self._add = (
             {sun: Pass(gpu, name, defines={"SUN": sun} | reads | more, vertex="common/rects") for sun in (False, True)}
             for name, more in (("direct_light/sky_rays", {"PASS": a_pass} | rays), ("direct_light/sky_light", {}))
         )
@@ -80,21 +80,22 @@ class SkyLight:
         unoccluded.filter = (gpu.ctx.LINEAR, gpu.ctx.LINEAR)
         return SkyLit(sky, SkyMap(gpu, sky), unoccluded, seen, all_, target, stream, passes, passes_table)
 
-    def reads(self, lit: SkyLit) -> tuple[dict[str, Texture], dict[str, Any]]:
-        """Textures and uniforms of ``shoot``, besides origins and rays."""
-        textures, uniforms = {"t_passes": lit.passes_table}, {"u_stream": lit.stream}
+    def shooting(self, lit: SkyLit) -> tuple[Pass, dict[str, Texture], dict[str, Any]]:
+        """The program of shadow rays, and what it reads besides origins and rays."""
+        how, textures, uniforms = self._shoot[lit.is_sun], {"t_passes": lit.passes_table}, {"u_stream": lit.stream}
         if lit.map is None:
-            return textures, uniforms | {"u_sun": sun_uniform(lit.sky)}
-        return textures | lit.map.textures, uniforms | {"u_by_cosine": 1.0 if lit.map.even else BY_COSINE}
+            return how, textures, uniforms | {"u_sun": sun_uniform(lit.sky)}
+        return how, textures | lit.map.textures, uniforms | {"u_by_cosine": 1.0 if lit.map.even else BY_COSINE}
 
-    def sums(self, lit: SkyLit, normals: Texture) -> tuple[dict[str, Texture], dict[str, Any]]:
-        """Textures and uniforms of ``add``."""
+    def adding(self, lit: SkyLit, normals: Texture) -> tuple[Pass, dict[str, Texture], dict[str, Any]]:
+        """The program that sums up, and what it reads."""
+        how = self._add[lit.is_sun]
         textures = {"t_seen": lit.seen, "t_all": lit.all, "t_passes": lit.passes_table, "t_origin_normal": normals}
         scale = (lit.sky.sun_irradiance if lit.is_sun else lit.sky.scale) / self._lightmap.unit
         uniforms = {"u_scale": tuple(scale.tolist()), "u_size": self._lightmap.size}
         if lit.unoccluded is None:
-            return textures, uniforms | {"u_sun": sun_uniform(lit.sky)[:3]}
-        return textures | {"t_unoccluded": lit.unoccluded}, uniforms
+            return how, textures, uniforms | {"u_sun": sun_uniform(lit.sky)[:3]}
+        return how, textures | {"t_unoccluded": lit.unoccluded}, uniforms
 
     def resized(self, lit: SkyLit, moves: Moves) -> None:
         """The tile pool has got another number of slots."""

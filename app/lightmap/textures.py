@@ -26,9 +26,11 @@ from numpy.typing import NDArray
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.lightmap.options import STORAGE
 from app.lightmap.tile_pool import Array, Moves, SolverSpace, TilePool
+from app.scene.lights import Light
 from app.scene.model import F32, F64, Material
 from app.scene.sky import Sky
 
+NEAR_LIGHT = 0.25  # solver space: how far lights without area are from what they light most, about
 LIGHT = ("t_irradiance", "t_residual")
 QUAD_FORMAT = {"in_rect": "4f", "in_from": "2f"}  # see common/rects.vert.glsl
 BYTES = {"f4": 4, "u4": 4, "f2": 2, "f1": 1}
@@ -106,11 +108,18 @@ class LightTextures:
         """Have another sky from now on. The light stays as it is."""
         self.scene = self.scene.with_sky(sky)
 
+    def set_lights(self, lights: tuple[Light, ...]) -> None:
+        """Have other lamps without area from now on. The light stays as it is."""
+        self.scene = self.scene.with_lights(lights)
+
     def clear(self) -> None:
         """H = 0, r = E: nothing has been shot [Coombe03, 3]."""
         strongest = max((np.pi * max(m.emission) for m in self.scene.materials), default=0.0)
         if self.scene.sky is not None:
             strongest = max(strongest, self.scene.sky.most_irradiance)
+        near = (NEAR_LIGHT * self.pool.space.scale) ** 2
+        for light in self.scene.lights:
+            strongest = max(strongest, max(light.intensity) / (1.0 if light.from_afar else near) * light.on)
         self.unit = strongest or 1.0
         self.light_target.clear()
         self.ambient_target.clear()
@@ -122,9 +131,14 @@ class LightTextures:
 
     @property
     def emitted(self) -> F64:
-        """Power that the scene's emitters send out, RGB [W]: Σ E A."""
+        """Power that the scene's surfaces send out, RGB [W]: Σ E A."""
         weights = self.pool.emission_weights
         return np.asarray(np.pi * (np.array([m.emission for m in self.scene.materials]) * weights).sum(0))
+
+    @property
+    def sent_by_points(self) -> F64:
+        """Power that point and spot lights send out, RGB [W]."""
+        return np.asarray(sum((light.flux for light in self.scene.lights if not light.from_afar), np.zeros(3)))
 
     # -- leaves that come and go ---------------------------------------------------------------------------------------
 

@@ -35,4 +35,7 @@ def arrays_of(scene: Scene) -> dict[str, NDArray[Any]]:
         arrays["sky"] = scene.sky.radiance
         if scene.sky.sun is not None:
             arrays["sun"] = np.concatenate([scene.sky.sun.direction, scene.sky.sun_irradiance])
+    for k, light in enumerate(scene.lights):
+        places = (*light.position, *light.direction, light.inner, light.outer, light.range, light.radius, light.angle)
+        arrays[f"light {k} {light.kind}"] = np.array([*light.intensity, *places, light.on])
     return arrays

@@ -15,6 +15,10 @@
     [[procedural]]              # kind = "museum" | "grotto" | "village" | "icosphere" | "cylinder" and parameters:
                                 # procedural.py
     [[camera]]                  # name; position, target; yfov_deg = 45
+    [[light]]                   # a lamp without area: kind = "point" | "spot" | "directional"; intensity = [r, g, b] [W/sr], of
+                                # a directional one irradiance [W/m²]; position; direction or target; inner_deg = 0 and
+                                # outer_deg = 45 of a spot's cones; range; radius, or angle_deg of a directional one: of what
+                                # makes soft shadows; name
     [sky]                       # kind = "uniform" | "clear" | "image"; colour = [r, g, b] radiance L [W/(sr m²)] of a uniform
                                 # one, multiplies the others, and their sun; strength = 1; turbidity = 2.5, of clear air
                                 # sun = { azimuth = degrees from north, -z, over east, +x, height = degrees }
@@ -27,6 +31,7 @@ fills each quad and each face of a box, ``repeat`` times. +y is up.
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 import math
 import tomllib
@@ -42,6 +47,7 @@ from app.scene.cameras import look_at
 from app.scene.gltf import load_gltf
 from app.scene.gltf_file import first_problem
 from app.scene.images import ImageError, path_inside, read_image
+from app.scene.lights import OUTER, Light, LightKind
 from app.scene.meshfile import load_meshfile
 from app.scene.model import Camera, Material, Scene, Texture
 from app.scene.options import UNITS
@@ -71,7 +77,7 @@ Part01 = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Albedo = Annotated[tuple[Part01, Part01, Part01], BeforeValidator(_triple)]
-Light = Annotated[tuple[NotNegative, NotNegative, NotNegative], BeforeValidator(_triple)]
+Emitted = Annotated[tuple[NotNegative, NotNegative, NotNegative], BeforeValidator(_triple)]
 
 
 class Table(BaseModel):
@@ -101,8 +107,8 @@ class TextureTable(Table):
 class MaterialTable(Table):
     name: str
     albedo: Albedo | None = None
-    emission: Light | None = None
-    exitance: Light | None = None
+    emission: Emitted | None = None
+    exitance: Emitted | None = None
     texture: TextureTable | None = None
     double_sided: bool = False
     opacity: Part01 = 1.0
@@ -174,6 +180,46 @@ class CameraTable(Table):
         return self
 
 
+class LightTable(Table):
+    name: str = ""
+    kind: LightKind = "point"
+    intensity: Emitted
+    position: Vec3 | None = None
+    direction: Vec3 | None = None
+    target: Vec3 | None = None
+    inner_deg: Annotated[float, Field(ge=0.0, le=90.0)] = 0.0
+    outer_deg: Annotated[float, Field(gt=0.0, le=90.0)] = math.degrees(OUTER)
+    range: Positive | None = None
+    radius: NotNegative = 0.0
+    angle_deg: Annotated[float, Field(ge=0.0, lt=180.0)] = 0.0
+
+    @model_validator(mode="after")
+    def _what_the_kind_needs(self) -> Self:
+        afar, aims = self.kind == "directional", self.kind != "point"
+        if not afar and self.position is None:
+            raise ValueError(f"a {self.kind} light needs a position")
+        if aims and (self.direction is None) == (self.target is None or self.position is None):
+            raise ValueError(f"a {self.kind} light needs either a direction, or a position and a target")
+        if aims and not math.hypot(*self.aim):
+            raise ValueError("a light needs a direction of some length")
+        if self.inner_deg > self.outer_deg:
+            raise ValueError("inner_deg must be at most outer_deg")
+        given = self.model_fields_set
+        odd = given & ({"inner_deg", "outer_deg", "angle_deg"} if self.kind == "point" else set())
+        odd |= given & ({"inner_deg", "outer_deg", "range", "radius"} if afar else {"angle_deg"})
+        if odd:
+            raise ValueError(f"a {self.kind} light has no {sorted(odd)[0]}")
+        return self
+
+    @property
+    def aim(self) -> Vec3:
+        """Where it shines, of any length."""
+        if self.direction is not None or self.target is None or self.position is None:
+            return self.direction or (0.0, -1.0, 0.0)
+        x, y, z = (b - a for a, b in zip(self.position, self.target, strict=True))
+        return (x, y, z)
+
+
 class SunTable(Table):
     azimuth: float | None = None
     height: Annotated[float, Field(gt=0.0, le=90.0)] | None = None
@@ -201,7 +247,7 @@ class SunTable(Table):
 
 class SkyTable(Table):
     kind: SkyKind = "uniform"
-    colour: Light = (1.0, 1.0, 1.0)
+    colour: Emitted = (1.0, 1.0, 1.0)
     strength: NotNegative = 1.0
     turbidity: Annotated[float, Field(ge=LEAST_TURBIDITY, le=MOST_TURBIDITY)] = TURBIDITY
     sun: SunTable | None = None
@@ -227,6 +273,7 @@ class SceneFile(Table):
     mesh: list[MeshTable] = []
     procedural: list[Procedural] = []
     camera: list[CameraTable] = []
+    light: list[LightTable] = []
     sky: SkyTable | None = None
 
 
@@ -254,6 +301,7 @@ class _Builder:
         self.parts: list[Part] = []
         self.objects: list[str] = []
         self.cameras: list[Camera] = []
+        self.lights: list[Light] = []
         self.warnings: list[str] = []
         self.materials = [self._material(i, m) for i, m in enumerate(table.material)]
         self.ids = {m.name: i for i, m in enumerate(table.material)}
@@ -273,8 +321,11 @@ class _Builder:
         for camera in self.table.camera:
             eye, target = (self.unit * np.array(p) for p in (camera.position, camera.target))
             self.cameras.append(Camera(camera.name, look_at(eye, target), math.radians(camera.yfov_deg)))
+        self.lights += [self._light(i, light) for i, light in enumerate(self.table.light)]
         name = self.table.scene.name or self.path.stem
-        scene = validate(self.path, name, self.parts, self.objects, self.materials, self.cameras, self.warnings)
+        scene = validate(
+            self.path, name, self.parts, self.objects, self.materials, self.cameras, self.warnings, self.lights
+        )
         return scene if self.table.sky is None else scene.with_sky(self._sky(self.table.sky))
 
     def _id(self, material: str, where: str) -> int:
@@ -306,6 +357,22 @@ class _Builder:
             return Texture(table.image, read_image(found), uv_transform=scale)
         except ImageError as error:
             raise SceneError(self.path, f"{where}: '{table.image}' is not a readable picture: {error}") from error
+
+    def _light(self, index: int, table: LightTable) -> Light:
+        x, y, z = (self.unit * p for p in table.position or (0.0, 0.0, 0.0))
+        u, v, w = (c / math.hypot(*table.aim) for c in table.aim)
+        return Light(
+            table.name or f"light {index + 1}",
+            table.kind,
+            table.intensity,
+            (x, y, z),
+            (u, v, w),
+            math.radians(table.inner_deg),
+            math.radians(table.outer_deg),
+            math.inf if table.range is None else self.unit * table.range,
+            self.unit * table.radius,
+            math.radians(table.angle_deg),
+        )
 
     def _sky(self, table: SkyTable) -> Sky:
         image = None
@@ -358,4 +425,10 @@ class _Builder:
             )
         )
         self.objects += [prefix + name for name in part.objects]
+        for light in part.lights:
+            x, y, z = (matrix[:3, :3] @ np.array(light.position) + matrix[:3, 3]).tolist()
+            turned = matrix[:3, :3] @ np.array(light.direction)
+            u, v, w = (turned / np.linalg.norm(turned)).tolist()
+            name = prefix + light.name
+            self.lights.append(dataclasses.replace(light, name=name, position=(x, y, z), direction=(u, v, w)))
         self.warnings += [f"{table.file}: {note}" for note in part.warnings]

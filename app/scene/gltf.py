@@ -3,12 +3,13 @@
 Every node with a mesh becomes an object. Read: triangles, strips and fans, all component types, sparse accessors, node
 hierarchies, instances (also EXT_mesh_gpu_instancing), materials and their pictures (``gltf_materials``), TEXCOORD_0
 and 1, normals, COLOR_0 as a factor of the albedo, morph targets and skins as they
-stand (``gltf_pose``), perspective cameras. Counted and left out: points and lines, punctual lights, skins whose joints are in no
-scene.
+stand (``gltf_pose``), perspective cameras, lights of
+KHR_lights_punctual. Counted and left out: points and lines, skins whose joints are in no scene.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,9 @@ from app.scene.gltf_draco import decompress
 from app.scene.gltf_file import GltfFile
 from app.scene.gltf_materials import UNKNOWN_ALBEDO, read_materials
 from app.scene.gltf_pose import joint_matrices, morphed, skinning, turned_normals
+from app.scene.gltf_schema import Light as GltfLight
 from app.scene.gltf_schema import Mesh, Node, Primitive
+from app.scene.lights import LUMENS_PER_WATT, Light
 from app.scene.model import F64, Camera, Material, Scene
 from app.scene.validate import Part, check_triangle_count, counted, validate
 
@@ -51,7 +54,14 @@ def load_gltf(path: Path) -> Scene:
     if reader.unpainted:
         materials.append(Material("no material", UNKNOWN_ALBEDO))
     return validate(
-        path, path.stem, reader.parts, reader.objects, materials, reader.cameras, [*reader.warnings(), *notes]
+        path,
+        path.stem,
+        reader.parts,
+        reader.objects,
+        materials,
+        reader.cameras,
+        [*reader.warnings(), *notes],
+        reader.lights,
     )
 
 
@@ -63,16 +73,16 @@ class _Reader:
         self.parts: list[Part] = []
         self.objects: list[str] = []
         self.cameras: list[Camera] = []
+        self.lights: list[Light] = []
         self.used_materials: set[int] = set()
         self._worlds: dict[int, F64] = {}  # world-from-node of the scene's nodes, parents first
         self._shapes: dict[tuple[int, int | None, tuple[float, ...]], list[_Shape]] = {}
         self._triangle_count = 0
         self.unpainted = 0  # primitives without material
-        self._not_triangles = self._skinned = self._lights = self._not_pinholes = 0
+        self._not_triangles = self._skinned = self._not_pinholes = 0
 
     def warnings(self) -> list[str]:
         notes = [
-            (self._lights, "point light", "point lights", "ignored: only surfaces emit"),
             (self._not_triangles, "primitive", "primitives", "without triangles left out"),
             (self.unpainted, "primitive", "primitives", "without material: grey with albedo 0.5"),
             (self._skinned, "skinned mesh", "skinned meshes", "without joints in the scene: shown without pose"),
@@ -102,7 +112,10 @@ class _Reader:
             self._visit(index, nodes[index], world_from_node)
 
     def _visit(self, index: int, node: Node, world_from_node: F64) -> None:
-        self._lights += node.extensions.light is not None
+        if node.extensions.light is not None:
+            lights = self.file.document.extensions.punctual.lights
+            light = self.file.pick(lights, node.extensions.light.light, "light")
+            self.lights.append(_light(light, node.name or light.name or f"light {index}", world_from_node))
         if node.camera is not None:
             camera = self.file.pick(self.file.document.cameras, node.camera, "camera")
             if camera.perspective is None:
@@ -220,6 +233,26 @@ def _triangles(corners: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     if mode == STRIP:
         return corners[np.stack([i, i + 1 + i % 2, i + 2 - i % 2], axis=1)]
     return corners[np.stack([i + 1, i + 2, np.zeros_like(i)], axis=1)]
+
+
+def _light(light: GltfLight, name: str, world_from_node: F64) -> Light:
+    """A light in W/sr or W/m², whatever the scale of its node; it shines along -z."""
+    red, green, blue = (c * light.intensity / LUMENS_PER_WATT for c in light.color)
+    x, y, z = world_from_node[:3, 3].tolist()
+    u, v, w = (-world_from_node[:3, 2] / np.linalg.norm(world_from_node[:3, 2])).tolist()
+    spot = light.spot
+    return Light(
+        name,
+        light.type,
+        (red, green, blue),
+        (x, y, z),
+        (u, v, w),
+        spot.inner_cone_angle,
+        spot.outer_cone_angle,
+        light.range or math.inf,
+        light.extras.radius,
+        light.extras.angle,
+    )
 
 
 def _parent_from_node(node: Node) -> F64:

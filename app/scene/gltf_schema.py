@@ -10,6 +10,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.alias_generators import to_camel
 
+from app.scene.lights import OUTER
+
 Index = Annotated[int, Field(ge=0, lt=2**31)]
 Size = Annotated[int, Field(ge=0, lt=2**53)]
 Vec2 = tuple[float, float]
@@ -187,9 +189,13 @@ class Instancing(Model):
     attributes: dict[str, Index]
 
 
+class LightIndex(Model):
+    light: Index
+
+
 class NodeExtensions(Model):
     instancing: Instancing | None = Field(default=None, alias="EXT_mesh_gpu_instancing")
-    light: Empty | None = Field(default=None, alias="KHR_lights_punctual")
+    light: LightIndex | None = Field(default=None, alias="KHR_lights_punctual")
 
 
 class Node(Model):
@@ -206,6 +212,35 @@ class Node(Model):
     extensions: NodeExtensions = NodeExtensions()
 
 
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+class Spot(Model):
+    inner_cone_angle: NotNegative = 0.0
+    outer_cone_angle: NotNegative = OUTER
+
+
+class LightExtras(Model):
+    """What a bake keeps of a light besides."""
+
+    radius: NotNegative = 0.0
+    angle: NotNegative = 0.0
+
+
+class Light(Model):
+    name: str = ""
+    type: Literal["point", "spot", "directional"]
+    color: Vec3 = (1.0, 1.0, 1.0)
+    intensity: float = 1.0
+    range: Annotated[float, Field(gt=0.0)] | None = None
+    spot: Spot = Spot()
+    extras: LightExtras = LightExtras()
+
+
+class Lights(Model):
+    lights: list[Light] = []
+
+
 class Perspective(Model):
     yfov: float
 
@@ -219,6 +254,10 @@ class Camera(Model):
 class SceneNodes(Model):
     name: str = ""
     nodes: list[Index] = []
+
+
+class DocumentExtensions(Model):
+    punctual: Lights = Field(default=Lights(), alias="KHR_lights_punctual")
 
 
 class Document(Model):
@@ -239,3 +278,4 @@ class Document(Model):
     accessors: list[Accessor] = []
     buffer_views: list[BufferView] = []
     buffers: list[Buffer] = []
+    extensions: DocumentExtensions = DocumentExtensions()

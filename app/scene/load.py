@@ -13,8 +13,9 @@ from app.errors import SceneError
 from app.scene.authored import MESH_LOADERS, load_authored
 from app.scene.cameras import default_camera
 from app.scene.library import scene_names, scene_path
+from app.scene.lights import LUMENS_PER_WATT
 from app.scene.model import Material, Scene
-from app.scene.options import FileOptions
+from app.scene.options import PHOTOMETRIC, FileOptions
 from app.scene.orientation import oriented
 from app.scene.sky import Sky
 from app.scene.validate import one_line
@@ -39,7 +40,8 @@ def load_scene(
     path = scene_file(source)
     try:
         suffix = path.suffix.lower()
-        scene = oriented(LOADERS[suffix](path), suffix, file or FileOptions())
+        file = file or FileOptions()
+        scene = _with_light_units(oriented(LOADERS[suffix](path), suffix, file), suffix, file.light_units)
     except SceneError as error:  # its reason may quote the file, line breaks and all
         raise SceneError(error.source, one_line(error.reason)) from error
     if not scene.cameras:
@@ -51,6 +53,22 @@ def load_scene(
             return with_ceiling_light(scene)
         scene = dataclasses.replace(scene, warnings=(*scene.warnings, NO_LIGHT))
     return scene
+
+
+def _with_light_units(scene: Scene, suffix: str, units: str) -> Scene:
+    """The scene of a glTF file whose lights are counted in these units. SceneError for other files."""
+    if units == PHOTOMETRIC:
+        return scene
+    if suffix not in (".glb", ".gltf"):
+        raise SceneError(
+            scene.source or scene.name, f"--light-units {units}: only .glb and .gltf files have lights in units"
+        )
+    lights = []
+    for light in scene.lights:
+        factor = LUMENS_PER_WATT / (4 * math.pi if units == "watts" and not light.from_afar else 1.0)
+        red, green, blue = (factor * c for c in light.intensity)
+        lights.append(dataclasses.replace(light, intensity=(red, green, blue)))
+    return scene.with_lights(tuple(lights))
 
 
 def with_ceiling_light(scene: Scene) -> Scene:

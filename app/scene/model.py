@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from app.scene.lights import Light
 from app.scene.sky import Sky
 
 F32 = NDArray[np.float32]
@@ -90,8 +91,8 @@ class Scene:
     into ``materials`` and ``objects`` (names). Per corner, where the file has them: uv0, uv1 (m, 3, 2) f32 with v = 0
     at the top, normals (m, 3, 3) f32 unit (kept for export; light transport uses geometric normals), colours (m, 3, 3)
     f32, linear Rec.709, in [0, 1], which multiply the albedo. What of the light is reflected is nowhere above MOST_ALBEDO.
-    ``warnings`` are one-line counted repairs and omissions. sky: what is seen where no surface is; None is black. Every value
-    is finite, every index in range, every triangle has an area: ``validate`` guarantees it.
+    ``warnings`` are one-line counted repairs and omissions. sky: what is seen where no surface is; None is black. lights: lamps
+    without area. Every value is finite, every index in range, every triangle has an area: ``validate`` guarantees it.
     """
 
     name: str
@@ -109,6 +110,7 @@ class Scene:
     warnings: tuple[str, ...] = ()
     source: Path | None = None
     sky: Sky | None = None
+    lights: tuple[Light, ...] = ()
 
     @functools.cached_property
     def corners(self) -> F64:
@@ -131,13 +133,20 @@ class Scene:
 
     @property
     def emits(self) -> bool:
-        """Whether any triangle has an emitting material, or light comes from the sky."""
-        return self.lit_by_sky or any(self.materials[i].emits for i in np.unique(self.material_ids))
+        """Whether any triangle has an emitting material, or light comes from the sky or a lamp without area."""
+        return (
+            self.lit_by_sky or self.lit_by_lights or any(self.materials[i].emits for i in np.unique(self.material_ids))
+        )
 
     @property
     def lit_by_sky(self) -> bool:
         """Whether light comes from the sky."""
         return self.sky is not None and self.sky.emits
+
+    @property
+    def lit_by_lights(self) -> bool:
+        """Whether light comes from lamps without area."""
+        return any(light.emits for light in self.lights)
 
     @property
     def sides(self) -> NDArray[np.bool_]:
@@ -149,3 +158,6 @@ class Scene:
 
     def with_sky(self, sky: Sky | None) -> Scene:
         return dataclasses.replace(self, sky=sky)
+
+    def with_lights(self, lights: tuple[Light, ...]) -> Scene:
+        return dataclasses.replace(self, lights=lights)

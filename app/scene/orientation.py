@@ -63,8 +63,15 @@ def _placed(scene: Scene, scale: float, turn: NDArray[Any]) -> Scene:
         matrix[:3] = turn @ matrix[:3]
         matrix[:3, 3] *= scale
         cameras.append(dataclasses.replace(camera, world_from_camera=matrix))
+    lights = []
+    for light in scene.lights:
+        x, y, z = (scale * (turn @ np.array(light.position))).tolist()
+        u, v, w = (turn @ np.array(light.direction)).tolist()
+        far, radius = scale * light.range, scale * light.radius
+        lights.append(dataclasses.replace(light, position=(x, y, z), direction=(u, v, w), range=far, radius=radius))
     return dataclasses.replace(
         scene,
+        lights=tuple(lights),
         positions=scale * (scene.positions @ turn.T),
         normals=None if scene.normals is None else (scene.normals @ turn.T).astype(np.float32),
         cameras=tuple(cameras),

@@ -2,7 +2,7 @@
 
 Repaired and counted as warnings: triangles without area, triangles listed twice, textured triangles without texture
 coordinates, albedo below 0 or above MOST_ALBEDO, vertex colours outside [0, 1], emission below 0, cameras that make
-no sense. Repaired without a word: normals that are zero or not finite.
+no sense, lights with an intensity below 0 or with odd cones. Repaired without a word: normals that are zero or not finite.
 Refused with ``SceneError``: corners that are not finite, indices out of range, no triangle left, more than
 ``MAX_TRIANGLES``, an absurd size.
 """
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import SceneError
+from app.scene.lights import Light
 from app.scene.model import F32, F64, MOST_ALBEDO, RGB, Camera, Material, Scene, Texture
 
 MAX_TRIANGLES = 20_000_000
@@ -82,6 +83,7 @@ def validate(
     materials: Sequence[Material],
     cameras: Sequence[Camera] = (),
     warnings: Iterable[str] = (),
+    lights: Sequence[Light] = (),
 ) -> Scene:
     """Check, repair and join ``parts`` into a Scene. ``source`` names the file in errors; SceneError if unusable."""
     notes = [one_line(w) for w in warnings]
@@ -132,6 +134,7 @@ def validate(
         uv1=None if uvs[1] is None else np.nan_to_num(uvs[1], nan=0.0, posinf=0.0, neginf=0.0),
         colours=colours,
         source=Path(source),
+        lights=_check_lights(source, lights, notes),
     )
     return dataclasses.replace(scene, normals=_unit_normals(scene, normals), warnings=tuple(notes))
 
@@ -373,6 +376,38 @@ def _check_cameras(cameras: Sequence[Camera], notes: list[str]) -> tuple[Camera,
         dropped = len(cameras) - len(good)
         notes.append(f"{counted(dropped, 'camera was', 'cameras were')} dropped: singular or without a field of view")
     return tuple(good)
+
+
+def _check_lights(source: str | Path, lights: Sequence[Light], notes: list[str]) -> tuple[Light, ...]:
+    """Lights that a solver can use: finite, not negative, with the inner cone within the outer one, and that within half of all
+    directions."""
+    checked, dark, cones, aimless = [], 0, 0, 0
+    for light in lights:
+        name = one_line(light.name)
+        if not all(map(math.isfinite, (*light.intensity, *light.position, light.inner, light.outer, light.radius))):
+            raise SceneError(source, f"light '{name}': intensity, position, cones and radius must be finite numbers")
+        if max(light.intensity) > BRIGHTEST:
+            raise SceneError(source, f"light '{name}': an intensity above {BRIGHTEST:g} is out of range")
+        direction = light.direction
+        if not all(map(math.isfinite, direction)):
+            if light.kind != "point":
+                aimless += 1
+                continue
+            direction = (0.0, -1.0, 0.0)
+        intensity = _rgb(max(x, 0.0) for x in light.intensity)
+        outer = min(light.outer, math.pi / 2)
+        inner = min(light.inner, outer)
+        dark += intensity != light.intensity
+        cones += (inner, outer) != (light.inner, light.outer)
+        held = dataclasses.replace(light, name=name, intensity=intensity, direction=direction)
+        checked.append(dataclasses.replace(held, inner=inner, outer=outer))
+    if aimless:
+        notes.append(f"{counted(aimless, 'light was', 'lights were')} dropped: without a direction")
+    if dark:
+        notes.append(f"{counted(dark, 'light', 'lights')} with an intensity below 0: set to 0")
+    if cones:
+        notes.append(f"{counted(cones, 'spot light', 'spot lights')} with cones out of order or above 90 degrees: held")
+    return tuple(checked)
 
 
 def _unit_normals(scene: Scene, normals: Array | None) -> NDArray[np.float32] | None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.gpu import Gpu
+from app.scene.lights import Light
 from app.scene.model import Material
 from app.scene.sky import Sky
 from app.session.energy import Effort, EnergyWatch
@@ -106,6 +107,10 @@ class Run:
     def set_sky(self, sky: Sky | None) -> None:
         """Another sky. Raises UserError."""
         self._edit(lambda: self.solver.set_sky(sky))
+
+    def set_lights(self, lights: tuple[Light, ...]) -> None:
+        """Other lamps without area. Raises UserError."""
+        self._edit(lambda: self.solver.set_lights(lights))
 
     def _edit(self, edit: Callable[[], None]) -> None:
         converged, counts = self.converged, self.solver.inspect().counts

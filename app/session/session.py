@@ -19,6 +19,7 @@ from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
 from app.options import Options
+from app.scene.lights import Light
 from app.scene.model import F64, Material, Scene
 from app.scene.options import FileOptions
 from app.scene.sky import Sky
@@ -156,6 +157,7 @@ class Session:
         if same_scene and self.scene is not scene:
             lightmap.set_materials(self.materials)
             lightmap.set_sky(self.scene.sky)
+            lightmap.set_lights(self.scene.lights)
             solver.reset()
         self.close()
         self.lightmap, self.solver, self.unedited = lightmap, solver, scene
@@ -369,6 +371,14 @@ class Session:
         self.run.set_sky(sky)
         if self._steady is not None:
             self._steady = self._steady.with_sky(sky)
+        if self.solver.issued == 0:
+            self._light_begins()
+
+    def set_lights(self, lights: tuple[Light, ...]) -> None:
+        """Other lamps without area. Raises UserError where the solver cannot light by them."""
+        self.run.set_lights(lights)
+        if self._steady is not None:
+            self._steady = self._steady.with_lights(lights)
         if self.solver.issued == 0:
             self._light_begins()
 

@@ -12,6 +12,7 @@ from typing import Any, Protocol, TypeVar
 
 from app.gpu import Texture
 from app.options import Options
+from app.scene.lights import Light
 from app.scene.model import F32, F64, Material
 from app.scene.sky import Sky
 
@@ -130,6 +131,9 @@ class Solver(Protocol[OptionsT]):
 
     def set_sky(self, sky: Sky | None) -> None:
         """Have another sky from the next piece of work on. Raises UserError."""
+
+    def set_lights(self, lights: tuple[Light, ...]) -> None:
+        """Have other lamps without area from the next piece of work on. Raises UserError."""
 
     def set_observer(self, position: F64) -> None:
         """The eye is at ``position`` (3,) [m]: what a solver does first, or alone, where the world is too large to solve at

@@ -63,7 +63,6 @@ REPAIRED: dict[str, tuple[Callable[[Gltf], None], str]] = {
     "broken picture": (merge("images.0.bufferView", 0), "1 picture could not be read"),
     "no picture": (merge("textures.0", {}), "1 texture without a picture"),
     "far coordinates": (merge("materials.0.emissiveTexture", {"index": 0, "texCoord": 2}), "TEXCOORD_2"),
-    "point light": (merge("nodes.0.extensions", {"KHR_lights_punctual": {"light": 0}}), "1 point light ignored"),
     "unlit": (merge("materials.0.extensions", {"KHR_materials_unlit": {}}), "1 unlit material"),
     "albedo": (
         merge("materials.0.pbrMetallicRoughness.baseColorFactor", [2, -1, 0, 1]),
@@ -130,6 +129,10 @@ HOSTILE: dict[str, tuple[Callable[[Gltf], None] | Gltf, str]] = {
     "version 1": (merge("asset.version", "1.0"), "version 1.0"),
     "no asset": (merge("asset", {}), "asset.version"),
     "mesh": (merge("nodes.0.mesh", 7), "mesh 7 does not exist: there are 1"),
+    "light": (
+        merge("nodes.0.extensions", {"KHR_lights_punctual": {"light": 0}}),
+        "light 0 does not exist: there are 0",
+    ),
     "material": (merge("meshes.0.primitives.0.material", 3), "material 3 does not exist"),
     "texture": (merge("materials.0.emissiveTexture", {"index": 9}), "texture 9 does not exist"),
     "accessor": (merge("meshes.0.primitives.0.indices", 99), "accessor 99 does not exist"),

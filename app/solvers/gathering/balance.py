@@ -2,14 +2,15 @@
 
     emitted = absorbed + escaped + imbalance,    absorbed = Σ (1 - ρ) H A,    escaped = Σ B A (share of rays that hit nothing)
 
-Of the sky, what arrives on texels is emitted. Light is gathered, and never sent: nothing forces the books to close, so that the
-imbalance is an error of the solution.
+Of the sky and of directional lights, what arrives on texels is emitted; of other lamps without area, what does not has escaped.
+Light is gathered, and never sent: nothing forces the books to close, so that the imbalance is an error of the solution.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from app.direct_light.shadow_rays import DirectLight
 from app.gpu import Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
@@ -31,13 +32,13 @@ class Balance:
         self._tiles = [self._gpu.texture(size, 4, "f4") for _ in range(4)]
         self._target = self._gpu.target(*self._tiles)
 
-    def measure(self, hits: Hits, direct: Texture, indirect: Texture, from_sky: F64) -> EnergyBalance:
-        """Where all light is now, RGB [W]. from_sky: what the sky sends to texels. Reads every texel and waits for the GPU."""
+    def measure(self, hits: Hits, direct: DirectLight, indirect: Texture) -> EnergyBalance:
+        """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
         lightmap, (lost, rays) = self._lightmap, hits.lost()
         reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_emission"
         self._sum.draw(
             self._target,
-            textures=lightmap.textures(*reads) | {"t_lost": lost, "t_direct": direct, "t_indirect": indirect},
+            textures=lightmap.textures(*reads) | {"t_lost": lost, "t_direct": direct.light, "t_indirect": indirect},
             uniforms={"u_unit": lightmap.unit, "u_rays": float(max(rays, 1))},
         )
         sums: list[F64] = [
@@ -45,7 +46,9 @@ class Balance:
         ]
         area, square = sums[0][3], lightmap.space.scale**2
         absorbed, escaped, blackened = (s[:3] * lightmap.unit * square for s in sums[:3])
-        emitted = lightmap.emitted + from_sky
+        sent = lightmap.sent_by_points
+        escaped = escaped + sent - direct.from_points()
+        emitted = lightmap.emitted + direct.from_outside() + sent
         return EnergyBalance(
             emitted=emitted,
             absorbed=absorbed + blackened,

@@ -21,6 +21,7 @@ from app.gpu import Framebuffer, Gpu, ReadBack, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
 from app.lightmap.tile_pool import Moves, TilePool
+from app.scene.lights import Light
 from app.scene.model import F64, Material
 from app.scene.sky import Sky
 from app.solvers.base import EnergyBalance, Inspection, Progress
@@ -236,8 +237,7 @@ class Gathering:
     def energy(self) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
         self._under_way.finish()
-        direct = self.at_points
-        balance = self._balance.measure(self.hits, direct.light, self._compose.indirect, direct.from_sky())
+        balance = self._balance.measure(self.hits, self.at_points, self._compose.indirect)
         self._progress = replace(self._progress, escaped=balance.escaped)
         return balance
 
@@ -295,10 +295,21 @@ class Gathering:
         self.lightmap.set_sky(sky)
         if self.points is not self.lightmap:
             self.points.set_sky(sky)
-        if not self.issued:
+        self._follow_scene()
+
+    def set_lights(self, lights: tuple[Light, ...]) -> None:
+        """Other lamps without area: shadow rays to them are sent anew, but where only their strength or colour is another."""
+        self.lightmap.set_lights(lights)
+        if self.points is not self.lightmap:
+            self.points.set_lights(lights)
+        self._follow_scene()
+
+    def _follow_scene(self) -> None:
+        """With the next piece of work."""
+        if self.issued:
+            self._edited = True
+        else:
             self.reset()
-            return
-        self._edited = True
 
     def _set_materials(self) -> None:
         """Let points and bounces follow the lightmap's materials."""

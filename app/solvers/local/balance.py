@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.gpu import Texture
+from app.direct_light.shadow_rays import DirectLight
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
 from app.solvers.base import EnergyBalance
@@ -15,17 +15,17 @@ from app.solvers.local.patches import Patches
 LEAST = 1e-6  # 1 - λ: in a furnace of λ = 1 light never ends
 
 
-def balance_of(lightmap: Lightmap, direct: Texture, from_sky: F64, patches: Patches, members: Members) -> EnergyBalance:
+def balance_of(lightmap: Lightmap, direct: DirectLight, patches: Patches, members: Members) -> EnergyBalance:
     """emitted = absorbed + escaped + imbalance, RGB [W]: escaped is the light of lamps that no texel got, and of what nodes
-    reflect the share that their own rays lost. from_sky: what the sky sends to texels, which is what it emits. Reads every texel
-    and waits for the GPU."""
+    reflect the share that their own rays lost. What the sky and directional lights send to texels is what they emit. Reads every
+    texel and waits for the GPU."""
     held = members.held
     area = lightmap.pool.surfaces.area[..., None]
     albedo, H = lightmap.albedo().astype(np.float64), lightmap.irradiance().astype(np.float64)
-    raw = np.frombuffer(direct.read(), np.float32).reshape(*lightmap.size[::-1], 4)
+    raw = np.frombuffer(direct.light.read(), np.float32).reshape(*lightmap.size[::-1], 4)
     D = lightmap.pool.tiles_from_image(raw)[..., :3].astype(np.float64) * lightmap.unit
     nodes, lost = held.nodes, 1.0 - held.received[held.node >= 0]
-    emitted = lightmap.emitted + from_sky
+    emitted = lightmap.emitted + direct.from_outside() + lightmap.sent_by_points
     escaped = emitted - (D * area).sum((0, 1, 2))
     if len(nodes):
         B = patches.mean(_in_order(lightmap, patches, albedo * H))[nodes]

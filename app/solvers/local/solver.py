@@ -21,6 +21,7 @@ from app.direct_light.shadow_rays import DirectLight
 from app.errors import UserError
 from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap
+from app.scene.lights import Light
 from app.scene.model import F64, Material
 from app.scene.sky import Sky
 from app.solvers.base import EnergyBalance, Inspection, Progress
@@ -282,7 +283,7 @@ class Local:
     def energy(self) -> EnergyBalance:
         """Where all light is now, RGB [W]. Reads every texel and waits for the GPU."""
         self._under_way.finish()
-        balance = balance_of(self.lightmap, self.direct.light, self.direct.from_sky(), self.patches, self.members)
+        balance = balance_of(self.lightmap, self.direct, self.patches, self.members)
         self._look_for_error()
         if not self.issued and self.lightmap.scene.emits:
             return replace(balance, escaped=np.zeros(3), unshot=balance.emitted)
@@ -339,11 +340,19 @@ class Local:
     def set_sky(self, sky: Sky | None) -> None:
         """Another sky: its light with the next piece of work."""
         self.lightmap.set_sky(sky)
-        if not self.issued:
+        self._follow_scene()
+
+    def set_lights(self, lights: tuple[Light, ...]) -> None:
+        """Other lamps without area: their light with the next piece of work."""
+        self.lightmap.set_lights(lights)
+        self._follow_scene()
+
+    def _follow_scene(self) -> None:
+        if self.issued:
+            self._edited = True
+            self._under_way.finish()
+        else:
             self.reset()
-            return
-        self._edited = True
-        self._under_way.finish()
 
     def _fill_anew(self) -> None:
         """Take all nodes out: they enter with the next pieces of work."""

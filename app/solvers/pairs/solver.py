@@ -19,6 +19,7 @@ import numpy as np
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
+from app.scene.lights import Light
 from app.scene.model import F64, Material
 from app.scene.sky import Sky
 from app.solvers.base import EnergyBalance, Inspection, Progress
@@ -32,6 +33,7 @@ from app.util.parts import is_running, run_to_end
 
 PIECE = 0.1  # seconds of a bounce that are one piece of work: a solve looks at its clock in between
 NO_SKY = "--solver pairs: texels gather from texels, and not from the sky; the other solvers do"
+NO_LIGHTS = "--solver pairs: texels gather from texels, and not from lamps without area; the other solvers do"
 LONG = 2.0  # seconds of a bounce, from which on it is said beforehand
 
 
@@ -46,6 +48,8 @@ class Pairs:
             raise UserError("--solver pairs: texels gather from texels of one size; not with --adaptive")
         if lightmap.scene.lit_by_sky:
             raise UserError(NO_SKY)
+        if lightmap.scene.lit_by_lights:
+            raise UserError(NO_LIGHTS)
         check(options, lightmap.texel_count)
         self._gpu, self._lightmap, self.options = gpu, lightmap, options
         self._scenes, self._pace, self._books = Scenes(gpu, lightmap), Pace(gpu), Books(lightmap)
@@ -202,6 +206,12 @@ class Pairs:
         if sky is not None and sky.emits:
             raise UserError(NO_SKY)
         self._lightmap.set_sky(sky)
+
+    def set_lights(self, lights: tuple[Light, ...]) -> None:
+        """Only such that send no light. Raises UserError."""
+        if any(light.emits for light in lights):
+            raise UserError(NO_LIGHTS)
+        self._lightmap.set_lights(lights)
 
     @property
     def _left(self) -> float:

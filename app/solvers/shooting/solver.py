@@ -17,6 +17,7 @@ from app.gpu import Framebuffer, Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
 from app.lightmap.tile_pool import Moves
+from app.scene.lights import Light
 from app.scene.model import F64, Material
 from app.scene.sky import Sky
 from app.solvers.base import EnergyBalance, Inspection, Progress
@@ -35,6 +36,7 @@ LOOK_AFTER = 32  # shots, or a quarter of all, between two looks at leaves that 
 SIGHT = "What the last shooter saw"
 PICTURES = {SIGHT: "All that the patch that shot last sees, one colour per surface"}
 NO_SKY = "--solver shooting: quadtrees do not follow the light of the sky; uniform texels do, and --solver gathering"
+NO_LIGHTS = "--solver shooting: shoots no light of lamps without area: gathering and local do"
 CHANGES_PER_SHOT = 8  # leaves that split or merge, for each shot of a piece of work: bounded work for a frame
 
 
@@ -48,6 +50,8 @@ class Shooting:
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool = True) -> None:
         """audits: whether strong shots are tried before they are made."""
         _check_sky(lightmap, lightmap.scene.sky)
+        if lightmap.scene.lit_by_lights:
+            raise UserError(NO_LIGHTS)
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
         self.batch = Batch(gpu, lightmap, options, audits=audits)
         if lightmap.refinement is not None:
@@ -310,6 +314,12 @@ class Shooting:
         batch.ambient.update(batch.bins, shown=self.options.ambient)
         if self._sky_left:
             self._before_sky = self._received()
+
+    def set_lights(self, lights: tuple[Light, ...]) -> None:
+        """Only such that send no light. Raises UserError."""
+        if any(light.emits for light in lights):
+            raise UserError(NO_LIGHTS)
+        self.lightmap.set_lights(lights)
 
     # -- leaves that come and go, see app/lightmap/refinement.py -------------------------------------------------------
 

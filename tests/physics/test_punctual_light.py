@@ -1,0 +1,113 @@
+"""Lamps without area by every solver, against closed forms."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from solver_scenes import Solution, begin, grey, quads_scene, room
+
+from app.gpu import Gpu
+from app.scene.lights import Light
+from app.scene.model import Scene
+
+SOLVERS = ("gathering", "local")
+EVERY_SOLVER = pytest.mark.parametrize("solver", SOLVERS)
+FLOOR = [[0, 0, 2], [2, 0, 2], [2, 0, 0], [0, 0, 0]]  # faces up
+POINT = Light("point", intensity=(1.0, 2.0, 3.0), position=(0.8, 1.3, 0.9))
+DOWN = (0.0, -1.0, 0.0)
+SLANTED = (0.6, -0.8, 0.0)
+
+
+def solved(gpu: Gpu, scene: Scene, solver: str) -> Solution:
+    known: dict[str, object] = {
+        "shooting": {"density": 8},
+        "gathering": {"density": 8, "smooth": False},
+        "local": {"density": 8, "shadow_rays": 64},
+    }
+    lit = begin(gpu, scene, solver=solver, **known[solver])  # type: ignore[arg-type]
+    if solver == "gathering":
+        lit.gather(64)
+    else:
+        lit.settle()
+    return lit
+
+
+@EVERY_SOLVER
+@pytest.mark.parametrize(
+    "light",
+    [
+        POINT,
+        replace(POINT, range=2.0),
+        replace(POINT, radius=0.2),
+        Light("spot", "spot", (5.0, 5.0, 5.0), (1.0, 1.5, 1.0), DOWN, 0.2, 0.7),
+        Light("sun", "directional", (1.0, 2.0, 3.0), direction=SLANTED),
+        Light("disc", "directional", (1.0, 2.0, 3.0), direction=SLANTED, angle=0.1),
+    ],
+    ids=lambda light: f"{light.name}-{light.range:g}-{light.radius:g}",
+)
+def test_an_open_floor_receives_what_the_law_says(gpu: Gpu, solver: str, light: Light) -> None:
+    """E = I(ω) w cos θ / d², or E cos θ from afar, and the books count what is sent out."""
+    scene = quads_scene([FLOOR], [grey(0.0)]).with_lights((light,))
+    lit = solved(gpu, scene, solver)
+    expected = light.irradiance(lit.position, lit.normal)
+    # over a texel of 1/8 m a spot's falloff bends by 2 % of its most, cos θ / d² by less than a hundredth
+    assert np.abs(lit.H - expected).max() < 0.02 * expected.max()
+    arrived = (lit.H * lit.area[:, None]).sum(0)
+    sent = np.array(light.intensity) * (4 * 0.8 if light.from_afar else light.solid_angle)
+    assert np.allclose(lit.book.emitted, sent, rtol=5e-3)
+    assert np.allclose(lit.book.absorbed, arrived, rtol=1e-3)
+    assert np.allclose(lit.book.emitted, lit.book.absorbed + lit.book.escaped + lit.book.unshot, rtol=5e-3)
+    lit.release()
+
+
+@EVERY_SOLVER
+@pytest.mark.parametrize("kind", ["point", "directional"])
+def test_a_board_casts_its_shadow(gpu: Gpu, solver: str, kind: str) -> None:
+    """A board of 0.5 m halfway below a point light takes 1 m of the floor, one that light from afar meets as much as it is."""
+    board = np.array([[0.75, 0.75, 1.25], [1.25, 0.75, 1.25], [1.25, 0.75, 0.75], [0.75, 0.75, 0.75]])
+    light = replace(POINT, position=(1.0, 1.5, 1.0)) if kind == "point" else Light("sun", "directional", direction=DOWN)
+    scene = quads_scene([FLOOR, board], [grey(0.0, double_sided=True)]).with_lights((light,))
+    lit = solved(gpu, scene, solver)
+    floor = (lit.object == 0) & (lit.normal[:, 1] > 0)
+    away = np.abs(lit.position[floor][:, [0, 2]] - 1.0).max(1)
+    half = 0.5 if kind == "point" else 0.25
+    H, free = lit.H[floor].mean(1), light.irradiance(lit.position, lit.normal)[floor].mean(1)
+    inside, outside = away < half - 1 / 16, away > half + 1 / 16  # half a texel of 1/8 m
+    assert H[inside].max() < 1e-3 * free.max()
+    assert np.allclose(H[outside], free[outside], rtol=0.02)
+    assert lit.H[(lit.object == 1) & (lit.normal[:, 1] < 0)].max() < 1e-3 * free.max()
+    lit.release()
+
+
+@EVERY_SOLVER
+def test_in_a_closed_room_nothing_is_lost(gpu: Gpu, solver: str) -> None:
+    """Albedo 1/2 all over: what a point light sends out is absorbed in the end, and its walls receive twice that."""
+    scene = quads_scene(room((2.0, 2.0, 2.0)), [grey(0.5)]).with_lights(
+        (POINT, replace(POINT, position=(1.5, 0.5, 1.2)))
+    )
+    lit = solved(gpu, scene, solver)
+    sent = 2 * 4 * math.pi * np.array(POINT.intensity)
+    assert np.allclose(lit.book.emitted, sent, rtol=1e-6)
+    assert np.allclose((lit.H * lit.area[:, None]).sum(0), 2 * sent, rtol=0.02)
+    assert abs(lit.book.imbalance_share) < 0.02
+    lit.release()
+
+
+@EVERY_SOLVER
+def test_light_follows_an_edit(gpu: Gpu, solver: str) -> None:
+    """Another strength, another place, and off."""
+    scene = quads_scene([FLOOR], [grey(0.0)]).with_lights((POINT,))
+    lit = solved(gpu, scene, solver)
+    for light in (
+        replace(POINT, intensity=(4.0, 1.0, 1.0)),
+        replace(POINT, position=(1.4, 1.0, 1.5)),
+        replace(POINT, on=False),
+    ):
+        lit.solver.set_lights((light,))
+        lit.settle()
+        expected = light.irradiance(lit.position, lit.normal)
+        assert np.abs(lit.H - expected).max() < 0.01 * max(float(expected.max()), 1.0)
+    lit.release()
