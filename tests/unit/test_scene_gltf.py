@@ -207,3 +207,14 @@ def test_262_thousand_triangles_load_in_under_two_seconds(tmp_path: Path) -> Non
     scene = load_gltf(path)
     assert len(scene.triangles) == 262_144
     assert time.process_time() - start < 2.0
+
+
+def test_of_variants_the_default_is_read(tmp_path: Path) -> None:
+    gltf = quad_gltf()
+    gltf.json["materials"].append({"name": "other", "pbrMetallicRoughness": {"baseColorFactor": [0.3, 0.3, 0.3, 1]}})
+    gltf.json["extensionsRequired"] = gltf.json["extensionsUsed"] = ["KHR_materials_variants"]
+    gltf.json["extensions"] = {"KHR_materials_variants": {"variants": [{"name": "worn"}]}}
+    mappings = {"mappings": [{"material": 1, "variants": [0]}]}
+    gltf.json["meshes"][0]["primitives"][0]["extensions"] = {"KHR_materials_variants": mappings}
+    scene = load(tmp_path, gltf.glb())
+    assert scene.materials[scene.material_ids[0]].name == "paint" and scene.warnings == ()
