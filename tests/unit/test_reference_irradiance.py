@@ -173,6 +173,14 @@ def test_paths_pass_what_is_not_opaque(tracer: Any, cutoff: float | None) -> Non
     assert lit[2] == pytest.approx(lit[0] / 4 if cutoff is None else 0.0, rel=0.04, abs=1e-3 * lit[0])
 
 
+def test_vertex_colours_are_a_factor_of_the_albedo(tracer: Any) -> None:
+    painted = furnace(0.8)
+    painted = replace(painted, colours=np.full((len(painted.triangles), 3, 3), 0.625, np.float32))
+    place = np.array([[1.0, 0, 1]]), np.array([[0.0, 1, 0]])
+    E = [tracer.Tracer(scene).irradiance(*place, 256, 3) for scene in (painted, furnace(0.5), furnace(0.8))]
+    assert E[0] == pytest.approx(E[1], rel=1e-5) and E[2].mean() > 1.5 * E[1].mean()
+
+
 @pytest.mark.parametrize("channel", ["emission", "albedo"])
 def test_textures_lie_as_the_solver_has_them(tracer: Any, channel: str) -> None:
     """Close to a square with four colours each point sees the one that the dense reference looks up there; turned over or shifted
