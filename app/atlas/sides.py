@@ -115,7 +115,7 @@ def weld(scene: Scene) -> tuple[F64, I32]:
     index, inverse, _ = distinct_rows(*corners.T)
     points = corners[index]
     pairs = cKDTree(points).query_pairs(WELD * scene_size(scene), output_type="ndarray")
-    count, label = _groups(len(points), pairs)
+    count, label = groups_of(len(points), pairs)
     first = np.zeros(count, np.int64)
     first[label[::-1]] = np.arange(len(points))[::-1]
     return points[first], label[inverse.reshape(-1, 3)].astype(np.int32)
@@ -133,7 +133,7 @@ def facets(points: F64, triangles: I32, materials: I32, size: float) -> I32:
     normals /= np.maximum(doubled, np.finfo(float).tiny)[:, None]
     edges = _flat_edges(corners, triangles, materials, normals)
     joins = np.concatenate([edges[0], _t_junctions(corners, normals, materials, edges[1])])
-    count, label = _groups(len(triangles), joins)
+    count, label = groups_of(len(triangles), joins)
     # plane of each piece, and how far the piece strays from it
     mean = totals(label, normals * doubled[:, None], count)
     mean /= np.maximum(np.linalg.norm(mean, axis=1), np.finfo(float).tiny)[:, None]
@@ -146,7 +146,8 @@ def facets(points: F64, triangles: I32, materials: I32, size: float) -> I32:
     return np.unique(label, return_inverse=True)[1].astype(np.int32)
 
 
-def _groups(count: int, pairs: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
+def groups_of(count: int, pairs: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
+    """How many groups so many things form that pairs (p, 2) join, and the number of that of each (count,)."""
     graph = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     number, label = connected_components(graph, directed=False)
     return int(number), label.astype(np.int64)

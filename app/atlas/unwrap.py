@@ -2,6 +2,10 @@
 
 xatlas runs in a process of its own with a time limit; its answer is cached by what went in. Where it fails, and for the
 few triangles it gives up on, every flat piece becomes a chart by itself, laid down without distortion.
+
+Surfaces of one shape are unfolded once (copies.py). What xatlas takes for a chart grows with the square of its triangles: it
+looks at all of them for each that it adds. So large surfaces have charts of about ``CHART`` triangles at most, and the largest
+are cut into pieces.
 """
 
 from __future__ import annotations
@@ -19,19 +23,24 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.sides import totals
+from app.atlas.copies import find_surfaces
+from app.atlas.sides import distinct_rows, totals
 from app.scene.model import F64, I32
 from app.util import cache
 
 Progress = Callable[[str, float], None]
 
 TIME_LIMIT_S = 120.0
-TIME_LIMIT_S_PER_TRIANGLE = 1e-3  # about ten times what xatlas takes for models that it digests
+TIME_LIMIT_S_PER_TRIANGLE = 1e-3  # more than ten times what xatlas takes for models that it digests
+EXPECTED_S = 1.0, 5e-5  # and for each triangle: what it takes, about
 POLL_S = 0.05
 CACHE_FILES = 64  # kept, newest first
-FORMAT = b"glowtree unwrap 1"  # changes when the worker's options or its answer do
+FORMAT = b"glowtree unwrap 2"  # changes when the worker's options or its answer do
 # Diagonal of what xatlas sees: it drops triangles smaller than 1e-7 in area, whatever the unit.
 XATLAS_SIZE = 1000.0
+LARGE = 4096  # triangles of a surface, from which on its charts are limited: one chart of as many takes xatlas a second
+CHART = 1024  # triangles of a chart then, if all were of one size
+PIECE = 16384  # triangles of a surface, beyond which it is cut
 # A triangle squeezed to less than this share of its area, or turned over, is unusable in its chart.
 LEAST_SHARE = 1e-4
 
@@ -67,11 +76,17 @@ def unwrap(
     if not len(triangles):
         return Unfolded(np.empty(0, np.int32), np.empty((0, 3, 2)), 0)
     warnings: list[str] = []
+    surfaces = find_surfaces(points, triangles, groups)
+    originals, of = np.unique(surfaces.original, return_inverse=True)
     try:
-        chart, uv = _xatlas(points, triangles, groups, time_limit, progress)
+        chart, uv = _xatlas(
+            points, triangles[originals], groups[originals], surfaces.surface[originals], time_limit, progress
+        )
     except _UnwrapError as failure:
         warnings.append(f"xatlas {failure}: every flat piece is a chart of its own")
-        chart, uv = np.full(len(triangles), -1, np.int32), np.zeros((len(triangles), 3, 2))
+        chart, uv = np.full(len(originals), -1, np.int32), np.zeros((len(originals), 3, 2))
+    if len(originals) < len(triangles):
+        chart, uv = _of_copies(chart[of], surfaces.surface), uv[of]
     chart, uv = _to_scale(chart, uv, corners)
     count = int(chart.max()) + 1
     rest = np.flatnonzero(chart < 0)
@@ -86,17 +101,34 @@ class _UnwrapError(Exception):
     """xatlas gave no usable answer; the message completes "xatlas ..."."""
 
 
+def _of_copies(chart: I32, surface: NDArray[np.int64]) -> I32:
+    """The charts of originals, apart for each surface that has them."""
+    inside = np.flatnonzero(chart >= 0)
+    own = np.full(len(chart), -1, np.int32)
+    own[inside] = distinct_rows(surface[inside], chart[inside])[1]
+    return own
+
+
 def _xatlas(
-    points: F64, triangles: I32, groups: I32, time_limit: float | None, progress: Progress | None
+    points: F64,
+    triangles: I32,
+    groups: I32,
+    surface: NDArray[np.int64],
+    time_limit: float | None,
+    progress: Progress | None,
 ) -> tuple[I32, F64]:
     """xatlas's own charts, from the cache or from a worker."""
     used, local = np.unique(triangles, return_inverse=True)
     centred = points[used] - (points[used].min(axis=0) + points[used].max(axis=0)) / 2
     centred *= XATLAS_SIZE / np.linalg.norm(np.ptp(centred, axis=0))
+    local = local.reshape(-1, 3)
+    meshes, scale, most_area = _meshes(centred[local], groups, surface)
     given = {
         "positions": centred.astype(np.float32),
-        "triangles": local.reshape(-1, 3).astype(np.uint32),
-        "groups": groups.astype(np.int32),
+        "triangles": local.astype(np.uint32),
+        "groups": meshes,
+        "scale": scale,
+        "most_area": np.float32(most_area),
     }
     cached = cache.entry("unwrap", cache.digest(FORMAT + version("xatlas").encode(), given))
     answer = _read(cached, len(triangles))
@@ -106,7 +138,7 @@ def _xatlas(
         with tempfile.TemporaryDirectory(prefix="glowtree-") as folder:
             source, target = Path(folder) / "in.npz", Path(folder) / "out.npz"
             np.savez(source, **given)
-            _run_worker(source, target, time_limit, progress)
+            _run_worker(source, target, time_limit, len(triangles), progress)
             answer = _read(target, len(triangles))
             if answer is None:
                 raise _UnwrapError("wrote no charts")
@@ -114,7 +146,48 @@ def _xatlas(
     return answer
 
 
-def _run_worker(source: Path, target: Path, time_limit: float, progress: Progress | None) -> None:
+def _meshes(corners: F64, groups: I32, surface: NDArray[np.int64]) -> tuple[I32, NDArray[np.float32], float]:
+    """What xatlas is given as one mesh: its number for each triangle (m,), a scale for each mesh, and the area of a chart at most
+    in these scales; 0 where no surface is large.
+
+    Small surfaces of a group are a mesh together, to no other scale, and their charts as large as xatlas likes.
+    """
+    large = np.flatnonzero(np.bincount(surface)[surface] > LARGE)
+    mesh = np.unique(groups, return_inverse=True)[1].astype(np.int32)
+    if not len(large):
+        return mesh, np.ones(int(mesh.max()) + 1, np.float32), 0.0
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    most_area = max(float(area.sum() - area[large].sum()), 1.0)
+    pieces = []
+    for rows in np.split(large[np.argsort(surface[large], kind="stable")], np.cumsum(np.bincount(surface[large]))[:-1]):
+        if len(rows):
+            pieces += _pieces(corners.mean(axis=1), rows)
+    number = int(mesh.max()) + 1
+    for k, rows in enumerate(pieces):
+        mesh[rows] = number + k
+    mesh = np.unique(mesh, return_inverse=True)[1].astype(np.int32)
+    scale = np.ones(int(mesh.max()) + 1)
+    for rows in pieces:
+        scale[mesh[rows[0]]] = np.sqrt(
+            most_area / CHART * len(rows) / max(float(area[rows].sum()), np.finfo(float).tiny)
+        )
+    return mesh, scale.astype(np.float32), most_area
+
+
+def _pieces(centre: F64, rows: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Triangles cut in two, halfway along the longest extent of their centres (m, 3), until none is larger than PIECE."""
+    if len(rows) <= PIECE:
+        return [rows]
+    along = centre[rows, np.ptp(centre[rows], axis=0).argmax()]
+    order = np.argsort(along, kind="stable")
+    middle = len(rows) // 2
+    return [
+        *_pieces(centre, np.sort(rows[order[:middle]])),
+        *_pieces(centre, np.sort(rows[order[middle:]])),
+    ]
+
+
+def _run_worker(source: Path, target: Path, time_limit: float, triangles: int, progress: Progress | None) -> None:
     """Run xatlas on source; whatever ends the wait (the limit, Ctrl-C, a cancelling callback) ends the worker."""
     root = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(p for p in (root, os.environ.get("PYTHONPATH")) if p)
@@ -128,7 +201,7 @@ def _run_worker(source: Path, target: Path, time_limit: float, progress: Progres
                 if elapsed > time_limit:
                     raise _UnwrapError(f"took longer than {time_limit:g} s")
                 if progress is not None:
-                    progress("unwrap", elapsed / (elapsed + time_limit / 10))
+                    progress("unwrap", elapsed / (elapsed + EXPECTED_S[0] + EXPECTED_S[1] * triangles))
                 time.sleep(POLL_S)
         finally:
             worker.kill()

@@ -3,7 +3,8 @@
 xatlas holds the interpreter for the whole call, cannot be cancelled and can hang or crash, so whoever wants charts
 starts this and waits with a time limit.
 
-in.npz: positions (n, 3) f32, triangles (m, 3) u32, groups (m,) i32; charts never mix groups.
+in.npz: positions (n, 3) f32, triangles (m, 3) u32, groups (m,) i32 from 0, scale (g,) f32; charts never mix groups, each to its
+scale, in which no chart grows beyond most_area, if that is not 0.
 out.npz: chart (m,) i32, -1 where xatlas made none; uv (m, 3, 2) f32 in texels of xatlas's page, not to scale.
 """
 
@@ -22,19 +23,25 @@ PAGE = 1024
 
 
 def unwrap(
-    positions: NDArray[np.float32], triangles: NDArray[np.uint32], groups: NDArray[np.int32]
+    positions: NDArray[np.float32],
+    triangles: NDArray[np.uint32],
+    groups: NDArray[np.int32],
+    scale: NDArray[np.float32],
+    most_area: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Charts of one xatlas run, as in ``out.npz``."""
-    corners = positions[triangles].astype(np.float64)
+    corners = positions[triangles].astype(np.float64) * scale[groups][:, None, None]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
     atlas = xatlas.Atlas()
-    members = [np.flatnonzero(groups == g) for g in np.unique(groups)]
-    for rows in members:
+    members = np.split(np.argsort(groups, kind="stable"), np.cumsum(np.bincount(groups))[:-1])
+    for group, rows in enumerate(members):
         used, local = np.unique(triangles[rows], return_inverse=True)
-        atlas.add_mesh(np.ascontiguousarray(positions[used]), local.reshape(-1, 3).astype(np.uint32))
+        atlas.add_mesh(np.ascontiguousarray(positions[used] * scale[group]), local.reshape(-1, 3).astype(np.uint32))
     pack = xatlas.PackOptions()
     pack.texels_per_unit = PAGE / float(np.sqrt(area))
-    atlas.generate(xatlas.ChartOptions(), pack)
+    options = xatlas.ChartOptions()
+    options.max_chart_area = most_area
+    atlas.generate(options, pack)
     chart = np.full(len(triangles), -1, np.int32)
     uv = np.zeros((len(triangles), 3, 2), np.float32)
     first = 0
@@ -51,7 +58,9 @@ def unwrap(
 def main() -> None:
     source, target = sys.argv[1:]
     with np.load(source) as given:
-        chart, uv = unwrap(given["positions"], given["triangles"], given["groups"])
+        chart, uv = unwrap(
+            given["positions"], given["triangles"], given["groups"], given["scale"], float(given["most_area"])
+        )
     np.savez(target, chart=chart, uv=uv)
 
 

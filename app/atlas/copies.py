@@ -1,0 +1,132 @@
+"""Connected surfaces, and which of them are copies: one shape that differs only by where it is, how it is turned and its size.
+
+What unfolds one of them unfolds the others: a chart is known by lengths on the surface alone. Copies list their triangles and
+corners in one order, as nodes of glTF that share a mesh and instances do; so no two surfaces need be compared in more than one
+way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.sides import distinct_rows, groups_of, totals
+from app.scene.model import F64, I32
+
+LEAST = 32  # triangles of a surface that is looked for: fewer cost no time to unfold
+SAME = 1e-4  # of a shape's radius, that a corner of a copy may be off: charts have at most some thousand texels
+ROUNDS = 8  # shapes told apart among surfaces that seem alike; what is left then is unfolded by itself
+BLOCK = 1 << 20  # corners compared at a time
+# Odd multiplier that spreads bits [Knuth, multiplicative hashing by the golden ratio].
+HASH = np.uint64(0x9E3779B97F4A7C15)
+
+I64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Surfaces:
+    """surface (m,) i64: the number of the connected surface of each triangle; original (m,) i64: the triangle that each is a copy
+    of, itself where there is none before it."""
+
+    surface: I64
+    original: I64
+
+
+def find_surfaces(points: F64, triangles: I32, groups: I32) -> Surfaces:
+    """Of triangles (m, 3) into welded points (n, 3); those of different groups (m,) are not connected."""
+    vertices = _vertices(triangles, groups)
+    surface = _connected(vertices)
+    order = np.argsort(surface, kind="stable")
+    count = np.bincount(surface)
+    first = np.cumsum(count) - count
+    original = np.arange(len(triangles))
+    corners, named = points[triangles[order]], _names(vertices[order], first, count)
+    kind = distinct_rows(count, _digest(named, first), _sizes(corners, first, count))[1]
+    for mine in np.split(np.argsort(kind, kind="stable"), np.cumsum(np.bincount(kind))[:-1]):
+        if len(mine) > 1 and count[mine[0]] >= LEAST:
+            rows = first[mine][:, None] + np.arange(count[mine[0]])
+            original[order[rows]] = order[rows[_same_shape(corners, named, rows)]]
+    return Surfaces(surface, original)
+
+
+def _vertices(triangles: I32, groups: I32) -> I64:
+    """(m, 3) numbers of the corners, apart where groups meet."""
+    corner = triangles.astype(np.int64)
+    if (groups == groups[0]).all():
+        return corner
+    apart = corner + (int(corner.max()) + 1) * groups.astype(np.int64)[:, None]
+    return distinct_rows(apart.reshape(-1))[1].reshape(-1, 3)
+
+
+def _connected(vertices: I64) -> I64:
+    """(m,) a number for each set of triangles that corners connect, in the order of their first triangles."""
+    joins = np.concatenate([vertices[:, :2], vertices[:, 1:]])
+    label = groups_of(int(vertices.max()) + 1, joins)[1][vertices[:, 0]]
+    first = np.full(int(label.max()) + 1, len(label))
+    np.minimum.at(first, label, np.arange(len(label)))
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[label]
+
+
+def _names(vertices: I64, first: I64, count: I64) -> I64:
+    """(m, 3) each corner by the place in its surface, a run of triangles, at which its vertex is named first."""
+    flat = vertices.reshape(-1)
+    before = np.empty(int(flat.max()) + 1, np.int64)
+    before[flat[::-1]] = np.arange(len(flat))[::-1]
+    return before[vertices] - np.repeat(3 * first, count)[:, None]
+
+
+def _digest(named: I64, first: I64) -> NDArray[np.uint64]:
+    """(s,) equal for surfaces that name their corners alike."""
+    place = np.arange(named.size) - np.repeat(3 * first, 3 * np.diff(np.append(first, len(named))))
+    mixed = (named.reshape(-1) + 1).astype(np.uint64) * HASH * (2 * place + 1).astype(np.uint64)
+    return np.asarray(np.add.reduceat(mixed ^ (mixed >> np.uint64(29)), 3 * first), np.uint64)
+
+
+def _sizes(corners: F64, first: I64, count: I64) -> I64:
+    """(s,) the area of each surface over the square of its extent, roughly: surfaces that seem alike may differ there."""
+    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    surface = np.repeat(np.arange(len(count)), count)
+    middle = totals(surface, corners.mean(1), len(count)) / count[:, None]
+    spread = totals(surface, ((corners - middle[surface][:, None]) ** 2).sum((1, 2)), len(count)) / count
+    least = np.finfo(float).tiny
+    ratio = totals(surface, doubled, len(count)) / np.maximum(spread, least)
+    return np.asarray(np.round(64 * np.log2(np.maximum(ratio, least))), np.int64)
+
+
+def _same_shape(corners: F64, named: I64, rows: I64) -> I64:
+    """(k,) for each of surfaces whose triangles are the rows (k, t), the first one that it is a copy of: itself, if none."""
+    same, waiting, one = np.arange(len(rows)), np.arange(1, len(rows)), 0
+    step = max(1, BLOCK // (3 * rows.shape[1]))
+    for _ in range(ROUNDS):
+        shape = _centred(corners[rows[one : one + 1]])
+        fits = np.zeros(len(waiting), bool)
+        for start in range(0, len(waiting), step):
+            mine = rows[waiting[start : start + step]]
+            alike = (named[mine] == named[rows[one]]).all((1, 2))
+            fits[start : start + step] = alike & _fits(_centred(corners[mine]), shape)
+        same[waiting[fits]] = one
+        waiting = waiting[~fits]
+        if not len(waiting):
+            break
+        one, waiting = waiting[0], waiting[1:]
+    return same
+
+
+def _centred(corners: F64) -> F64:
+    """Corners (k, t, 3, 3) of surfaces as points (k, 3 t, 3) about their middle."""
+    points = corners.reshape(len(corners), -1, 3)
+    return np.asarray(points - points.mean(axis=1, keepdims=True))
+
+
+def _fits(copies: F64, shape: F64) -> NDArray[np.bool_]:
+    """(k,) whether points (k, n, 3) about their centre are those of a shape (1, n, 3), turned and scaled [Kabsch76]."""
+    radius = np.sqrt((copies**2).sum((1, 2)) / np.maximum((shape**2).sum(), np.finfo(float).tiny))
+    u, _, v = np.linalg.svd(np.einsum("kni,nj->kij", copies, shape[0]))
+    u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]  # no mirror
+    placed = radius[:, None, None] * np.einsum("nj,kij->kni", shape[0], u @ v)
+    off = np.abs(copies - placed).max((1, 2))
+    return np.asarray(off <= SAME * radius * np.abs(shape).max())
