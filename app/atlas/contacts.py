@@ -11,6 +11,7 @@ front of it.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -21,7 +22,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from app.atlas.sides import FLAT, FLAT_ANGLE, facets, scene_size, weld
+from app.atlas.sides import FLAT, FLAT_ANGLE, distinct_rows, facets, scene_size, weld
 from app.scene.model import F64, I32, Scene
 
 GAP = 0.05  # of a texel: what is no farther from a surface lies on it
@@ -45,12 +46,28 @@ class Hidden:
 
 
 @dataclass(frozen=True, eq=False)
+class _Members:
+    """The rows that bear each of some labels: of label k, ``order`` from ``first[k]`` up to ``first[k + 1]``."""
+
+    order: I64
+    first: I64
+
+    @staticmethod
+    def of(label: I64) -> _Members:
+        """label (n,): from 0, none missing."""
+        return _Members(np.argsort(label, kind="stable"), np.cumsum(np.append(0, np.bincount(label))))
+
+    def __getitem__(self, label: int) -> I64:
+        return self.order[self.first[label] : self.first[label + 1]]
+
+
+@dataclass(frozen=True, eq=False)
 class _Facets:
     """Flat pieces of triangles, those of the scene first. corners (m, 3, 3); members: triangles of each facet; normal, point
     (n, 3): their planes; least, most (n, 3): boxes around them; depth (n,): see _depths; scene: how many are the scene's."""
 
     corners: F64
-    members: list[I64]
+    members: _Members
     normal: F64
     point: F64
     least: F64
@@ -75,7 +92,7 @@ class _Facets:
         first = np.flatnonzero(np.diff(facet[order], prepend=-1))
         return _Facets(
             corners,
-            np.split(order, first[1:]),
+            _Members(order, np.append(first, len(order))),
             normals[order[first]],
             corners[order[first], 0],
             np.minimum.reduceat(corners[order].min(1), first),
@@ -102,11 +119,11 @@ def hidden_pieces(
     two = np.array([m.double_sided for m in scene.materials])[scene.material_ids]
     all_ = _Facets.of(points - points.min(0), triangles, facet, two, flat)
     sides, side = np.unique(2 * facet[face_triangle].astype(np.int64) + face_back, return_inverse=True)
-    faces_of = np.split(np.argsort(side.reshape(-1), kind="stable"), np.cumsum(np.bincount(side.reshape(-1)))[:-1])
+    faces_of = _Members.of(side.reshape(-1))
     own, up = sides // 2, all_.normal[sides // 2] * np.where(sides % 2 == 1, -1.0, 1.0)[:, None]
     lids, left_out = _lids(all_, own, up, within, flat)
     pieces, owners = [np.empty((0, 3, 2))], [np.empty(0, np.int64)]
-    sheer = np.zeros(len(all_.members), bool)  # nothing that is not opaque hides what it lies on
+    sheer = np.zeros(len(all_.normal), bool)  # nothing that is not opaque hides what it lies on
     sheer[facet] = ~np.array([m.opaque for m in scene.materials])[scene.material_ids]
     for one, those in lids:
         lid = those[~sheer[those]]
@@ -170,26 +187,25 @@ def _lids(all_: _Facets, own: I64, up: F64, within: float, flat: float) -> tuple
     lid_planes = np.column_stack([down, (down * all_.point[lids]).sum(1)]) / units
     planes = np.column_stack([up, (up * all_.point[own]).sum(1)]) / units
     tree = cKDTree(lid_planes)
-    few = tree.query_ball_point(planes, 1.0, return_length=True) <= MOST_NEAR
-    near = dict(zip(np.flatnonzero(few).tolist(), tree.query_ball_point(planes[few], 1.0), strict=True))
-    crowded = np.flatnonzero(~few)
-    side, lid = _boxes_that_meet(all_, own[crowded], lids, np.abs(up[crowded]).argmax(1), within)
-    if len(crowded) and len(side) <= MOST_MEET:
-        one_plane = ((planes[crowded[side]] - lid_planes[lid]) ** 2).sum(1) <= 1
-        side, lid = side[one_plane], lid[one_plane]
-        ends_of = np.searchsorted(side, np.arange(len(crowded)), "right")
-        near |= zip(crowded.tolist(), np.split(lid, ends_of[:-1]), strict=True)
-    found = []
-    for one, those in sorted(near.items()):
-        mine, lid = own[one], lids[those]
-        height = (all_.point[lid] - all_.point[mine]) @ up[one]
-        lies = ((height > flat) | body[those] & (height >= -flat)) & (lid != mine)
-        lies &= (all_.least[lid] <= all_.most[mine] + within).all(1) & (
-            all_.most[lid] >= all_.least[mine] - within
-        ).all(1)
-        if lies.any():
-            found.append((one, np.unique(lid[lies])))
-    return found, len(planes) - len(near)
+    count = tree.query_ball_point(planes, 1.0, return_length=True, workers=-1)
+    few = np.flatnonzero((count > 1) & (count <= MOST_NEAR))  # one is the side's own facet
+    near = tree.query_ball_point(planes[few], 1.0, workers=-1)
+    side, lid = np.repeat(few, count[few]), np.fromiter(itertools.chain.from_iterable(near), np.int64, count[few].sum())
+    crowded = np.flatnonzero(count > MOST_NEAR)
+    there, those = _boxes_that_meet(all_, own[crowded], lids, np.abs(up[crowded]).argmax(1), within)
+    left_out = len(crowded) if len(there) > MOST_MEET else 0
+    if not left_out:
+        one_plane = ((planes[crowded[there]] - lid_planes[those]) ** 2).sum(1) <= 1
+        side, lid = np.append(side, crowded[there[one_plane]]), np.append(lid, those[one_plane])
+    mine, other = own[side], lids[lid]
+    height = np.einsum("pk,pk->p", all_.point[other] - all_.point[mine], up[side])
+    lies = ((height > flat) | body[lid] & (height >= -flat)) & (other != mine)
+    lies &= (all_.least[other] <= all_.most[mine] + within).all(1)
+    lies &= (all_.most[other] >= all_.least[mine] - within).all(1)
+    first = distinct_rows(side[lies], other[lies])[0]
+    side, other = side[lies][first], other[lies][first]
+    starts = np.flatnonzero(np.diff(side, prepend=-1))
+    return list(zip(side[starts].tolist(), np.split(other, starts[1:]), strict=True)) if len(side) else [], left_out
 
 
 def _boxes_that_meet(all_: _Facets, own: I64, lids: I64, axis: I64, within: float) -> tuple[I64, I64]:
