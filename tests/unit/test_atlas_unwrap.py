@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import platformdirs
@@ -19,7 +20,7 @@ from app.atlas.parametrize import parametrize
 from app.atlas.sides import facets, scene_size, weld
 from app.atlas.unwrap import Unfolded, unwrap
 from app.scene import shapes
-from app.scene.model import Material, Scene
+from app.scene.model import F64, I32, Material, Scene
 
 __all__ = ["own_cache"]
 
@@ -176,3 +177,53 @@ def test_slivers_that_welding_flattens_keep_their_area() -> None:
     assert np.isfinite(charts.face_uv).all()
     assert (np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) > 0).all()
     assert len(face_areas(scene, charts)) == len(charts.face_uv)
+
+
+def _counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many triangles each run of xatlas unfolds."""
+    counts: list[int] = []
+    unfold = unwrap_module._xatlas
+
+    def counting(points: F64, triangles: I32, *rest: Any) -> tuple[I32, F64]:
+        counts.append(len(triangles))
+        return unfold(points, triangles, *rest)
+
+    monkeypatch.setattr(unwrap_module, "_xatlas", counting)
+    return counts
+
+
+def test_copies_are_unfolded_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever they are, however turned and large; not what is mirrored, squeezed, or only listed alike."""
+    counts = _counted(monkeypatch)
+    pot = shapes.lathe([(0.3, 0.0), (0.5, 0.4), (0.2, 0.9), (0.35, 1.2)], 24)
+    bent = shapes.Mesh(pot.positions + [0.02, 0, 0] * pot.positions[:, 1:2] ** 2, pot.triangles, pot.uv)
+    mirrored = shapes.Mesh(pot.positions * (-1, 1, 1), pot.triangles[:, ::-1], pot.uv)
+    copy = pot.transformed(shapes.transform((2, 1, 0), (31.0, 47.0, 13.0), 0.7))
+    meshes = [pot, copy, mirrored.moved(4, 0, 0), bent.moved(6, 0, 0), copy.moved(0, 0, 3)]
+    scene = scene_of(meshes, [Material("a"), Material("b")])
+    unfolded = _unwrap(scene)
+    assert counts == [3 * len(pot.triangles)]
+    parts = [unfolded.uv[scene.object_ids == k] for k in range(5)]
+    charts = [np.unique(unfolded.chart[scene.object_ids == k]) for k in range(5)]
+    assert len(np.concatenate(charts)) == len(np.unique(np.concatenate(charts)))
+    for k in (1, 4):  # each chart is that of the first one, smaller
+        mine, first = unfolded.chart[scene.object_ids == k], unfolded.chart[scene.object_ids == 0]
+        for a, b in zip(np.unique(mine), np.unique(first), strict=True):
+            small, large = parts[k][mine == a], parts[0][first == b]
+            assert np.allclose(small - small[0, 0], 0.7 * (large - large[0, 0]), atol=1e-6)  # float32 of the transform
+    assert np.allclose(_areas(unfolded.uv).sum(), scene.normals_areas[1].sum())
+
+
+def test_charts_of_large_surfaces_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sheet with waves: xatlas would make a few charts of it, in a time that grows with the square of their triangles."""
+    for name, value in (("LARGE", 256), ("CHART", 64), ("PIECE", 512)):
+        monkeypatch.setattr(unwrap_module, name, value)
+    flat = split_grid(shapes.quad((0, 0, 0), (2, 0, 0), (0, 0, -2)), 32, 32)
+    waves = 0.1 * np.sin(5 * flat.positions[:, :1]) * np.cos(4 * flat.positions[:, 2:])
+    scene = scene_of([shapes.Mesh(flat.positions + [0, 1, 0] * waves, flat.triangles, flat.uv), BALL.moved(0, 3, 0)])
+    unfolded = _unwrap(scene)
+    sheet = scene.object_ids == 0
+    assert np.bincount(unfolded.chart[sheet]).max() < 2 * 64
+    area = scene.normals_areas[1]
+    assert (np.abs(np.log2(_areas(unfolded.uv)[sheet] / area[sheet])) < 0.5).all()  # gently curved
+    assert unfolded.by_xatlas == unfolded.chart.max() + 1
