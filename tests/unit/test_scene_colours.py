@@ -20,8 +20,9 @@ from app.reference.closed_form import no_furnace
 from app.reference.patches import make_patches
 from app.scene import shapes
 from app.scene.arrays import arrays_of
+from app.scene.ceiling_light import with_ceiling_light
 from app.scene.gltf import load_gltf
-from app.scene.load import load_scene, with_ceiling_light
+from app.scene.load import load_scene
 from app.scene.meshfile import load_meshfile
 from app.scene.model import MOST_ALBEDO, Material, Scene, Texture
 from app.scene.validate import Part, validate

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 from pathlib import Path
@@ -11,10 +12,11 @@ import pytest
 from scene_files import quad_gltf, written
 
 from app.errors import SceneError, UserError
-from app.scene.cameras import default_camera
+from app.scene.cameras import default_camera, look_at
+from app.scene.ceiling_light import with_ceiling_light
 from app.scene.library import scene_names, scene_path
-from app.scene.load import NO_LIGHT, load_scene, with_ceiling_light
-from app.scene.model import Material, Scene
+from app.scene.load import NO_LIGHT, load_scene
+from app.scene.model import Camera, Material, Scene
 from app.scene.shapes import Mesh, box, icosphere, merged, quad
 from app.scene.validate import Part, validate
 
@@ -105,7 +107,75 @@ def test_ceiling_light_is_not_in_the_plane_of_a_ceiling() -> None:
     roof, ceiling = quad((-2, 2, -4), (0, 0, 8), (4, 0, 0)), quad((-2, 1.98, -4), (4, 0, 0), (0, 0, 8))
     floor = quad((-2, 0, -4), (0, 0, 8), (4, 0, 0))
     lit = with_ceiling_light(scene_of(merged([roof, ceiling, floor])))
-    assert np.allclose(lit.corners[-1][:, 1], 1.96)
+    assert np.allclose(lit.corners[-1][:, 1], 0.99 * 1.98)
+
+
+def slabs(x: float, y: float, z: float, thick: float = 0.25) -> list[Mesh]:
+    """A house of one room of that size, its floor at y = 0: six closed slabs, faces outwards."""
+    walls = [box((thick, y, z)).moved(s * (x + thick) / 2, y / 2, 0) for s in (-1, 1)]
+    walls += [box((x + 2 * thick, y, thick)).moved(0, y / 2, s * (z + thick) / 2) for s in (-1, 1)]
+    plan = (x + 2 * thick, thick, z + 2 * thick)
+    return [*walls, box(plan).moved(0, -thick / 2, 0), box(plan).moved(0, y + thick / 2, 0)]
+
+
+def l_shape() -> Mesh:
+    """A room of 12 × 12 × 3 m without its quarter at +x, +z: the middle of its box is a corner of it."""
+    plan = np.array([(0, 0), (12, 0), (12, 4), (4, 4), (4, 12), (0, 12)], float)
+    floor = np.array([(0, 1, 2), (0, 2, 3), (0, 3, 5), (3, 4, 5)])
+    count = len(plan)
+    up = np.insert(plan, 1, 0.0, axis=1), np.insert(plan, 1, 3.0, axis=1)
+    walls = [t for i in range(count) for j in [(i + 1) % count] for t in ((i, j, i + count), (j, j + count, i + count))]
+    triangles = np.concatenate([floor[:, ::-1], floor + count, np.array(walls)])
+    return Mesh(np.concatenate(up), triangles, np.zeros((2 * count, 2)))
+
+
+def _lamp(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    corners = scene.corners[-2:].reshape(-1, 3)
+    return corners.min(0), corners.max(0)
+
+
+def test_ceiling_light_hangs_in_the_room_not_in_the_slab_over_it() -> None:
+    low, high = _lamp(with_ceiling_light(scene_of(*slabs(5, 3, 4))))
+    assert low[1] == high[1] == pytest.approx(0.99 * 3) and np.allclose((low + high)[[0, 2]], 0)
+    assert np.allclose((high - low)[[0, 2]], [1.25, 1])
+
+
+def test_ceiling_light_is_clear_of_what_hangs_from_the_ceiling() -> None:
+    beam = box((8, 0.4, 0.2)).moved(0, 2.8, 0.1)
+    low, _ = _lamp(with_ceiling_light(scene_of(*slabs(8, 3, 4), beam)))
+    assert low[1] == pytest.approx(0.99 * 2.6)
+
+
+def test_ceiling_light_hangs_in_the_room_where_the_camera_is() -> None:
+    upper = [mesh.moved(0, 3.5, 0) for mesh in slabs(5, 3, 4)]
+    house = scene_of(*slabs(5, 3, 4), *upper)
+    for floor in (0.0, 3.5):
+        camera = Camera("here", look_at((2, floor + 1.6, 1), (0, floor + 1, 0)), 1.0)
+        assert _lamp(with_ceiling_light(dataclasses.replace(house, cameras=(camera,))))[0][1] == pytest.approx(
+            floor + 2.97
+        )
+
+
+def test_ceiling_light_of_an_object_hangs_above_it() -> None:
+    assert _lamp(with_ceiling_light(scene_of(icosphere(1.0, 2))))[0][1] > 1.1
+
+
+def test_default_camera_and_ceiling_light_are_in_a_room_of_two_wings() -> None:
+    scene = scene_of(l_shape())
+    camera = default_camera(scene)
+    eye, forward = camera.world_from_camera[:3, 3], -camera.world_from_camera[:3, 2]
+    low, high = _lamp(with_ceiling_light(scene))
+    assert high[0] - low[0] > 0.5
+    for x, y, z in (eye, eye + 8 * forward, low, high):
+        assert 0 < x < 12 and 0 < y < 3 and 0 < z < 12 and (x < 4 or z < 4)
+
+
+def test_default_camera_stands_in_a_closed_room_beside_what_is_none() -> None:
+    """The house is a wing of a larger scene: its middle is in the open."""
+    house = [mesh.moved(-6, 0, -6) for mesh in slabs(8, 3, 6)]
+    garden = box((20, 0.1, 20)).moved(0, -0.3, 0)
+    eye = default_camera(scene_of(*house, garden, box((1, 4, 1)).moved(8, 2, 8))).world_from_camera[:3, 3]
+    assert (np.abs(eye - [-6, 1.5, -6]) < [4, 1.5, 3]).all()
 
 
 def looks_at_all(scene: Scene) -> bool:
