@@ -28,11 +28,11 @@ NAMED = ("o", "g", "usemtl", "mtllib")
 class _Mesh:
     """What the lines say, in order; corners are ``position/texture/normal`` as written, polygons as fans."""
 
-    numbers: dict[str, list[list[float]]] = field(default_factory=lambda: {kind: [] for kind in KINDS})
+    numbers: dict[str, list[float]] = field(default_factory=lambda: {kind: [] for kind in KINDS})  # one after the other
     colours: dict[int, list[float]] = field(default_factory=dict)  # by position
     corners: list[str] = field(default_factory=list)  # 3 per triangle
     fans: list[int] = field(default_factory=list)  # triangles of each face
-    object_ids: list[int] = field(default_factory=list)
+    object_ids: list[int] = field(default_factory=list)  # of each face
     material_ids: list[int] = field(default_factory=list)
     objects: dict[str, int] = field(default_factory=dict)
     materials: dict[str, int] = field(default_factory=dict)
@@ -47,7 +47,10 @@ def load_obj(path: Path) -> Scene:
         raise SceneError(path, f"cannot be read: {error.strerror}") from error
     mesh = _read_lines(path, text)
     corners = _corner_indices(path, mesh)
-    object_ids, material_ids = np.array(mesh.object_ids, np.int64), np.array(mesh.material_ids, np.int64)
+    fans = np.array(mesh.fans, np.int64)
+    object_ids, material_ids = (
+        np.repeat(np.array(ids, np.int64), fans) for ids in (mesh.object_ids, mesh.material_ids)
+    )
     values: dict[str, NDArray[Any] | None] = {}
     for column, kind in enumerate(KINDS):
         table = np.array(mesh.numbers[kind], np.float64).reshape(-1, KINDS[kind])
@@ -57,7 +60,7 @@ def load_obj(path: Path) -> Scene:
             raise SceneError(path, f"{kind} index {index} is out of range: there are {len(table)}")
         if kind == "v":
             positions = table
-            corners, of = _with_ears_clipped(positions, corners, np.array(mesh.fans))
+            corners, of = _with_ears_clipped(positions, corners, fans)
             object_ids, material_ids = object_ids[of], material_ids[of]
         elif (corners[:, column] < 0).all():
             values[kind] = None
@@ -100,16 +103,16 @@ def _read_lines(path: Path, text: str) -> _Mesh:
                 if len(values) < width:
                     raise ValueError(f"{key} needs {width} numbers")
                 if key == "v" and len(words) > 6:
-                    mesh.colours[len(mesh.numbers[key])] = [float(w) for w in words[4:7]]
-                mesh.numbers[key].append(values)
+                    mesh.colours[len(mesh.numbers[key]) // width] = [float(w) for w in words[4:7]]
+                mesh.numbers[key] += values
             elif key == "f":
                 corners = [_absolute(c, mesh) for c in words[1:]] if "-" in line else words[1:]
                 for k in range(1, len(corners) - 1):
                     mesh.corners += (corners[0], corners[k], corners[k + 1])
-                count = max(len(corners) - 2, 0)
-                mesh.fans.append(count)
-                mesh.object_ids += [mesh.objects.setdefault(object_name, len(mesh.objects))] * count
-                mesh.material_ids += [mesh.materials.setdefault(material_name, len(mesh.materials))] * count
+                if len(corners) > 2:
+                    mesh.fans.append(len(corners) - 2)
+                    mesh.object_ids.append(mesh.objects.setdefault(object_name, len(mesh.objects)))
+                    mesh.material_ids.append(mesh.materials.setdefault(material_name, len(mesh.materials)))
             elif key in ("o", "g"):
                 object_name = name or path.stem
             elif key == "usemtl":
@@ -118,8 +121,8 @@ def _read_lines(path: Path, text: str) -> _Mesh:
                 mesh.libraries.append(name)
         except ValueError as error:
             raise SceneError(path, f"line {number}: {error}") from error
-    check_triangle_count(path, len(mesh.object_ids))
-    if not mesh.object_ids:
+    check_triangle_count(path, len(mesh.corners) // 3)
+    if not mesh.fans:
         raise SceneError(path, "no triangles")
     return mesh
 
@@ -130,34 +133,37 @@ def _absolute(corner: str, mesh: _Mesh) -> str:
     for word, kind in zip(corner.split("/"), KINDS, strict=False):
         index = int(word) if word else 0
         if index < 0:
-            index += len(mesh.numbers[kind]) + 1
+            count = len(mesh.numbers[kind]) // KINDS[kind]
+            index += count + 1
             if index < 1:
-                raise ValueError(f"{kind} index {word} is out of range: there are {len(mesh.numbers[kind])} so far")
+                raise ValueError(f"{kind} index {word} is out of range: there are {count} so far")
         out.append(str(index) if word else "")
     return "/".join(out)
 
 
 def _corner_indices(path: Path, mesh: _Mesh) -> NDArray[np.int64]:
     """(3m, 3) position, texture and normal index of each corner, from 0; -1 where it has none."""
-    parsed: dict[str, tuple[int, ...]] = {}
-    for corner in dict.fromkeys(mesh.corners):
+    number = {corner: k for k, corner in enumerate(dict.fromkeys(mesh.corners))}
+    parsed = []
+    for corner in number:
         words = [*corner.split("/"), "", ""][:3]
         try:
-            indices = tuple(int(w) - 1 if w else -1 for w in words)
+            indices = [int(w) - 1 if w else -1 for w in words]
         except ValueError as error:
             raise SceneError(path, f"'{corner[:40]}' is not a corner of a face") from error
         given = [i for i, w in zip(indices, words, strict=True) if w]
         if indices[0] < 0 or min(given) < 0 or max(given) >= 2**40:
             raise SceneError(path, f"'{corner[:40]}' has an index out of range")
-        parsed[corner] = indices
-    return np.array([parsed[c] for c in mesh.corners], np.int64)
+        parsed.append(indices)
+    which = np.fromiter(map(number.__getitem__, mesh.corners), np.int64, len(mesh.corners))
+    return np.array(parsed, np.int64)[which]
 
 
 def _colours(mesh: _Mesh) -> NDArray[np.float32] | None:
     """(n, 3) linear Rec.709 of the positions, NaN where one has none; None if none has any."""
     if not mesh.colours:
         return None
-    srgb = np.full((len(mesh.numbers["v"]), 3), np.nan, np.float32)
+    srgb = np.full((len(mesh.numbers["v"]) // KINDS["v"], 3), np.nan, np.float32)
     srgb[list(mesh.colours)] = list(mesh.colours.values())
     return linear_from_srgb(srgb)
 
