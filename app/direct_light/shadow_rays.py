@@ -375,6 +375,23 @@ class DirectLight:
             blend=blend,
         )
 
+    def apart(self, scene: Scene, others: Framebuffer, sky: Framebuffer) -> bool:
+        """Write the light of all but the sky, and that of the sky as SKY_RAYS rays have gathered it. Whether there is one."""
+        lit_now = [lit for lit in self.sets if lit.passes.any() and _emits(lit, scene)]
+        skies = [lit for lit in lit_now if isinstance(lit, SkyLit) and not lit.is_sun]
+        if not skies:
+            return False
+        assert self._sky is not None
+        mesh = Mesh(self._gpu, self._everywhere.tobytes(), QUAD_FORMAT, per_instance=True)
+        others.clear()
+        for lit in lit_now:
+            if lit not in skies:
+                self._add_light(lit, scene, others, mesh, "add")
+        _, textures, uniforms = self._sky.adding(skies[0], self._origins.normals)
+        self._sky.gathered.draw(sky, textures=textures, uniforms=uniforms, mesh=mesh)
+        self._gpu.release_all(mesh)
+        return True
+
     def from_outside(self) -> F64:
         """Power that the sky, the sun and directional lights send to the texels, RGB [W]: their irradiance, as it is known. Waits
         for the GPU."""

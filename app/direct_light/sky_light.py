@@ -56,7 +56,8 @@ class SkyLit:
 
 
 class SkyLight:
-    """Programs, and what they read, for the light of sky and sun on one lightmap."""
+    """Programs, and what they read, for the light of sky and sun on one lightmap. gathered: the light of the sky alone as rays
+    have gathered it, to be smoothed."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, rays: dict[str, object], a_pass: int) -> None:
         """rays: defines of visibility/rays.glsl; a_pass: shadow rays in one."""
@@ -66,6 +67,8 @@ class SkyLight:
             {sun: Pass(gpu, name, defines={"SUN": sun} | reads | more, vertex="common/rects") for sun in (False, True)}
             for name, more in (("direct_light/sky_rays", {"PASS": a_pass} | rays), ("direct_light/sky_light", {}))
         )
+        gathered = {"GATHERED": True} | reads
+        self.gathered = Pass(gpu, "direct_light/sky_light", defines=gathered, vertex="common/rects")
 
     def lit(self, sky: Sky, stream: int, passes_table: Texture, *, sun: bool) -> SkyLit:
         """Of another sky, or its sun, nothing of which is known yet."""

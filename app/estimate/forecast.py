@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from app.atlas.texels import TexelSurfaces
 from app.scene.model import F64
+from app.scene.sky import Sky
+from app.scene.sky_directions import directions_of
 
 POINTS, LAMP_POINTS = 384, 64  # on all surfaces, and on lamps besides
 CELLS = 48  # along the scene's longest edge, at most
@@ -22,6 +24,7 @@ TEXELS_PER_CELL = 1.5  # edges: a surface's cells have no holes
 NEAR = 2.5  # cells around both points that hide nothing
 PLANE = 1.25  # cells above a point's plane, up to which lie those of its own surface
 BOUNCES = 50
+SKY_ERROR = 0.02  # of directions that stand for the sky: as few as there may be
 SEED = 2
 
 
@@ -33,14 +36,20 @@ class Forecast(NamedTuple):
     irradiance: F64
 
 
-def forecast(surfaces: TexelSurfaces, albedo: NDArray[np.floating], exitance: NDArray[np.floating]) -> Forecast:
-    """albedo, exitance E [W/m²]: of each texel (tiles, t, t, 3)."""
+def forecast(
+    surfaces: TexelSurfaces, albedo: NDArray[np.floating], exitance: NDArray[np.floating], sky: Sky | None = None
+) -> Forecast:
+    """albedo, exitance E [W/m²]: of each texel (tiles, t, t, 3). sky: seen by each point as far as it sees no other."""
     at, area = _points(surfaces.area.ravel(), exitance.max(-1).ravel())
     rho, E = (texels.reshape(-1, 3)[at].astype(np.float64) for texels in (albedo, exitance))
-    if not E.any():
+    if not E.any() and sky is None:
         return Forecast(area, rho, np.zeros_like(E))
-    F = _form_factors(surfaces, at, area)
-    H = direct = F @ E
+    grid = _Grid(surfaces)
+    F = _form_factors(surfaces, at, area, grid)
+    direct = F @ E
+    if sky is not None:
+        direct = direct + _from_sky(surfaces, at, grid, sky)
+    H = direct
     for _ in range(BOUNCES):
         H = direct + F @ (rho * H)
     return Forecast(area, rho, H)
@@ -65,7 +74,18 @@ def _points(area: F64, exitance: NDArray[np.floating]) -> tuple[NDArray[np.int64
     return (np.concatenate(points), np.concatenate(areas)) if points else (np.zeros(0, np.int64), np.zeros(0))
 
 
-def _form_factors(surfaces: TexelSurfaces, at: NDArray[np.int64], area: F64) -> F64:
+def _from_sky(surfaces: TexelSurfaces, at: NDArray[np.int64], grid: _Grid, sky: Sky) -> F64:
+    """(n, 3) what points receive of sky and sun [W/m²]."""
+    p, n = surfaces.position.reshape(-1, 3)[at], surfaces.normal.reshape(-1, 3)[at].astype(np.float64)
+    towards, irradiance = directions_of(sky, SKY_ERROR)
+    cosine = n @ towards.T
+    i, k = np.nonzero(cosine > 0)
+    light = np.zeros(cosine.shape)
+    light[i, k] = cosine[i, k] * grid.free(p[i], n[i], p[i] + grid.width * towards[k], -towards[k])
+    return np.asarray(light @ irradiance)
+
+
+def _form_factors(surfaces: TexelSurfaces, at: NDArray[np.int64], area: F64, grid: _Grid) -> F64:
     """(n, n) from each point to the disc around each other one."""
     p, n = surfaces.position.reshape(-1, 3)[at], surfaces.normal.reshape(-1, 3)[at].astype(np.float64)
     way = p[None] - p[:, None]
@@ -73,7 +93,6 @@ def _form_factors(surfaces: TexelSurfaces, at: NDArray[np.int64], area: F64) -> 
     leaves, arrives = np.einsum("ijk,ik->ij", way, n), -np.einsum("ijk,jk->ij", way, n)
     F = np.maximum(leaves, 0) * np.maximum(arrives, 0) / squared * area / (np.pi * squared + area / 4)
     i, j = np.nonzero(np.triu(F))
-    grid = _Grid(surfaces)
     free = np.zeros(F.shape, bool)
     free[i, j] = free[j, i] = grid.free(p[i], n[i], p[j], n[j])
     F *= free
@@ -88,6 +107,7 @@ class _Grid:
         covered = surfaces.area > 0
         points = surfaces.position[covered]
         self._low = points.min(0)
+        self.width = float(np.linalg.norm(np.ptp(points, axis=0)))  # diagonal [m]: what is farther is beyond all
         texel = float(np.sqrt(np.quantile(surfaces.area[covered], 0.9)))  # small charts' texels are covered in part
         self.cell = max(float(np.ptp(points, axis=0).max()) / CELLS, TEXELS_PER_CELL * texel)
         index = np.floor((points - self._low) / self.cell).astype(np.int64)

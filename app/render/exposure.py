@@ -29,7 +29,8 @@ def first_exposure(pool: TilePool) -> float:
     materials = pool.scene.materials
     albedo = sampled_colours(pool, [m.albedo for m in materials], pool.albedo_tiles, slice(None))
     emission = sampled_colours(pool, [m.emission for m in materials], pool.emission_tiles, slice(None))
-    light = forecast(pool.surfaces, albedo, np.float32(np.pi) * emission)
+    sky = pool.scene.sky if pool.scene.lit_by_sky else None
+    light = forecast(pool.surfaces, albedo, np.float32(np.pi) * emission, sky)
     return _exposure(light.albedo * light.irradiance, light.area)
 
 

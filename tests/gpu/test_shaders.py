@@ -76,6 +76,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "SKY": FLAG,
     "PIXELS": (1024,),
     "SUN": FLAG,
+    "GATHERED": FLAG,
     "TRACED": FLAG,
     "FINER": FLAG,
     "RADIUS": (0, 1, RADIUS),

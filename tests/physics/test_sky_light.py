@@ -178,3 +178,17 @@ def test_what_cannot_follow_a_sky_says_so(gpu: Gpu) -> None:
         begin(gpu, scene, density=2, adaptive=True)
     with pytest.raises(UserError, match="pairs"):
         Pairs(gpu, Lightmap(gpu, TilePool(scene, parametrize(scene, density=2))), PairsOptions())
+
+
+def test_light_of_the_sky_is_smoothed_by_as_much_as_it_is_noisy(gpu: Gpu) -> None:
+    scene = quads_scene([FLOOR, WALL], [grey(0.0, double_sided=True)]).with_sky(Sky())
+    off = []
+    for smooth in (False, True):
+        lit = begin(gpu, scene, solver="gathering", density=16, smooth=smooth)
+        lit.gather(32)
+        floor = (lit.object == 0) & (lit.normal[:, 1] > 0)
+        off.append(lit.H[floor].mean(1) / (np.pi * (1 - wall_factor(lit.position[floor]))) - 1)
+        lit.release()
+    raw, smoothed = off
+    assert np.abs(smoothed).mean() < 0.5 * np.abs(raw).mean()
+    assert abs(smoothed.mean()) < 5e-3

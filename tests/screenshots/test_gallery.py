@@ -125,6 +125,7 @@ REELS = (
     ),
     Reel("museum", 40_000, GATHERING, (Picture("museum-gathering", 512),), solver="gathering"),
     Reel("textured-room", 60_000, GATHERING, (Picture("textured-room-gathering", 128),), solver="gathering"),
+    Reel("living-room", 40_000, GATHERING, (Picture("living-room", 64),), solver="gathering"),
     Reel(
         "village",
         0,

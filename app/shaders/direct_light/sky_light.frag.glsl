@@ -1,5 +1,6 @@
 // The direct light of the sky, or of the sun, U Σ w V / Σ w, as its shadow rays have it so far. Blended.
 #define SUN 0
+#define GATHERED 0  // 1: as what SKY_RAYS rays have gathered, see solvers/gathering/gather.frag.glsl
 #include "common/atlas.glsl"
 #include "common/tile.glsl"
 uniform sampler2D t_seen;  // see sky_rays.frag.glsl
@@ -15,6 +16,7 @@ uniform vec3 u_scale;        // of the sky; of the sun what faces it receives [s
 
 layout(location = 0) out vec4 out_direct;  // a: variance of the mean of RGB
 
+const float SKY_RAYS = 8.0;  // two groups of four
 const int NORMALS = 33;  // along the edge of the square: odd, so that axes are nodes
 
 vec2 octahedral(vec3 n) {
@@ -36,4 +38,8 @@ void main() {
     float mean = dot(U, vec3(1.0 / 3.0)), sum = dot(all, vec3(1.0)), V = sum > 0.0 ? dot(seen.rgb, vec3(1.0)) / sum : 0.0;
     float spread = max(seen.a / passes - V * V, 0.0);
     out_direct = vec4(U * seen.rgb / max(all, vec3(1e-30)), mean * mean * spread / max(passes - 1.0, 1.0));
+#if GATHERED
+    float light = dot(out_direct.rgb, vec3(1.0 / 3.0));
+    out_direct = vec4(out_direct.rgb * SKY_RAYS, 0.5 * SKY_RAYS * SKY_RAYS * (out_direct.a + light * light));
+#endif
 }

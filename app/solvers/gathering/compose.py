@@ -11,19 +11,22 @@ from typing import Any
 
 import numpy as np
 
-from app.gpu import Framebuffer, Gpu, Pass, ReadBack, Texture
+from app.direct_light.shadow_rays import DirectLight
+from app.gpu import Framebuffer, Gpu, Pass, ReadBack, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
-from app.scene.model import F64
+from app.scene.model import F64, Scene
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
 RADIUS = 4  # of the window that indirect light is smoothed over, in points
+SKY_RAYS = int(glsl_constant("direct_light/sky_light.frag.glsl", "SKY_RAYS"))
 
 
 class Compose:
     """Of one lightmap, with its points. Whoever makes it releases it.
 
     indirect: of the points [stored units], a: variance of the mean of RGB. variance: of H of the lightmap, of the mean of RGB.
+    direct: the direct light that was drawn last.
     """
 
     def __init__(
@@ -46,6 +49,9 @@ class Compose:
         self._indirect_target = gpu.target(self.indirect)
         self._target: Framebuffer | None = None
         self._of: Texture | None = None
+        self.direct: Texture | None = None
+        self._sky: tuple[Texture, Texture] | None = None  # direct light with a sky's smoothed; the sky's alone
+        self._sky_targets: tuple[Framebuffer, Framebuffer] | None = None
         self._walls = self._look_for_walls(rays)
         self._windows = self._open_windows()
         self._fit()
@@ -94,15 +100,31 @@ class Compose:
 
     def smooth(self, gathered: Texture, rays: int, *, smooth: bool) -> None:
         """Bring ``indirect`` up to date with what so many rays of each point have gathered."""
+        self._smooth_into(self._indirect_target, gathered, max(rays, 1), RADIUS if smooth else 0, None)
+
+    def _smooth_into(self, target: Framebuffer, gathered: Texture, rays: int, radius: int, blend: str | None) -> None:
         textures = {"t_gathered": gathered} | self._windows
-        uniforms = {"u_rays": float(max(rays, 1))}
+        uniforms = {"u_rays": float(rays)}
         self._aim.draw(self._pilot_target, textures=textures, uniforms=uniforms)
-        how = self._smooth[RADIUS if smooth else 0]
-        how.draw(self._indirect_target, textures=textures | {"t_pilot": self._pilot}, uniforms=uniforms)
+        textures |= {"t_pilot": self._pilot}
+        self._smooth[radius].draw(target, textures=textures, uniforms=uniforms, blend=blend)
+
+    def smoothed_sky(self, direct: DirectLight, scene: Scene) -> Texture:
+        """Direct light, where texels are the points, with that of the sky smoothed as indirect light is: both come from all
+        around."""
+        if not scene.lit_by_sky or self._finer:
+            return direct.light
+        if self._sky is None or self._sky_targets is None:
+            self._sky = self._gpu.texture(self._points.size, 4, "f4"), self._gpu.texture(self._points.size, 4, "f4")
+            self._sky_targets = self._gpu.target(self._sky[0]), self._gpu.target(self._sky[1])
+        if not direct.apart(scene, *self._sky_targets):
+            return direct.light
+        self._smooth_into(self._sky_targets[0], self._sky[1], SKY_RAYS, RADIUS, "add")
+        return self._sky[0]
 
     def draw(self, direct: Texture) -> None:
         """Write H of the lightmap, the direct light and ``indirect``."""
-        lightmap = self._lightmap
+        lightmap, self.direct = self._lightmap, direct
         if (irradiance := lightmap.texture("t_irradiance")) is not self._of:
             self._forget_target()
             self._target, self._of = self._gpu.target(irradiance, self.variance), irradiance
@@ -128,6 +150,7 @@ class Compose:
 
     def resized(self) -> None:
         """The tile pool has got another number of slots."""
+        self.direct = None
         self._forget_target()
         self._gpu.release_all(self._noise_target, self._noise, self.variance)
         self._fit()
@@ -141,6 +164,8 @@ class Compose:
         self._forget_target()
         self._gpu.release_all(self._noise_target, self._noise, self.variance, self._indirect_target, self.indirect)
         self._gpu.release_all(self._pilot_target, self._pilot, self._walls)
+        if self._sky is not None and self._sky_targets is not None:
+            self._gpu.release_all(*self._sky_targets, *self._sky)
         self._gpu.release_all(*self._windows.values())
 
 

@@ -44,7 +44,7 @@ class Inspectable:
 
     def layers(self, rays: int) -> Mapping[str, Texture]:
         """See app/solvers/base.py. rays: of each texel."""
-        return {"direct": self._direct.light, "variance": self._compose.variance, "rays": self._ray_counts(rays)}
+        return {"direct": self._shown, "variance": self._compose.variance, "rays": self._ray_counts(rays)}
 
     def _ray_counts(self, rays: int) -> Texture:
         """Rays of each texel, the same for all."""
@@ -78,9 +78,14 @@ class Inspectable:
             rays=None if outgoing is None else self.rays(texel, outgoing),
         )
 
+    @property
+    def _shown(self) -> Texture:
+        """Direct light as it is shown."""
+        return self._compose.direct or self._direct.light
+
     def _parts(self, texel: tuple[int, int]) -> dict[str, F64]:
         """Direct and indirect H [W/m²]."""
-        target = self._gpu.target(self._direct.light)
+        target = self._gpu.target(self._shown)
         stored = np.frombuffer(target.read((*texel, 1, 1), 3, dtype="f4", alignment=1), np.float32)
         self._gpu.release_all(target)
         direct = stored.astype(np.float64) * self._lightmap.unit

@@ -141,7 +141,7 @@ class Gathering:
             self.origins.write(slots)
             yield from self.direct.shoot_tiles(slots)
             self.direct.sum(self.lightmap.scene)
-            self._compose.draw(self.direct.light)
+            self._compose.draw(self._direct_light)
             self._judge()
         yield from refinement.look(CHANGES_PER_RAY * BATCH, bands, self.issued)
         if refinement.stable:
@@ -200,13 +200,21 @@ class Gathering:
 
     def _judge(self) -> None:
         """Let the GPU say how noisy the light that is shown is."""
-        self._judged.append((self.issued, self.lightmap.version, self._compose.judge(self.direct.light)))
+        self._judged.append(
+            (self.issued, self.lightmap.version, self._compose.judge(self._compose.direct or self.direct.light))
+        )
 
     def _show(self, rays: int) -> None:
         """What so many rays of each texel have gathered."""
         self._compose.smooth(self.bounces.gathered, rays, smooth=self.options.smooth)
-        self._compose.draw(self.direct.light)
+        self._compose.draw(self._direct_light)
         self._shown, self.drawn = rays, self.drawn + 1
+
+    @property
+    def _direct_light(self) -> Texture:
+        """As it is shown."""
+        smooth = self.options.smooth
+        return self._compose.smoothed_sky(self.direct, self.lightmap.scene) if smooth else self.direct.light
 
     @property
     def _directs(self) -> tuple[DirectLight, ...]:

@@ -19,9 +19,9 @@ from app.gpu import Gpu, Pass
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
 from app.scene.sky import Sky
+from app.scene.sky_directions import Directions, axes_of, directions_of
 from app.solvers.shooting.choose import band_of
 from app.solvers.shooting.records import BATCH, OPEN
-from app.solvers.shooting.sky_directions import Directions, axes_of, directions_of
 from app.visibility.occluders import Occluders
 
 PIXELS = 1024  # along the edge of a map

@@ -1,4 +1,4 @@
-"""The directions from which the sky is shot: stratified by its power, so many that open surfaces receive what they should."""
+"""Directions that stand for the sky: stratified by its power, so many that open surfaces receive what they should."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Directions(NamedTuple):
         return np.asarray(np.maximum(normals @ self.towards.T, 0) @ self.irradiance)
 
 
-def directions_of(sky: Sky | None) -> Directions:
-    """Of the sun first, then of the sky, such that some of the first are spread over all of it."""
-    parts = [] if sky is None else [_sun(sky), _sky(sky)]
+def directions_of(sky: Sky | None, error: float = ERROR) -> Directions:
+    """Of the sun first, then of the sky, such that some of the first are spread over all of it. error: as ERROR."""
+    parts = [] if sky is None else [_sun(sky), _sky(sky, error)]
     towards, irradiance = (np.concatenate([np.empty((0, 3)), *(part[i] for part in parts)]) for i in (0, 1))
     lit = irradiance.any(1)
     return Directions(towards[lit], irradiance[lit])
@@ -49,15 +49,15 @@ def _sun(sky: Sky) -> Directions:
     return Directions(towards, np.tile(sky.sun_irradiance / SUN_SHOTS, (SUN_SHOTS, 1)))
 
 
-def _sky(sky: Sky) -> Directions:
-    """As few as are right to ERROR, or the most."""
+def _sky(sky: Sky, error: float) -> Directions:
+    """As few as are right to that, or the most."""
     if not sky.shines:
         return Directions(np.empty((0, 3)), np.empty((0, 3)))
     normals = NORMALS / np.linalg.norm(NORMALS, axis=1, keepdims=True)
     right = sky.scale * sky.shape_irradiance(normals)
     for count in COUNTS:
         found = _stratified(sky, count)
-        if np.abs(found.on(normals) - right).max() <= ERROR * right.max():
+        if np.abs(found.on(normals) - right).max() <= error * right.max():
             break
     return found
 
