@@ -79,13 +79,9 @@ def laid_out(scene: Scene, solved: Laid) -> Laid:
     square = _squares(scene, charts, faces, uv)
     world = scene.normals_areas[1][charts.face_triangle[faces]]
     face_uv, size = _placed(uv, world, square, int(solved.covered.sum()), charts.tile)
-    own = dataclasses.replace(
-        charts.with_faces(faces),
-        size=size,
-        face_uv=face_uv,
-        hidden_uv=np.empty((0, 3, 2)),
-        hidden_face=np.empty(0, np.int64),
-    )
+    own = charts.with_faces(faces)
+    hidden = _carried(own.hidden_uv, own.face_uv[own.hidden_face], face_uv[own.hidden_face])
+    own = dataclasses.replace(own, size=size, face_uv=face_uv, hidden_uv=hidden)
     leaves = uniform_leaves(own)
     surfaces = on_their_faces(scene, own, texel_surfaces(scene, own, leaves))
     there = surfaces.face >= 0
@@ -99,6 +95,13 @@ def laid_out(scene: Scene, solved: Laid) -> Laid:
     image[where] = light_at(solved.image, charts, points)
     known[where] = True
     return Laid(own, image, known, int(square.max()) + 1)
+
+
+def _carried(pieces: F64, old: F64, new: F64) -> F64:
+    """Pieces (k, 3, 2) of triangles (k, 3, 2) where those are moved to."""
+    flat = [np.pad(triangles, ((0, 0), (0, 0), (0, 1))) for triangles in (pieces, old)]
+    weights = barycentric(flat[0].reshape(-1, 3), np.repeat(flat[1], 3, axis=0)).reshape(-1, 3, 3)
+    return np.asarray(np.einsum("kpc,kcx->kpx", weights, new))
 
 
 def _shown(scene: Scene, solved: Laid) -> NDArray[np.int64]:

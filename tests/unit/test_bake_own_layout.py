@@ -130,6 +130,22 @@ def test_squares_of_objects_are_placed_side_by_side(tmp_path: Path) -> None:
     assert np.allclose(ratio[0] / ratio[1], 4.0, rtol=0.05)  # the box is 4 times as small; whole texels
 
 
+def test_what_something_stands_on_is_no_texel() -> None:
+    room = _room()
+    assert room.uv1 is not None
+    box = shapes.box((1.0, 1.0, 1.0)).transformed(shapes.transform((0.0, -1.0, 0.0), (0.0, 0.0, 0.0), 1.0))
+    scene = scene_of([box_room(), box], [room.materials[0]])
+    scene = dataclasses.replace(scene, uv1=np.concatenate([room.uv1[:12]] * 2))
+    solved = _solved(scene, 6000)
+    assert len(solved.charts.hidden_uv)
+    laid = laid_out(scene, solved)
+    surfaces = texel_surfaces(scene, laid.charts, uniform_leaves(laid.charts))
+    of_room = (surfaces.face >= 0) & (scene.object_ids[laid.charts.face_triangle[surfaces.face]] == 0)
+    floor = surfaces.position[of_room & (np.abs(surfaces.position[..., 1] + 1.5) < 1e-6)]
+    # where a corner of the box lies in a texel, light is taken beside it, from places an eighth of a texel apart
+    assert len(floor) > 500 and np.abs(floor[:, [0, 2]]).max(axis=1).min() > 0.5 - 0.25 / solved.charts.density
+
+
 def test_sides_of_a_sheet_have_one_place_unless_no_light_comes_to_one() -> None:
     room = _room()
     assert room.uv1 is not None
