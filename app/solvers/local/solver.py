@@ -26,6 +26,7 @@ from app.scene.model import F64, Material
 from app.scene.sky import Sky
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.local.balance import balance_of, matrix_error
+from app.solvers.local.exchange import Exchange
 from app.solvers.local.form_factors import LocalSet
 from app.solvers.local.inspectable import facts_of, figures_of
 from app.solvers.local.lighting import SWEEPS, Lighting
@@ -34,7 +35,7 @@ from app.solvers.local.members import DRIFT, Members
 from app.solvers.local.options import LocalOptions
 from app.solvers.local.patches import patch_count, patches_of
 from app.solvers.local.rows import BYTES, ROWS_OF_A_NODE, Rows, rows_in
-from app.solvers.local.selection import Selection, Swap, swaps
+from app.solvers.local.selection import Swap
 from app.solvers.local.tiles import Tiles
 from app.util.parts import UnderWay, run_to_end
 from app.visibility.origins import Origins
@@ -43,9 +44,6 @@ from app.visibility.rays import RayScene
 I64 = NDArray[np.int64]
 SOFTWARE, HARDWARE = 1024, 4096  # patches of the set by default, where a CPU rasterises and where not
 WHOLE = 3  # highest level of patches that are large so that a whole scene is in the set
-FILLING = 64  # nodes that enter at once while the set is filled
-ROWS = 256  # made at once before that, and
-ROWS_WHILE_WALKING = 48  # while it goes on
 LEFT, MOST_REFLECTED = 1e-4, 0.99  # of light, that bounces may leave; mean albedo that their number allows for
 OUTSIDE_BOUNCES = 8  # between the set and what is outside of it
 FADE, FADED = 0.75, 16  # share of what was shown that stays in each picture after nodes came and went, and for how many
@@ -72,7 +70,6 @@ class Local:
         self._parts: list[Any] = []
         self._under_way = UnderWay()
         self._fading = self._bounces_left = self.issued = 0
-        self._first = True  # whether the set is filled for the first time
         # whether lamps are others, change in every piece of work, and direct light is known of all tiles as they are now
         self._edited, self._editing, self._all_known, self._lit = False, False, True, False
         self._escaped, self._error = np.zeros(3), 0.0
@@ -107,9 +104,9 @@ class Local:
         lighting = Lighting(gpu, lightmap, self.origins, patches, rows.places, most, 2**level)
         self._parts.append(lighting)
         self.options, self.patches, self.rows, self.lighting, self.level = options, patches, rows, lighting, level
-        self._selection = Selection(patches, most)
         self.set, self.matrix = LocalSet(patches, rows, most), matrix
         self.members = Members(self.set, matrix, self._albedo())
+        self.exchange = Exchange(patches, rows, self.set, self.members, matrix)
 
     # -- work ----------------------------------------------------------------------------------------------------------
 
@@ -136,8 +133,8 @@ class Local:
         if self._tiles.dark_near(self.direct):
             yield from self._shoot(tiles, bands)
         else:
-            yield from self._make_rows()
-            if plan := self._plan():
+            yield from self.exchange.make_rows()
+            if plan := self.exchange.plan():
                 entered = yield from self._swap(plan, bands)
             elif len(tiles):
                 yield from self._shoot(tiles, bands)
@@ -196,47 +193,16 @@ class Local:
         reflected = min(self.members.mean_albedo, MOST_REFLECTED)
         return int(np.ceil(np.log(LEFT) / np.log(reflected) / SWEEPS)) if reflected > 0 else 0
 
-    def _make_rows(self) -> Iterator[None]:
-        """Rows that nodes need which are to enter, nearest first."""
-        wanted = self._wanted
-        missing = wanted[~self.rows.has(wanted)]
-        at_once = ROWS if self._first else ROWS_WHILE_WALKING
-        if len(missing):
-            yield from self.rows.make(missing[:at_once], np.concatenate([self.set.nodes, wanted]))
-
-    def _plan(self) -> list[Swap]:
-        """The next nodes that enter and leave, whole swaps whose rows are there, or that enter anew."""
-        have_rows = bool(self.rows.has(self._wanted).all())
-        if self._first and not have_rows:
-            return []
-        held = self.set
-        plan = list(swaps(self.patches, held.nodes, self._wanted, held.free, self._tiles.observer, self.rows.has))
-        if not plan and have_rows:
-            plan = [Swap((node,), (node,)) for node in self.members.stale()]
-        return plan
-
     def _swap(self, plan: list[Swap], bands: int) -> Generator[None, None, int]:
-        """Carry out as much of the plan as a piece of work may; less where an edit waits for it to end."""
-        at_once, diagonals = self.options.swaps, dict[int, float]()
-        if self._first:  # rows of a part of the set must not sum to more than those of all of it
-            at_once = FILLING
-            diagonals = dict(zip(self._wanted.tolist(), self.set.diagonals(self._wanted).tolist(), strict=True))
-        entered: list[int] = []
-        for swap in plan:
-            full = len(entered) + len(swap.enter) > at_once or not self.matrix.has_room(swap.leave, swap.enter)
-            if entered and (full or self._edited):
-                break
-            yield
-            entered += self.members.swap(swap, diagonals)
-        self.issued += len(entered)
-        self.members.entered[entered] = self.members.pieces
-        self._first = self._first and self.to_come > 0
+        """Nodes enter and leave, less of them where an edit waits for it to end."""
+        entered = yield from self.exchange.swap(plan, self.options.swaps, lambda: self._edited)
+        self.issued += entered
         if self.options.bounces == "series" and self.members.left > self.set.most:
             self._fill_anew()  # paths through nodes that left pile up
         yield from self.matrix.flush_in(FLUSH_PARTS * bands)
         self.lighting.set_slots(self.set.slot_at)
         self._lit = False
-        return len(entered)
+        return entered
 
     # -- how far it is -------------------------------------------------------------------------------------------------
 
@@ -245,7 +211,7 @@ class Local:
         if wait:
             self._under_way.finish()
         emits = self.lightmap.scene.emits
-        wanted = max(len(self._wanted), 1)
+        wanted = max(len(self.wanted), 1)
         here = self.to_come / wanted
         shadow = 0.0
         if self.direct.sets:
@@ -304,7 +270,6 @@ class Local:
         self.direct.follow(self.lightmap.scene)
         self._edited, self._editing, self._all_known, self._lit = False, False, True, False
         self._fading = self._bounces_left = self.issued = 0
-        self._first = True  # whether the set is filled for the first time
         self._escaped, self._error = np.zeros(3), 0.0
         self._look()
 
@@ -319,7 +284,7 @@ class Local:
             self.rows.set_memory(options.row_memory, self.set.most)
             self.options = options
             self._look()
-            self.rows.make_room(0, np.concatenate([self.set.nodes, self._wanted]))
+            self.rows.make_room(0, self.exchange.needed)
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light of other lamps with the next piece of work; of other albedos, while nodes enter
@@ -358,7 +323,7 @@ class Local:
         """Take all nodes out: they enter with the next pieces of work."""
         self.members.clear()
         self.lighting.set_slots(self.set.slot_at)
-        self._first, self._lit = True, False
+        self.exchange.first, self._lit = True, False
 
     def _albedo(self) -> F64:
         """(nodes, 3) of each patch and cluster."""
@@ -378,10 +343,7 @@ class Local:
 
     def _look(self) -> None:
         """Which nodes are wanted in the set from here."""
-        choose = self._selection.cascade if self.options.outside == "cascade" else self._selection.nearest
-        before, self._wanted = getattr(self, "_wanted", None), choose(self._tiles.observer)
-        if before is None or not np.array_equal(before, self._wanted):
-            self.members.look_again()
+        self.exchange.look(self._tiles.observer, self.options.outside)
 
     # -- what there is to see ------------------------------------------------------------------------------------------
 
@@ -396,12 +358,12 @@ class Local:
     @property
     def wanted(self) -> I64:
         """The nodes that the set is to have, nearest first."""
-        return self._wanted
+        return self.exchange.wanted
 
     @property
     def to_come(self) -> int:
-        """How many of the nodes that are wanted are not in the set yet."""
-        return int((self.set.slot[self._wanted] < 0).sum())
+        """How many of these are not in the set yet."""
+        return self.exchange.to_come
 
     def inspect(self, texel: tuple[int, int] | None = None, *, images: bool = False) -> Inspection:
         """What the set, its rows and its matrix are; of a texel, the node that it is in."""
@@ -422,8 +384,8 @@ class Local:
         """Each part of a piece of work by itself, to be timed."""
         self._under_way.finish()
         tiles = self._tiles.in_turn()
-        node, needed = int(self._wanted[0]), np.concatenate([self.set.nodes, self._wanted])
-        run_to_end(self.rows.make(self._wanted[:1][~self.rows.has(self._wanted[:1])], needed))
+        node, needed = int(self.wanted[0]), self.exchange.needed
+        run_to_end(self.rows.make(self.wanted[:1][~self.rows.has(self.wanted[:1])], needed))
 
         def swap() -> None:
             if self.set.slot[node] >= 0:
