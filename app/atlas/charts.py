@@ -15,6 +15,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from app.atlas.seams import Seams
+
 TILES = (8, 16, 32)  # texels along the edge of a leaf tile
 DEFAULT_TILE = 16  # [Coombe03, 4.1]
 GAP = 2  # empty texels between charts: one gutter texel for each neighbour
@@ -34,6 +36,7 @@ class Charts:
     chart_rects (c, 4) i32: x, y, width, height of each chart in whole texels.
     dark_faces: number of sides left out because nothing in the scene lies in front of them.
     method: how the charts were made, e.g. ``12 rectangles, 932 xatlas charts``.
+    seams: edges across which a surface goes on in another chart.
     hidden_uv (k, 3, 2) f64, hidden_face (k,): pieces of faces that something lies on, no part of any texel, see contacts.py.
     """
 
@@ -49,6 +52,7 @@ class Charts:
     dark_faces: int
     method: str
     warnings: tuple[str, ...] = ()
+    seams: Seams = field(default_factory=Seams)
     hidden_uv: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3, 2)))
     hidden_face: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 

@@ -21,6 +21,7 @@ from app.atlas.contacts import hidden_pieces
 from app.atlas.cuts import GOES_ON
 from app.atlas.packing import MAX_SIDE, outlines, pack
 from app.atlas.rectangles import Rectangles, find_rectangles
+from app.atlas.seams import find_seams
 from app.atlas.sides import Sides, distinct_rows, facets, lit_sides, scene_size, totals, weld
 from app.atlas.unwrap import unwrap
 from app.errors import UserError
@@ -115,6 +116,7 @@ def parametrize(
         dark_faces=lit.dark,
         method=method,
         warnings=warnings,
+        seams=find_seams(scene, corners, lit.triangle, lit.back, face_uv, face_chart, ends),
         hidden_uv=hidden.uv,
         hidden_face=hidden.face,
     )

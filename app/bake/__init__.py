@@ -19,7 +19,7 @@ from app.atlas.charts import Charts
 from app.bake.exr import write_irradiance
 from app.bake.gltf_writer import glb_bytes
 from app.errors import UserError
-from app.lightmap.gutter import fill_gutter
+from app.lightmap.seams import finished
 from app.scene.model import F32, Scene
 from app.util.json_text import json_text
 
@@ -72,7 +72,7 @@ def write_bake(
     files = BakeFiles(directory / IRRADIANCE_NAME, directory / SCENE_NAME, directory / REPORT_NAME)
     temporary = {path: path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") for path in vars(files).values()}
     try:
-        write_irradiance(temporary[files.irradiance], fill_gutter(irradiance, covered))
+        write_irradiance(temporary[files.irradiance], finished(irradiance, covered, charts))
         temporary[files.scene].write_bytes(glb_bytes(scene, charts, IRRADIANCE_NAME))
         temporary[files.report].write_text(json_text(report), encoding="utf-8")
         for path, written in temporary.items():

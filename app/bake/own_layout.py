@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from app.atlas.charts import Charts
 from app.atlas.packing import MAX_SIDE, outlines, pack
 from app.atlas.points import Points, barycentric
+from app.atlas.seams import Seams
 from app.atlas.sides import totals
 from app.atlas.texels import texel_surfaces, uniform_leaves
 from app.lightmap.at_points import light_at
-from app.lightmap.gutter import fill_gutter
+from app.lightmap.seams import finished
 from app.lightmap.tiles import on_their_faces
 from app.scene.model import F32, F64, Scene
 from app.scene.validate import counted
@@ -44,8 +45,8 @@ class Laid:
 
     @property
     def image(self) -> F32:
-        """The irradiance with filled gutters."""
-        return fill_gutter(self.irradiance, self.covered)
+        """The irradiance with filled gutters, and one light for both charts near seams."""
+        return finished(self.irradiance, self.covered, self.charts)
 
 
 def why_not_kept(scene: Scene, solved: Laid) -> str | None:
@@ -81,7 +82,7 @@ def laid_out(scene: Scene, solved: Laid) -> Laid:
     face_uv, size = _placed(uv, world, square, int(solved.covered.sum()), charts.tile)
     own = charts.with_faces(faces)
     hidden = _carried(own.hidden_uv, own.face_uv[own.hidden_face], face_uv[own.hidden_face])
-    own = dataclasses.replace(own, size=size, face_uv=face_uv, hidden_uv=hidden)
+    own = dataclasses.replace(own, size=size, face_uv=face_uv, hidden_uv=hidden, seams=Seams())
     leaves = uniform_leaves(own)
     surfaces = on_their_faces(scene, own, texel_surfaces(scene, own, leaves))
     there = surfaces.face >= 0

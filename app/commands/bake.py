@@ -8,6 +8,7 @@ import itertools
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from app.commands.steps import estimate, open_scene, session_options, solve
 from app.errors import UserError
 from app.gpu import gpu_context
 from app.lightmap.collapse import collapse
+from app.lightmap.gutter import fill_gutter
+from app.lightmap.seams import jumps
 from app.session.session import Session
 from app.solvers import SOLVERS
 from app.util.console import Console
@@ -47,6 +50,7 @@ def bake(flags: argparse.Namespace) -> int:
         result = report(session) | {"texels_not_finite": lost}
         irradiance = np.where(finite[..., None], np.maximum(irradiance, 0), np.float32(0))  # no light is still owed
         laid = Laid(session.charts, irradiance, covered & finite)
+        result |= _seams(laid)
         if not flags.unwrap and session.scene.uv1 is not None:
             against = why_not_kept(session.scene, laid)
             if against is None:
@@ -59,13 +63,31 @@ def bake(flags: argparse.Namespace) -> int:
                 console.warn(note)
                 result["warnings"].append(note)
         files = write_bake(flags.output, session.scene, laid.charts, laid.irradiance, laid.covered, result)
-        line = summary(session, result)
+        line = summary(session, result) + _at_seams(result)
         session.release()
     if failure is not None:
         raise UserError(f"{failure}; {flags.output} has the light of all texels but {lost}")
     result = {"output": [str(path) for path in vars(files).values()], **result}
     console.result(result, f"{flags.output}: {line}")
     return 130 if result["interrupted"] or not whole else 0
+
+
+def _seams(laid: Laid) -> dict[str, Any]:
+    """How far light jumps at seams, before and after it was made one there, and beside them from texel to texel: over its mean,
+    median and 90 % quantile. Nothing where there are none."""
+    if not len(laid.charts.seams):
+        return {}
+    before = jumps(fill_gutter(laid.irradiance, laid.covered), laid.charts)
+    after = jumps(laid.image, laid.charts)
+    return {"seams": {"places": after.places, "before": before.across, "after": after.across, "beside": before.within}}
+
+
+def _at_seams(result: dict[str, Any]) -> str:
+    """The same, in words."""
+    if "seams" not in result:
+        return ""
+    before, after, beside = (result["seams"][name][0] for name in ("before", "after", "beside"))
+    return f", light jumps by {after:.1%} at seams ({before:.1%} before, {beside:.1%} between texels beside them)"
 
 
 @contextlib.contextmanager

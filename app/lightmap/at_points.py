@@ -10,14 +10,14 @@ import numpy as np
 from app.atlas.charts import Charts
 from app.atlas.points import Points, SideIndex, bilinear
 from app.lightmap.collapse import collapse
-from app.lightmap.gutter import fill_gutter
 from app.lightmap.lightmap import Lightmap
+from app.lightmap.seams import finished
 from app.scene.model import F32, F64
 
 
 def irradiance_of(lightmap: Lightmap, points: Points) -> F64:
     """(n, 3) [W/m²], bilinear, as a bake would hold it: with what is still to come."""
-    image = fill_gutter(*collapse(lightmap.pool, lightmap.irradiance(ambient=True)))
+    image = finished(*collapse(lightmap.pool, lightmap.irradiance(ambient=True)), lightmap.charts)
     return light_at(image, lightmap.charts, points)
 
 

@@ -23,6 +23,7 @@ from app.render.edges import Kind, reached_from
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS, Layer
 from app.render.options import DisplayOptions
+from app.render.seam_texels import DisplaySeams
 from app.render.tone_mapping import curve
 
 # Texels around each tile: as many as interpolation at its edge reaches beyond it
@@ -63,6 +64,7 @@ class DisplayTexels:
         }
         self._write_places()
         self._edges = EdgeTexels(gpu, lightmap, border)
+        self._seams = DisplaySeams(gpu, lightmap, border)
         self._stale = np.empty(0, np.int64)  # slots whose display texels are of other leaves
         defines = lightmap.defines("TILE") | {"BORDER": border}
         self._find_sources = Pass(gpu, "render/source", defines=defines)
@@ -132,6 +134,8 @@ class DisplayTexels:
         self._edges.draw(self._target, first, first + rows, make_edges)
         self._stale = self._stale[:0]
         smooth = layer.smooth and display.interpolation != "nearest"
+        if smooth and layer.light is not None:
+            self._seams.draw(first, first + rows, lambda mesh: draw("seams", self._target, mesh=mesh, scissor=band))
         filtering = self._gpu.ctx.LINEAR if smooth else self._gpu.ctx.NEAREST
         self._colour.filter = (filtering, filtering)
         names = ("t_shown_pages", "t_places")
@@ -155,6 +159,7 @@ class DisplayTexels:
         )
         rects.release()
         self._edges.follow(touched)
+        self._seams.follow()
         self._stale = np.union1d(self._stale, changed)
 
     def _leaf_keys(self) -> NDArray[np.int64]:
@@ -180,6 +185,7 @@ class DisplayTexels:
 
     def release(self) -> None:
         self._edges.release()
+        self._seams.release()
         targets = (self._target, self._unlit_target, self._source_target)
         self._gpu.release_all(*targets, self._colour, self._unlit, self._nothing, *self._tables.values())
 
@@ -208,7 +214,7 @@ class DisplayTexels:
     def _pass(self, name: str, layer: Layer, shader: str, rects: bool, **more: bool) -> Pass:
         key = name, layer, shader, rects, *more.values()
         if key not in self._passes:
-            own = ("TILE",) if name == "edges" else ()
+            own = ("TILE",) if name in ("edges", "seams") else ()
             defines = self._lightmap.defines(*layer.defines, *own) | more
             slots = {"layer": f"render/layers/{layer.shader}.glsl", "curve": f"render/{shader}.glsl"}
             vertex = "common/rects" if rects else FULLSCREEN

@@ -19,7 +19,7 @@ import numpy as np
 from app.errors import UserError
 from app.gpu import gpu_context
 from app.lightmap.collapse import collapse
-from app.lightmap.gutter import fill_gutter
+from app.lightmap.seams import finished
 from app.session.run import Stop
 from app.session.session import Session
 from app.session.stats import Stats
@@ -46,7 +46,7 @@ def solve(source: Path, target: Path) -> int:
         if session.run.interrupted:
             return INTERRUPTED
         lightmap, charts = session.lightmap, session.charts
-        image = fill_gutter(*collapse(lightmap.pool, lightmap.irradiance(ambient=True)))
+        image = finished(*collapse(lightmap.pool, lightmap.irradiance(ambient=True)), lightmap.charts)
         answer = {
             "image": image,
             "triangle": charts.face_triangle,

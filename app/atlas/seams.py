@@ -1,0 +1,132 @@
+"""Seams are edges across which a smooth surface goes on in another chart, and where the light of both charts is made one.
+
+Texels of two charts have other centres, and each chart ends with its own: bilinear look-ups from both sides of an edge differ by
+as much as light does over half a texel or more. So light fades from one chart to the other within a texel of their edge: at a
+distance s beyond it (before it: s < 0) [texels],
+
+    H(s) = (1 - w) H_own + w H_other,   w = (1 + s)/2, held in [0, 1],
+
+for every texel near the edge, also those around the chart that cover nothing. Where something stands on an edge, light may jump.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.cuts import JUMPS
+from app.atlas.rectangles import CREASE
+from app.atlas.sides import distinct_rows
+from app.scene.model import F64, I32, Scene
+
+REACH = 1.5  # texels: bilinear look-ups inside of a chart reach √2 beyond its edge
+SAME_NORMAL = 1e-3  # that shared vertex normals may differ by
+
+I64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Seams:
+    """Each edge from both sides, all from one side first. own (k, 2, 2): its ends in the atlas [texels of level 0], with its
+    chart to the left; other (k, 2, 2): the same ends in the other chart, which lies to the right there."""
+
+    own: F64 = field(default_factory=lambda: np.empty((0, 2, 2)))
+    other: F64 = field(default_factory=lambda: np.empty((0, 2, 2)))
+
+    def __len__(self) -> int:
+        return len(self.own)
+
+    def points(self, step: float) -> tuple[F64, F64, F64]:
+        """Places along the edges, each edge once, about so many texels apart: in its own chart (n, 2) and in the other (n, 2);
+        the way into its own chart (n, 2), one texel long."""
+        once = slice(0, len(self) // 2)
+        own, other = self.own[once], self.other[once]
+        way = own[:, 1] - own[:, 0]
+        length = np.linalg.norm(way, axis=1)
+        count = np.maximum(np.ceil(length / step), 1).astype(np.int64)
+        edge = np.repeat(np.arange(len(own)), count)
+        nth = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+        t = ((nth + 0.5) / count[edge])[:, None]
+        inward = np.stack([-way[:, 1], way[:, 0]], axis=1) / length[:, None]
+        return own[edge, 0] + t * way[edge], other[edge, 0] + t * (other[edge, 1] - other[edge, 0]), inward[edge]
+
+
+@dataclass(frozen=True, eq=False)
+class SeamTexels:
+    """Texels of one level near seams: x, y of each (n, 2); other (n, 2): where its surface goes on [texels of level 0];
+    weight (n,) of what is there."""
+
+    texel: I64
+    other: F64
+    weight: F64
+
+
+def find_seams(
+    scene: Scene,
+    corners: I32,
+    triangle: I32,
+    back: NDArray[np.bool_],
+    uv: F64,
+    chart: I32,
+    ends: NDArray[np.uint8] | None,
+) -> Seams:
+    """corners (m, 3): welded, of all triangles; triangle, back, uv, chart of the faces; ends: see cuts.py."""
+    face = np.repeat(np.arange(len(triangle)), 3)
+    k = np.tile(np.arange(3), len(triangle))
+    # a back is seen the other way round
+    first, second = np.where(back[face], (k + 1) % 3, k), np.where(back[face], k, (k + 1) % 3)
+    start, end = corners[triangle[face], first], corners[triangle[face], second]
+    kind = distinct_rows(np.minimum(start, end), np.maximum(start, end), back[face])
+    order = np.argsort(kind[1], kind="stable")
+    two = np.flatnonzero(kind[2] == 2)
+    at = (np.cumsum(kind[2]) - kind[2])[two]
+    a, b = order[at], order[at + 1]
+    meets = (start[a] == end[b]) & (start[a] != end[a]) & (chart[face[a]] != chart[face[b]])
+    a, b = a[meets], b[meets]
+    ta, tb = triangle[face[a]], triangle[face[b]]
+    smooth = scene.material_ids[ta] == scene.material_ids[tb]
+    if ends is not None:
+        smooth &= (ends[ta, k[a]] != JUMPS) & (ends[tb, k[b]] != JUMPS)
+    if scene.normals is None:
+        normals = scene.normals_areas[0]
+        smooth &= np.einsum("ek,ek->e", normals[ta], normals[tb]) > np.cos(CREASE)
+    else:
+        for mine, theirs in ((first, second), (second, first)):
+            apart = scene.normals[ta, mine[a]] - scene.normals[tb, theirs[b]]
+            smooth &= np.abs(apart).max(1) < SAME_NORMAL
+    a, b = a[smooth], b[smooth]
+    one = np.stack([uv[face[a], first[a]], uv[face[a], second[a]]], axis=1)
+    other = np.stack([uv[face[b], second[b]], uv[face[b], first[b]]], axis=1)
+    return Seams(np.concatenate([one, other[:, ::-1]]), np.concatenate([other, one[:, ::-1]]))
+
+
+def seam_texels(seams: Seams, finer: int = 1) -> SeamTexels:
+    """The texels near seams where there are so many of them along an edge of a texel of level 0; each by its nearest seam."""
+    own, other = seams.own * finer, seams.other * finer
+    low = np.floor(own.min(1) - REACH).astype(np.int64)
+    across, up = (np.ceil(own.max(1) + REACH).astype(np.int64) - low).T
+    count = across * up
+    seam = np.repeat(np.arange(len(own)), count)
+    nth = np.arange(len(seam)) - np.repeat(np.cumsum(count) - count, count)
+    texel = low[seam] + np.stack([nth % across[seam], nth // across[seam]], axis=1)
+    way, there = own[:, 1] - own[:, 0], other[:, 1] - other[:, 0]
+    length = np.linalg.norm(way, axis=1)
+    from_start = texel + 0.5 - own[seam, 0]
+    t = np.clip((from_start * way[seam]).sum(1) / length[seam] ** 2, 0.0, 1.0)[:, None]
+    far = np.linalg.norm(from_start - t * way[seam], axis=1)
+    near = far <= REACH
+    seam, texel, t, far, from_start = seam[near], texel[near], t[near], far[near], from_start[near]
+    right = np.stack([way[:, 1], -way[:, 0]], axis=1) / length[:, None]
+    beyond = np.where((from_start * right[seam]).sum(1) > 0, far, -far)
+    order = np.lexsort((far, texel[:, 0], texel[:, 1]))
+    fresh = np.r_[True, (np.diff(texel[order], axis=0) != 0).any(1)][: len(order)]
+    seam, texel, t, beyond = (values[order[fresh]] for values in (seam, texel, t, beyond))
+    outward = (
+        np.stack([there[:, 1], -there[:, 0]], axis=1) / length[:, None]
+    )  # as long as a texel of the own chart is there
+    place = other[seam, 0] + t * there[seam] + np.maximum(beyond, 0.0)[:, None] * outward[seam]
+    weight = np.clip((1 + beyond) / 2, 0.0, 1.0)
+    some = weight > 0
+    return SeamTexels(texel[some], place[some] / finer, weight[some])
