@@ -8,12 +8,14 @@ light escapes, and which rooms it hardly reaches.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.texels import TexelSurfaces
+from app.scene.lights import Light
 from app.scene.model import F64
 from app.scene.sky import Sky
 from app.scene.sky_directions import directions_of
@@ -37,18 +39,30 @@ class Forecast(NamedTuple):
 
 
 def forecast(
-    surfaces: TexelSurfaces, albedo: NDArray[np.floating], exitance: NDArray[np.floating], sky: Sky | None = None
+    surfaces: TexelSurfaces,
+    albedo: NDArray[np.floating],
+    exitance: NDArray[np.floating],
+    sky: Sky | None = None,
+    lights: Sequence[Light] = (),
 ) -> Forecast:
-    """albedo, exitance E [W/m²]: of each texel (tiles, t, t, 3). sky: seen by each point as far as it sees no other."""
+    """albedo, exitance E [W/m²]: of each texel (tiles, t, t, 3). sky, and lights without area: seen by each point as far as it
+    sees no other."""
     at, area = _points(surfaces.area.ravel(), exitance.max(-1).ravel())
     rho, E = (texels.reshape(-1, 3)[at].astype(np.float64) for texels in (albedo, exitance))
-    if not E.any() and sky is None:
+    shining = [light for light in lights if light.emits]
+    if not E.any() and sky is None and not shining:
         return Forecast(area, rho, np.zeros_like(E))
     grid = _Grid(surfaces)
     F = _form_factors(surfaces, at, area, grid)
     direct = F @ E
-    if sky is not None:
-        direct = direct + _from_sky(surfaces, at, grid, sky)
+    p, n = surfaces.position.reshape(-1, 3)[at], surfaces.normal.reshape(-1, 3)[at].astype(np.float64)
+    if sky is not None or shining:
+        direct = direct + _from_beyond(p, n, grid, sky, shining)
+    for light in shining:
+        if not light.from_afar:
+            end = np.broadcast_to(light.position, p.shape)
+            away = (p - end) / np.maximum(np.linalg.norm(p - end, axis=1, keepdims=True), 1e-30)
+            direct = direct + light.irradiance(p, n) * grid.free(p, n, end, away)[:, None]
     H = direct
     for _ in range(BOUNCES):
         H = direct + F @ (rho * H)
@@ -74,10 +88,9 @@ def _points(area: F64, exitance: NDArray[np.floating]) -> tuple[NDArray[np.int64
     return (np.concatenate(points), np.concatenate(areas)) if points else (np.zeros(0, np.int64), np.zeros(0))
 
 
-def _from_sky(surfaces: TexelSurfaces, at: NDArray[np.int64], grid: _Grid, sky: Sky) -> F64:
-    """(n, 3) what points receive of sky and sun [W/m²]."""
-    p, n = surfaces.position.reshape(-1, 3)[at], surfaces.normal.reshape(-1, 3)[at].astype(np.float64)
-    towards, irradiance = directions_of(sky, SKY_ERROR)
+def _from_beyond(p: F64, n: F64, grid: _Grid, sky: Sky | None, lights: Sequence[Light]) -> F64:
+    """(n, 3) what points p (n, 3) with normals n (n, 3) receive of sky, sun and directional lights [W/m²]."""
+    towards, irradiance = directions_of(sky, lights, SKY_ERROR)
     cosine = n @ towards.T
     i, k = np.nonzero(cosine > 0)
     light = np.zeros(cosine.shape)

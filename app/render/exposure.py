@@ -30,7 +30,7 @@ def first_exposure(pool: TilePool) -> float:
     albedo = sampled_colours(pool, [m.albedo for m in materials], pool.albedo_tiles, slice(None))
     emission = sampled_colours(pool, [m.emission for m in materials], pool.emission_tiles, slice(None))
     sky = pool.scene.sky if pool.scene.lit_by_sky else None
-    light = forecast(pool.surfaces, albedo, np.float32(np.pi) * emission, sky)
+    light = forecast(pool.surfaces, albedo, np.float32(np.pi) * emission, sky, pool.scene.lights)
     return _exposure(light.albedo * light.irradiance, light.area)
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from app.scene.lights import Light
 from app.scene.model import F64
 from app.scene.sky import SUN_ANGLE, Sky, solid_angles
 
@@ -13,7 +15,7 @@ COUNTS = (64, 128, 256, 512, 1024)
 ERROR = (
     2.5e-3  # of the most that any surface receives, by which what one receives may be off where nothing hides the sky
 )
-SUN_SHOTS = 8  # over the sun's disc
+SUN_SHOTS = 8  # over the disc of the sun, or of a directional light
 GOLDEN = (5**0.5 - 1) / 2
 NORMALS = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) != (0, 0, 0)])
 
@@ -29,24 +31,29 @@ class Directions(NamedTuple):
         return np.asarray(np.maximum(normals @ self.towards.T, 0) @ self.irradiance)
 
 
-def directions_of(sky: Sky | None, error: float = ERROR) -> Directions:
-    """Of the sun first, then of the sky, such that some of the first are spread over all of it. error: as ERROR."""
-    parts = [] if sky is None else [_sun(sky), _sky(sky, error)]
+def directions_of(sky: Sky | None, lights: Sequence[Light] = (), error: float = ERROR) -> Directions:
+    """Of directional lights and the sun first, then of the sky, such that some of the first are spread over all of it. error: as
+    ERROR."""
+    parts = [_disc(-np.array(s.direction), s.angle, np.array(s.intensity)) for s in lights if s.from_afar and s.emits]
+    if sky is not None and sky.sun is not None:
+        parts.append(_disc(sky.sun.direction, SUN_ANGLE, sky.sun_irradiance))
+    if sky is not None:
+        parts.append(_sky(sky, error))
     towards, irradiance = (np.concatenate([np.empty((0, 3)), *(part[i] for part in parts)]) for i in (0, 1))
     lit = irradiance.any(1)
     return Directions(towards[lit], irradiance[lit])
 
 
-def _sun(sky: Sky) -> Directions:
-    """Evenly over its disc [Vogel79]."""
-    if sky.sun is None:
-        return Directions(np.empty((0, 3)), np.empty((0, 3)))
+def _disc(towards: F64, angle: float, irradiance: F64) -> Directions:
+    """Evenly over a disc so far across [Vogel79]; one direction where it is a point."""
+    if angle == 0:
+        return Directions(towards[None], irradiance[None])
     nth = np.arange(SUN_SHOTS)
-    radius, turn = np.sin(SUN_ANGLE / 2) * np.sqrt((nth + 0.5) / SUN_SHOTS), 2 * np.pi * GOLDEN * nth
-    x, y = axes_of(sky.sun.direction)
-    towards = sky.sun.direction + (radius * np.cos(turn))[:, None] * x + (radius * np.sin(turn))[:, None] * y
-    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-    return Directions(towards, np.tile(sky.sun_irradiance / SUN_SHOTS, (SUN_SHOTS, 1)))
+    radius, turn = np.sin(angle / 2) * np.sqrt((nth + 0.5) / SUN_SHOTS), 2 * np.pi * GOLDEN * nth
+    x, y = axes_of(towards)
+    around = towards + (radius * np.cos(turn))[:, None] * x + (radius * np.sin(turn))[:, None] * y
+    around /= np.linalg.norm(around, axis=1, keepdims=True)
+    return Directions(around, np.tile(irradiance / SUN_SHOTS, (SUN_SHOTS, 1)))
 
 
 def _sky(sky: Sky, error: float) -> Directions:

@@ -74,6 +74,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "PASS": (PASS,),
     "PICTURE": FLAG,
     "SKY": FLAG,
+    "LIGHT": FLAG,
     "PIXELS": (1024,),
     "SUN": FLAG,
     "GATHERED": FLAG,

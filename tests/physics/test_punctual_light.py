@@ -13,7 +13,7 @@ from app.gpu import Gpu
 from app.scene.lights import Light
 from app.scene.model import Scene
 
-SOLVERS = ("gathering", "local")
+SOLVERS = ("shooting", "gathering", "local")
 EVERY_SOLVER = pytest.mark.parametrize("solver", SOLVERS)
 FLOOR = [[0, 0, 2], [2, 0, 2], [2, 0, 0], [0, 0, 0]]  # faces up
 POINT = Light("point", intensity=(1.0, 2.0, 3.0), position=(0.8, 1.3, 0.9))
@@ -42,11 +42,12 @@ def solved(gpu: Gpu, scene: Scene, solver: str) -> Solution:
         POINT,
         replace(POINT, range=2.0),
         replace(POINT, radius=0.2),
+        replace(POINT, position=(1.0, 9.0, 3.0)),  # farther than the scene is wide
         Light("spot", "spot", (5.0, 5.0, 5.0), (1.0, 1.5, 1.0), DOWN, 0.2, 0.7),
         Light("sun", "directional", (1.0, 2.0, 3.0), direction=SLANTED),
         Light("disc", "directional", (1.0, 2.0, 3.0), direction=SLANTED, angle=0.1),
     ],
-    ids=lambda light: f"{light.name}-{light.range:g}-{light.radius:g}",
+    ids=lambda light: f"{light.name}-{light.position[1]:g}-{light.range:g}-{light.radius:g}",
 )
 def test_an_open_floor_receives_what_the_law_says(gpu: Gpu, solver: str, light: Light) -> None:
     """E = I(ω) w cos θ / d², or E cos θ from afar, and the books count what is sent out."""

@@ -17,12 +17,21 @@ Light load_light(int nth) {
     return Light(a.xyz, a.w > 0.5, b.xyz, b.w, c.rgb, c.w, d.xy);
 }
 
+// Of what a light sends out, towards it being a unit vector: the share within a spot's cones, and what its range leaves of it.
+float within_cone(Light light, vec3 towards) {
+    float cone = clamp(light.slope.y - light.slope.x * dot(towards, light.direction), 0.0, 1.0);
+    return cone * cone;
+}
+
+float within_range(Light light, float squared_distance) {
+    float part = squared_distance * light.inverse_range * light.inverse_range;
+    return max(1.0 - part * part, 0.0);
+}
+
 // What a point with this normal receives of it.
 vec3 unoccluded(Light light, vec3 position, vec3 normal) {
     vec3 way = light.from_afar ? -light.direction : light.position - position;
     float r2 = max(dot(way, way), 1e-12), inverse = inversesqrt(r2), cosine = max(dot(way, normal) * inverse, 0.0);
     if (light.from_afar) return cosine * light.intensity;
-    float cone = clamp(light.slope.y - light.slope.x * dot(way, light.direction) * inverse, 0.0, 1.0);
-    float part = r2 * light.inverse_range * light.inverse_range;
-    return cosine * cone * cone * max(1.0 - part * part, 0.0) / r2 * light.intensity;
+    return cosine * within_cone(light, way * inverse) * within_range(light, r2) / r2 * light.intensity;
 }

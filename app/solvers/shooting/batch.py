@@ -33,6 +33,7 @@ from app.solvers.shooting.ledger import Ledger
 from app.solvers.shooting.material_edits import MaterialEdits
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.patch_marks import PatchMarks
+from app.solvers.shooting.point_shots import PointShots
 from app.solvers.shooting.receive import Receive
 from app.solvers.shooting.receivers import Receivers
 from app.solvers.shooting.records import BATCH, Shot, powers_of, shot_of
@@ -67,6 +68,12 @@ class Batch:
         resolution = options.resolution or fitting_resolution(lightmap, ROOT_LEVEL if lightmap.pool.adaptive else 0)
         self.see = See(self._gpu, self.occluders, self.shooters, options, resolution)
         self.receive = Receive(self._gpu, lightmap, self.receivers, self.shooters, self.see, options)
+
+    def point_shots(self) -> PointShots:
+        """What shoots for point and spot lights."""
+        points = PointShots(self._gpu, self._lightmap, self.occluders, self.receivers, self.shooters, self.ledger)
+        points.set_options(self.options, self.see.resolution)
+        return points
 
     # -- the batch -----------------------------------------------------------------------------------------------------
 
@@ -185,7 +192,7 @@ class Batch:
 
     def leaves_changed(self, change: Change) -> None:
         """Follow leaves that have split, or merged."""
-        self.ledger.emitted = self._lightmap.emitted + self.ledger.from_sky
+        self.ledger.follow_emission()
         self.auditor.forget()
         self.marks.follow(change)
         self.receivers.follow()

@@ -22,9 +22,9 @@ from app.solvers.shooting.shooters import ShooterBatch
 class Ledger:
     """The ledger of one lightmap. Whoever makes it releases it.
 
-    emitted: by all lamps and the sky, RGB [W], from_sky: what of that texels got from the sky; albedo: mean of all texels, RGB;
-    area: of all texels, solver space: see ``weigh``. watt: watts in one stored unit of power, the lightmap's unit [W/m²] times
-    solver area.
+    emitted: by all lamps and the sky, RGB [W], from_sky: what of that texels got from the sky and directional lights,
+    from_points: what point and spot lights have sent out; albedo: mean of all texels, RGB; area: of all texels, solver space: see
+    ``weigh``. watt: watts in one stored unit of power, the lightmap's unit [W/m²] times solver area.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch) -> None:
@@ -39,7 +39,7 @@ class Ledger:
         }
         self._add_tiles = Pass(gpu, "solvers/shooting/tile_energy", defines=lightmap.defines("TILE") | reads)
         self.emitted, self.albedo, self.area = np.zeros(3), (0.0, 0.0, 0.0), 0.0
-        self.from_sky = np.zeros(3)
+        self.from_sky, self.from_points = np.zeros(3), np.zeros(3)
         self._fit()
 
     def _fit(self) -> None:
@@ -51,9 +51,13 @@ class Ledger:
     def watt(self) -> float:
         return self._lightmap.unit * self._lightmap.space.scale**2
 
+    def follow_emission(self) -> None:
+        """See what all that emits sends out now."""
+        self.emitted = self._lightmap.emitted + self.from_sky + self.from_points
+
     def weigh(self) -> None:
         """See what emitters send out and surfaces reflect. Waits for the GPU."""
-        self.emitted = self._lightmap.emitted + self.from_sky
+        self.follow_emission()
         sums, _, reflectance = self.tile_sums()
         self.area = float(sums[3]) / self.watt
         self.albedo = tuple((reflectance[:3] / max(sums[3], 1e-300)).tolist())

@@ -60,9 +60,7 @@ class MaterialEdits:
 def needs_restart(lightmap: Lightmap, materials: tuple[Material, ...]) -> bool:
     """Whether the storage cannot hold the difference, or nothing is left to emit."""
     overflows = lightmap.storage == "rgba16f" and exceeds_half(lightmap, materials)
-    return (
-        overflows or lightmap.storage == "fixed8" or not (lightmap.scene.lit_by_sky or any(m.emits for m in materials))
-    )
+    return overflows or lightmap.storage == "fixed8" or not lightmap.scene.with_materials(materials).emits
 
 
 def exceeds_half(lightmap: Lightmap, materials: tuple[Material, ...]) -> bool:

@@ -34,19 +34,19 @@ class Receive:
     ) -> None:
         self._lightmap, self._receivers, self._shooters, self._see = lightmap, receivers, shooters, see
         kinds = (True, False) if lightmap.pool.adaptive else tuple(receivers.meshes)
-        self.passes = {
-            (planar, near): self._make(gpu, options, planar, near) for planar in kinds for near in (False, True)
-        }
+        fields = (False, True) if see.lights is None else (False,)
+        self.passes = {(planar, near): self._make(gpu, options, planar, near) for planar in kinds for near in fields}
 
     def _make(self, gpu: Gpu, options: ShootingOptions, planar: bool, near: bool) -> Pass:
         defines: dict[str, object] = {
             "PLANAR": planar,
-            "NEAR_FIELD": near,
             "RESOLUTION": self._see.resolution,
-            "DISC": options.form_factor == "disc",
-            "DISC_SUBDIVISION": options.discs,
             "VISIBILITY": VISIBILITIES.index(options.visibility),
         }
+        if self._see.lights is not None:
+            defines["LIGHT"] = True
+        else:
+            defines |= {"DISC": options.form_factor == "disc", "DISC_SUBDIVISION": options.discs, "NEAR_FIELD": near}
         return Pass(
             gpu,
             "solvers/shooting/receive",

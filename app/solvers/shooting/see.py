@@ -63,8 +63,16 @@ class See:
     """
 
     def __init__(
-        self, gpu: Gpu, occluders: list[Occluders], shooters: ShooterBatch, options: ShootingOptions, resolution: int
+        self,
+        gpu: Gpu,
+        occluders: list[Occluders],
+        shooters: ShooterBatch,
+        options: ShootingOptions,
+        resolution: int,
+        *,
+        lights: Texture | None = None,
     ) -> None:
+        """lights: where the shooters are point and spot lights, what these are, see common/light.glsl."""
         self._gpu, self._occluders, self._shooters = gpu, occluders, shooters
         self._projection, self._visibility = PROJECTIONS[options.projection], options.visibility
         self.resolution = resolution
@@ -72,7 +80,8 @@ class See:
         self._most_maps = max(1, min(BATCH, MAPS_TEXELS // (width * height)))
         self.maps = Maps(gpu, self.map_size, 1)
         self._inspected: Maps | None = None
-        pixels = {"RESOLUTION": resolution}
+        self.lights, kind = lights, {} if lights is None else {"LIGHT": True}
+        pixels: dict[str, object] = {"RESOLUTION": resolution}
         slots = self.slots = {"projection": self._projection.glsl}
         kinds: dict[bool, dict[str, object]] = {
             some.sheer: {"OPACITY": True} if some.sheer else {} for some in occluders
@@ -81,29 +90,41 @@ class See:
             sheer: Pass(
                 gpu,
                 "solvers/shooting/visibility",
-                defines=IN_BLOCKS | pixels | {"VIEWS": self._projection.views} | opacity,
+                defines=IN_BLOCKS | pixels | {"VIEWS": self._projection.views} | opacity | kind,
                 slots=RECORDS | self._projection.drawing,
             )
             for sheer, opacity in kinds.items()
         }
         self._draw_small = {
-            sheer: Pass(gpu, "solvers/shooting/small", defines=IN_BLOCKS | pixels | opacity, slots=RECORDS | slots)
+            sheer: Pass(
+                gpu, "solvers/shooting/small", defines=IN_BLOCKS | pixels | opacity | kind, slots=RECORDS | slots
+            )
             for sheer, opacity in kinds.items()
         }
         self._count_small = Pass(
             gpu, "solvers/shooting/small", defines=IN_BLOCKS | pixels | {"COUNT": 1}, slots=RECORDS | slots
         )
-        self._add_escaped = Pass(gpu, "solvers/shooting/escaped", defines={"BLOCK": ESCAPED_BLOCK})
+        self._add_escaped = (
+            Pass(gpu, "solvers/shooting/escaped", defines={"BLOCK": ESCAPED_BLOCK})
+            if lights is None
+            else Pass(
+                gpu,
+                "solvers/shooting/light_escaped",
+                defines=IN_BLOCKS | pixels | kind | {"BLOCK": ESCAPED_BLOCK},
+                slots=RECORDS | slots,
+            )
+        )
         self._weights = gpu.texture((width // 4, height // 4), 4, "f4")  # see weights.frag.glsl
         target = gpu.target(self._weights)
-        Pass(gpu, "solvers/shooting/weights", defines=pixels, slots=slots).draw(target)
+        Pass(gpu, "solvers/shooting/weights", defines=pixels | kind, slots=slots).draw(target)
         gpu.release_all(target)
 
     @property
     def textures(self) -> dict[str, Texture]:
         """What a receiver looks its visibility up in."""
         items = {"t_items": self.maps.items}
-        return items if self._visibility == "item-id" else items | {"t_depth": self.maps.depth}
+        lights = {} if self.lights is None else {"t_lights": self.lights}
+        return items | lights if self._visibility == "item-id" else items | lights | {"t_depth": self.maps.depth}
 
     def groups(self, shots: int) -> list[tuple[int, int]]:
         """(first, count) of those shots of a batch that see the scene at once; makes room for their maps."""
@@ -158,10 +179,13 @@ class See:
     def add_escaped(self, first: int, shots: int) -> None:
         """Add up how much of what these shooters of the batch send out leaves the scene."""
         width, height = self.maps.escaped_size
+        lit = self.lights is not None
         self._add_escaped.draw(
             self.maps.escaped_target,
-            textures={"t_items": self.maps.items, "t_weights": self._weights},
-            uniforms={"u_row": first * height},
+            textures={"t_items": self.maps.items, "t_weights": self._weights}
+            | ({"t_depth": self.maps.depth, "t_lights": self.lights} if self.lights is not None else {}),
+            uniforms={"u_row": first * height} | ({"u_first": first} if lit else {}),
+            blocks=self._shooters.blocks if lit else {},
             viewport=(0, first * height, width, shots * height),
         )
 

@@ -1,4 +1,5 @@
-"""Sky shots light all texels from one direction of the sky after the other, by maps in parallel projection.
+"""Sky shots light all texels from one direction of the sky after the other, by maps in parallel projection; directional lights
+are such directions, too.
 
     ΔH_j = E_k cos θ V_kj,    Δr_j = ρ_j ΔH_j
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from app.gpu import Gpu, Pass
 from app.lightmap.lightmap import Lightmap
+from app.scene.lights import Light
 from app.scene.model import F64
 from app.scene.sky import Sky
 from app.scene.sky_directions import Directions, axes_of, directions_of
@@ -50,14 +52,15 @@ class SkyShots:
         self._given = self._wanted = self._sky = directions_of(None)
         self._at = self.made = 0
 
-    def begin(self, sky: Sky | None) -> None:
-        """Nothing has been shot."""
-        self._given, self._sky = directions_of(None), directions_of(sky)
+    def begin(self, sky: Sky | None, lights: tuple[Light, ...]) -> None:
+        """Nothing has been shot. Of the lights the directional ones are."""
+        self._given, self._sky = directions_of(None), directions_of(sky, lights)
         self._wanted, self._at, self.made = self._sky, 0, 0
 
-    def change(self, sky: Sky | None) -> None:
-        """Another sky: what was given is taken back, and what it gives is to come, the strongest first."""
-        given, self._sky = self._shot(), directions_of(sky)
+    def change(self, sky: Sky | None, lights: tuple[Light, ...]) -> None:
+        """Another sky, or other directional lights: what was given is taken back, and what they give is to come, the
+        strongest first."""
+        given, self._sky = self._shot(), directions_of(sky, lights)
         queue = _together(Directions(given.towards, -given.irradiance), self._sky)
         order = np.argsort(-np.abs(queue.irradiance).sum(1), kind="stable")
         self._given, self._wanted, self._at = given, Directions(*(part[order] for part in queue)), 0

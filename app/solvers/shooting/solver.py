@@ -26,6 +26,7 @@ from app.solvers.shooting.batch import Batch
 from app.solvers.shooting.choose import Choice
 from app.solvers.shooting.material_edits import MaterialEdits, needs_restart
 from app.solvers.shooting.options import ShootingOptions
+from app.solvers.shooting.point_shots import PointShots
 from app.solvers.shooting.records import BATCH, Shot, powers_of, shot_of, sizes_of
 from app.solvers.shooting.reports import Reports
 from app.solvers.shooting.sky_shots import SkyShots
@@ -36,7 +37,7 @@ LOOK_AFTER = 32  # shots, or a quarter of all, between two looks at leaves that 
 SIGHT = "What the last shooter saw"
 PICTURES = {SIGHT: "All that the patch that shot last sees, one colour per surface"}
 NO_SKY = "--solver shooting: quadtrees do not follow the light of the sky; uniform texels do, and --solver gathering"
-NO_LIGHTS = "--solver shooting: shoots no light of lamps without area: gathering and local do"
+NO_LIGHTS = "--solver shooting: quadtrees do not follow lamps without area; uniform texels do, and --solver gathering"
 CHANGES_PER_SHOT = 8  # leaves that split or merge, for each shot of a piece of work: bounded work for a frame
 
 
@@ -50,8 +51,7 @@ class Shooting:
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool = True) -> None:
         """audits: whether strong shots are tried before they are made."""
         _check_sky(lightmap, lightmap.scene.sky)
-        if lightmap.scene.lit_by_lights:
-            raise UserError(NO_LIGHTS)
+        _check_lights(lightmap, lightmap.scene.lights)
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
         self.batch = Batch(gpu, lightmap, options, audits=audits)
         if lightmap.refinement is not None:
@@ -62,7 +62,8 @@ class Shooting:
         self._look_at = 0  # shots in the log at which leaves are looked at again
         self.issued = 0
         self.last_shot: Shot | None = None
-        self._sky: SkyShots | None = None  # where there has been a sky
+        self._points: PointShots | None = None  # where there have been point or spot lights
+        self._sky: SkyShots | None = None  # where there has been a sky, or a directional light
         self._before_sky = np.zeros(3)  # what texels had received when it began to shoot, RGB [W]
         self.reset()
 
@@ -73,6 +74,8 @@ class Shooting:
         batch, those too weak beside its best are left for later, and not counted once ``poll`` has the report of it."""
         self._under_way.finish()
         shots = min(amount, BATCH)
+        if self._points is not None and self._points.left:
+            return self._under_way.begin(self._shoot_points(self._points, shots, bands))
         if self._sky_left:
             return self._under_way.begin(self._shoot_sky(shots, bands))
         parts = self._shoot(shots, bands) if self.batch.replay is None else self._follow_leaves(shots, bands)
@@ -86,12 +89,43 @@ class Shooting:
         self._reports.send(choice, self.batch.bins, self.batch.ledger, self.batch.shooters)
         return made
 
-    # -- the sky, see sky_shots.py -------------------------------------------------------------------------------------
+    # -- lamps without area and the sky, see point_shots.py and sky_shots.py --------------------------------------------
+
+    @property
+    def _points_left(self) -> bool:
+        """Whether light of point and spot lights is still to be shot."""
+        return self._points is not None and self._points.left > 0
 
     @property
     def _sky_left(self) -> bool:
-        """Whether light of the sky is still to be shot."""
+        """Whether light of the sky, or of directional lights, is still to be shot."""
         return self._sky is not None and self._sky.left > 0
+
+    @property
+    def _sky_shoots(self) -> bool:
+        """Whether it shoots now: points go first."""
+        return self._sky_left and not self._points_left
+
+    def _shoot_points(self, points: PointShots, shots: int, bands: int) -> Generator[None, None, int]:
+        """The next point and spot lights; after the last the sky or patches go on."""
+        made = yield from points.shoot(shots, bands)
+        self.issued += made
+        self.batch.ledger.from_points = points.flux
+        self.batch.ledger.follow_emission()
+        self._progress = replace(self._progress, done=self.issued, remaining=points.share_left)
+        if not points.left:
+            self._patches_go_on()
+        return made
+
+    def _patches_go_on(self) -> None:
+        """All lamps without area have shot what they had to: see what that leaves to patches, or to the sky."""
+        self.batch.weigh()
+        if self._sky is not None and self._sky_left:
+            self._before_sky = self._received()
+            self._progress = replace(self._progress, remaining=self._sky.share_left)
+            return
+        self._progress = replace(self._progress, remaining=self._share(self.batch.unshot()))
+        self.batch.ambient.update(self.batch.bins, shown=self.options.ambient)
 
     def _shoot_sky(self, shots: int, bands: int) -> Generator[None, None, int]:
         """The next directions of the sky; after the last, what it gave is known, and patches go on."""
@@ -101,9 +135,7 @@ class Shooting:
         self._progress = replace(self._progress, done=self.issued, remaining=self._sky.share_left)
         if not self._sky.left:
             self._enter_sky()
-            self.batch.weigh()
-            self._progress = replace(self._progress, remaining=self._share(self.batch.unshot()))
-            self.batch.ambient.update(self.batch.bins, shown=self.options.ambient)
+            self._patches_go_on()
         return made
 
     def _enter_sky(self) -> None:
@@ -111,7 +143,7 @@ class Shooting:
         received = self._received()
         ledger = self.batch.ledger
         ledger.from_sky = ledger.from_sky + received - self._before_sky
-        ledger.emitted = self.lightmap.emitted + ledger.from_sky
+        ledger.follow_emission()
         self._before_sky = received
 
     def _received(self) -> F64:
@@ -126,18 +158,35 @@ class Shooting:
         _check_sky(self.lightmap, sky)
         self._under_way.finish()
         self.lightmap.set_sky(sky)
-        lit = self._sky is not None and self.issued > 0 and self.lightmap.scene.emits
-        if self._sky is None or not lit or self.lightmap.storage != "rgba32f":
+        self._follow_edit(points=False)
+
+    def set_lights(self, lights: tuple[Light, ...]) -> None:
+        """Other lamps without area, as of another sky. Raises UserError."""
+        _check_lights(self.lightmap, lights)
+        self._under_way.finish()
+        self.lightmap.set_lights(lights)
+        self._follow_edit(points=True)
+
+    def _follow_edit(self, *, points: bool) -> None:
+        """Let the difference that another sky, or other lights make be shot. points: whether point and spot lights are others."""
+        scene = self.lightmap.scene
+        missing = self._points is None if any(not light.from_afar for light in scene.lights) else False
+        missing |= self._sky is None if scene.lit_by_sky or any(light.from_afar for light in scene.lights) else False
+        if missing or not self.issued or not scene.emits or self.lightmap.storage != "rgba32f":
             self.reset()
             return
         self.poll(wait=True)
-        if self._sky_left:
+        if self._sky_shoots:
             self._enter_sky()
-        self._sky.change(sky)
-        self._before_sky = self._received()
+        if self._points is not None and points:
+            self._points.change(scene.lights)
+        if self._sky is not None:
+            self._sky.change(scene.sky, scene.lights)
+            self._before_sky = self._received()
         self.batch.phases.begin()
         self.batch.auditor.begin()
-        self._progress = replace(self._progress, remaining=1.0)
+        to_come = self._points_left or self._sky_left
+        self._progress = replace(self._progress, remaining=1.0 if to_come else self._unshot_share())
 
     # -- leaves of quadtrees -------------------------------------------------------------------------------------------
 
@@ -219,7 +268,7 @@ class Shooting:
     @property
     def _all_shot(self) -> bool:
         """Whether the finest patches have shot, and no more is unshot than asked for."""
-        even = self.batch.phases.even and not self._sky_left
+        even = self.batch.phases.even and not self._sky_left and not self._points_left
         return even and self._progress.remaining <= self.options.residual
 
     @property
@@ -234,17 +283,18 @@ class Shooting:
     def settle(self) -> Progress:
         """End the work under way, and measure what is unshot."""
         self.poll(wait=True)
-        to_come = 0.0
+        to_come = 0.0 if self._points is None else self._points.share_left
         if self._sky is not None and self._sky_left:
+            to_come = max(to_come, self._sky.share_left)
+        if self._sky_shoots:
             self._enter_sky()
-            to_come = self._sky.share_left
         self._progress = replace(self._progress, remaining=max(self._unshot_share(), to_come))
         return self.poll()
 
     def energy(self) -> EnergyBalance:
         """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
         self._under_way.finish()
-        if self._sky_left:
+        if self._sky_shoots:
             self._enter_sky()
         return self.batch.ledger.balance()
 
@@ -258,15 +308,20 @@ class Shooting:
         self._look_at = 0
         self._reports.drop()
         self.lightmap.clear()
-        self.batch.ledger.from_sky = np.zeros(3)
+        self.batch.ledger.from_sky = self.batch.ledger.from_points = np.zeros(3)
         self.batch.begin()
         self.issued, self.last_shot = 0, None
-        if self.lightmap.scene.lit_by_sky and self._sky is None:
-            self._sky = SkyShots(self.gpu, self.lightmap, self.batch.occluders)
+        scene, batch = self.lightmap.scene, self.batch
+        if self._points is None and any(not light.from_afar for light in scene.lights):
+            self._points = batch.point_shots()
+        if self._points is not None:
+            self._points.begin(scene.lights)
+        if self._sky is None and (scene.lit_by_sky or any(light.from_afar for light in scene.lights)):
+            self._sky = SkyShots(self.gpu, self.lightmap, batch.occluders)
         if self._sky is not None:
-            self._sky.begin(self.lightmap.scene.sky)
+            self._sky.begin(scene.sky, scene.lights)
             self._before_sky = self._received()
-        lit = self._sky_left or self.batch.ledger.emitted.sum() > 0
+        lit = self._points_left or self._sky_left or batch.ledger.emitted.sum() > 0
         self._progress = Progress(0, 1.0 if lit else 0.0, np.zeros(3))
 
     def set_options(self, options: ShootingOptions) -> None:
@@ -280,6 +335,8 @@ class Shooting:
             self.batch.replay.stop()
         self.options = options
         self.batch.set_options(options)
+        if self._points is not None:
+            self._points.set_options(options, self.batch.see.resolution)
         self.batch.ambient.hide()
         if self.issued:
             self.batch.unshot()
@@ -301,9 +358,10 @@ class Shooting:
         if self.lightmap.refinement is not None:
             self.lightmap.refinement.begin_again()
             self._look_at = 0
-        if self._sky_left:
+        if self._sky_shoots:
             self._enter_sky()
-        scaled = np.ones(3) if self._sky is not None else self.lightmap.common_factor(materials)  # not the sky's
+        lit = self._sky is not None or self._points is not None
+        scaled = np.ones(3) if lit else self.lightmap.common_factor(materials)  # not of their light
         factor, before = scaled, self.lightmap.scene.materials
         batch.scale(self._edits, factor)
         self._edits.enter(materials, factor)
@@ -312,14 +370,8 @@ class Shooting:
             batch.groups.divide(batch.phases)
         self._progress = replace(self._progress, remaining=self._unshot_share())
         batch.ambient.update(batch.bins, shown=self.options.ambient)
-        if self._sky_left:
+        if self._sky_shoots:
             self._before_sky = self._received()
-
-    def set_lights(self, lights: tuple[Light, ...]) -> None:
-        """Only such that send no light. Raises UserError."""
-        if any(light.emits for light in lights):
-            raise UserError(NO_LIGHTS)
-        self.lightmap.set_lights(lights)
 
     # -- leaves that come and go, see app/lightmap/refinement.py -------------------------------------------------------
 
@@ -400,9 +452,10 @@ class Shooting:
             run()
             self.gpu.ctx.finish()
             yield
-        if self._sky is not None:
-            run_to_end(self._sky.shoot(1, 1))
-            yield
+        for others in (self._points, self._sky):
+            if others is not None and others.left:
+                run_to_end(others.shoot(1, 1))
+                yield
         for choice in self.batch.phases.choices[1:]:
             run_to_end(self.batch.choose_once(choice, 1))
             self.gpu.ctx.finish()
@@ -412,7 +465,8 @@ class Shooting:
         refinement = self.lightmap.refinement
         if refinement is not None and refinement.follower is self:
             refinement.follower = None
-        for part in (self._reports, self._picture, self.batch, *(() if self._sky is None else (self._sky,))):
+        others = [one for one in (self._points, self._sky) if one is not None]
+        for part in (self._reports, self._picture, self.batch, *others):
             part.release()
 
 
@@ -420,6 +474,12 @@ def _check_sky(lightmap: Lightmap, sky: Sky | None) -> None:
     """Raise UserError for a sky whose light cannot be shot."""
     if lightmap.refinement is not None and sky is not None and sky.emits:
         raise UserError(NO_SKY)
+
+
+def _check_lights(lightmap: Lightmap, lights: tuple[Light, ...]) -> None:
+    """Raise UserError for lamps without area whose light cannot be shot."""
+    if lightmap.refinement is not None and any(light.emits for light in lights):
+        raise UserError(NO_LIGHTS)
 
 
 __all__ = ["Shooting"]

@@ -7,7 +7,11 @@
 #include "common/item.glsl"
 #include <projection>
 #include "solvers/shooting/shooter_block.glsl"
+#if LIGHT
+#include "common/light.glsl"
+#else
 #include "solvers/shooting/form_factor.glsl"
+#endif
 #include "visibility/visible.glsl"
 
 flat in uint v_shots;  // a bit for each shot that may light this receiver
@@ -32,8 +36,13 @@ layout(location = 1) out vec4 out_residual;
 vec2 received(vec3 position, vec3 normal, float facet, Shooter s, int shot) {
     mat3 axes = world_axes(s);
     vec3 local = (position - s.origin) * axes;
+#if LIGHT
+    vec2 FV = vec2(unoccluded(load_light(s.patch_x), position, normal).r, visible(facet, local, normal * axes, shot));
+    return local.z > 0.0 ? FV : vec2(0.0);
+#else
     vec2 FV = vec2(form_factor(position, normal, s), visible(facet, local, normal * axes, shot));
     return local.z > COPLANAR ? FV : vec2(0.0);
+#endif
 }
 
 void main() {

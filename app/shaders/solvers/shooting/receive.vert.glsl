@@ -27,6 +27,7 @@ flat out float v_facet;
 flat out vec3 v_albedo;
 #endif
 
+#if !LIGHT
 float support(Shooter s, vec3 axis) { return 0.5 * (abs(dot(s.edge_u, axis)) + abs(dot(s.edge_v, axis))); }
 
 #if PLANAR
@@ -54,6 +55,8 @@ float squared_distance(Shooter s) {
 }
 #endif
 
+#endif
+
 void main() {
     vec2 at = in_rect.zw * vec2(gl_VertexID & 1, gl_VertexID >> 1);
     gl_Position = vec4((in_rect.xy + at) / u_size * 2.0 - 1.0, 0.0, 1.0);
@@ -67,7 +70,9 @@ void main() {
     v_shots = 0u;
     for (int shot = 0; shot < u_shots; ++shot) {
         Shooter s = shooter_of(shot);
-#if PLANAR
+#if LIGHT
+        bool lit = true;
+#elif PLANAR
         bool lit = !hidden(s, v_normal, u, v) && in_far_field(s, squared_distance(s, u, v)) != bool(NEAR_FIELD);
 #else
         bool lit = !hidden(s) && in_far_field(s, squared_distance(s)) != bool(NEAR_FIELD);

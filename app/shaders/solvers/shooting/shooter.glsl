@@ -12,9 +12,3 @@ Shooter load_shooter(sampler2D shooters, int shot) {
     for (int row = 0; row < SHOOTER_ROWS; ++row) rows[row] = texelFetch(shooters, ivec2(row, shot), 0);
     return shooter_from_rows(rows);
 }
-
-// Rows are the shooter's axes: +z its normal, +x along its first edge.
-mat3 world_axes(Shooter s) {
-    vec3 x = normalize(s.edge_u - s.normal * dot(s.edge_u, s.normal));
-    return mat3(x, cross(s.normal, x), s.normal);
-}

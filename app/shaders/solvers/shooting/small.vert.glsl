@@ -51,7 +51,7 @@ void main() {
     float depth = plane.w / dot(plane.xyz, sight_from_px(view, px));
 #if OPACITY
     vec3 at_local = local_from_view(view, sight_from_px(view, px) * clamp(depth, nearest, furthest));
-    vec3 place = s.origin + world_axes(s) * at_local;
+    vec3 place = world_from_local(s, at_local);
     if (chance_in_map(s.origin, ivec2(px), gl_VertexID) >= opacity_at(gl_VertexID, place)) return;
 #endif
     v_seen = vec2(plane_of(local).w < 0.0 ? t.sides.r : t.sides.g, clamp(depth, nearest, furthest));

@@ -6,9 +6,6 @@
 
 vec3 seen_from(int map) { return shooter_of(map).origin; }
 
-vec3 place_seen(int map, vec3 local) {
-    Shooter s = shooter_of(map);
-    return s.origin + world_axes(s) * local;
-}
+vec3 place_seen(int map, vec3 local) { return world_from_local(shooter_of(map), local); }
 #endif
 #include "visibility/draw_map.glsl"
