@@ -104,6 +104,20 @@ def test_blended_sheets_lie_over_each_other_from_far_to_near(gpu: Gpu) -> None:
         made.release()
 
 
+def test_blended_sheets_that_cross_hide_nothing_of_each_other(gpu: Gpu) -> None:
+    """Whichever is drawn first, behind it or before it the other one is seen too."""
+    back = np.array([0, 0, 0.1])
+    cross = np.array([[0, 0, 1], [1, 0, 0], [1, 1, 0], [0, 1, 1.0]])
+    quads = [UNIT_SQUARE, cross + back, cross * np.array([-1, 1, 1]) + back + np.array([1, 0, 0])]
+    sheets = [painted(WALL), painted(RED, opacity=0.5), painted(BLUE, opacity=0.5)]
+    made = Shown(gpu, quads_scene(quads, sheets, range(3)))
+    wall, red, blue = (encode_srgb(np.array(c)) for c in (WALL, RED, BLUE))
+    both = [0.5 * near + 0.25 * far + 0.25 * wall for near, far in ((red, blue), (blue, red))]
+    for x, y in itertools.product((0.1, 0.3, 0.7, 0.9), (0.2, 0.6)):
+        assert any(made.at((x, y, 0.5)) == pytest.approx(colour, abs=STEP) for colour in both)
+    made.release()
+
+
 def test_a_blended_sheet_lies_over_the_background(gpu: Gpu) -> None:
     with shown(gpu, painted(WALL, opacity=0.5)) as made, shown(gpu, painted(WALL)) as whole:
         x, y = made.px((0.5, 0.5, 0.0))

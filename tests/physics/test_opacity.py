@@ -15,7 +15,9 @@ from app.atlas.parametrize import parametrize
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.tile_pool import TilePool
+from app.scene.lights import Light
 from app.scene.model import Material, Scene, Texture
+from app.scene.sky import Sky
 from app.solvers.pairs.options import PairsOptions
 from app.solvers.pairs.solver import Pairs
 from app.util.parts import run_to_end
@@ -139,3 +141,20 @@ def test_a_furnace_with_a_board_in_it_stays_one(gpu: Gpu, solver: str, board: st
     assert means == pytest.approx(2.0, rel=0.03)
     assert abs(solution.book.imbalance_share) < 0.02
     solution.release()
+
+
+@pytest.mark.parametrize("what", ["sky", "point"])
+def test_sky_and_lights_without_area_shine_through_a_board(gpu: Gpu, what: str) -> None:
+    """The floor receives the mean of what it does without a board, and under one that is closed, past which it sees the
+    horizon."""
+    power = []
+    for board in (None, CLOSED, BOARDS["half"]):
+        quads = [square(0.0, 1.0), *([] if board is None else [square(1.0, 1.5)])]
+        scene = quads_scene(quads, [grey(0.0), replace(board or CLOSED, albedo=(0.0,) * 3)], range(len(quads)))
+        if what == "sky":
+            scene = scene.with_sky(Sky())
+        else:
+            scene = scene.with_lights((Light("bulb", position=(2.0, 2.0, 2.0)),))
+        power.append(lit(gpu, scene, *WAYS["gathering"])[0])
+    assert power[2] == pytest.approx((power[0] + power[1]) / 2, rel=0.02)
+    assert power[1] < 0.6 * power[0]

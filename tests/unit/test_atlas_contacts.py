@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -195,3 +197,13 @@ def test_as_many_texels_are_told_as_there_are() -> None:
         charts = parametrize(scene_of(*quads), texels=3000)
         surfaces = texel_surfaces(scene_of(*quads), charts, uniform_leaves(charts))
         assert texel_count(charts) == np.count_nonzero(surfaces.face >= 0) == np.count_nonzero(surfaces.area > 0)
+
+
+@pytest.mark.parametrize("opacity", [1.0, 0.5])
+def test_what_is_not_opaque_hides_nothing(opacity: float) -> None:
+    """A rug of a quarter of the floor."""
+    rug = [(x / 2, 1e-3, z / 2) for x, _, z in FLOOR]
+    paint = grey(0.5, 1.0)
+    scene = quads_scene([CEILING, FLOOR, rug], [paint, replace(paint, opacity=opacity)], [0, 0, 1])
+    area, _, _ = seen_area(scene, 0.0)
+    assert area == pytest.approx(3.0 if opacity == 1.0 else 4.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from atlas_scenes import box_room, own_cache, scene_of
 
-from app.atlas.materials import texel_colours
+from app.atlas.materials import texel_colours, texel_opacity
 from app.atlas.parametrize import parametrize
 from app.atlas.texels import TexelSurfaces, texel_surfaces, uniform_leaves
 from app.scene import shapes
@@ -123,3 +123,29 @@ def test_one_where_there_is_no_texture_and_none_where_there_is_none_at_all() -> 
     on_wall = plain.object_ids[charts.face_triangle[surfaces.face]] == 0
     assert (emission[on_wall & (surfaces.face >= 0)] == 1).all()
     assert emission[~on_wall & (surfaces.face >= 0)].max() < 1
+
+
+@pytest.mark.parametrize("cutoff", [None, 0.5])
+@pytest.mark.parametrize("texels", [400, 30_000])
+def test_what_is_cut_out_lends_no_colour(texels: int, cutoff: float | None) -> None:
+    """White leaves in black that is not there: texels are white, and as much of each is there as the leaves cover."""
+    leaves = np.zeros((64, 64, 1), np.float32)
+    leaves[8:24, 8:56] = leaves[40:56, 8:56] = 1.0
+    seen = Texture("leaves", leaves.repeat(3, axis=2), bilinear=False)
+    scene = _textured(seen)
+    cut = dataclasses.replace(
+        scene.materials[1], opacity_texture=dataclasses.replace(seen, pixels=leaves), opacity_cutoff=cutoff
+    )
+    scene = scene.with_materials((scene.materials[0], cut))
+    albedo, *_ = _picture(scene, texels)
+    assert np.abs(albedo - 1.0).max() < 1e-5
+    charts = parametrize(scene, texels=texels)
+    tiles = uniform_leaves(charts)
+    surfaces = texel_surfaces(scene, charts, tiles)
+    there = texel_opacity(scene, charts, tiles, surfaces)
+    assert there is not None
+    of_sheet = scene.material_ids[charts.face_triangle[surfaces.face]] == 1
+    area = surfaces.area * of_sheet
+    # each texel's look-ups find as much as is there to a sixteenth of what a picture's edge takes of it
+    assert (area * there).sum() / area.sum() == pytest.approx(float(leaves.mean()), rel=0.03)
+    assert (there[~of_sheet & (surfaces.face >= 0)] == 1).all()
