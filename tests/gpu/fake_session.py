@@ -16,6 +16,7 @@ from app.render.camera import CameraView
 from app.render.false_colour import Scale, false_colour_scale
 from app.render.options import LAYERS, DisplayOptions
 from app.scene.model import Material
+from app.scene.sky import Sky
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Inspection, ShootingOptions
 
 EMITTED = 34.6  # W
@@ -248,6 +249,10 @@ class FakeSession:
         materials[index] = material
         self.scene.materials = tuple(materials)
         self.calls.append(("set_material", index, dataclasses.replace(material)))
+
+    def set_sky(self, sky: Sky | None) -> None:
+        self.scene.sky = sky
+        self.calls.append(("set_sky", sky))
 
     def release(self) -> None:
         self.calls.append(("release",))

@@ -19,6 +19,7 @@ from app.errors import UserError
 from app.gpu import Gpu, ShaderError
 from app.options import Options, specs
 from app.render.options import DisplayOptions
+from app.scene.sky import Sky, Sun
 from app.solvers import SOLVERS, ShootingOptions
 from app.ui import overlays, widgets
 from app.ui.app import Ui
@@ -211,6 +212,25 @@ def test_editing_a_material_tells_the_session(desk: Desk, monkeypatch: pytest.Mo
     assert call[1] == 3
     np.testing.assert_allclose(call[2].emission, (34.0, 24.0, 8.0), rtol=1e-12)  # colour kept, strength doubled
     assert call[2].albedo == (0.78, 0.78, 0.78)
+
+
+def test_the_sun_is_moved_and_the_sky_is_another(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    desk = Desk(gpu, FakeSession(), (1920, 1400))
+    before = desk.session.scene.sky = Sky("clear", (1.0, 0.5, 0.2), 2.0, sun=Sun(100, 20))
+    moved = {"##Sun azimuth": 230.0, "##sky strength": 3.0}
+    with monkeypatch.context() as hand:
+        hand.setattr(imgui, "slider_float", lambda label, value, *_: (label in moved, moved.get(label, value)))
+        desk.frames(1)
+    (sky,) = [call[1] for call in desk.session.calls if call[0] == "set_sky"]
+    assert (sky.sun, sky.strength, sky.colour) == (Sun(230, 20), 3.0, before.colour)
+    for index, kind in enumerate(("none", "uniform", "clear")):
+        desk.session.unedited = SimpleNamespace(sky=before)
+        chosen = {"##kind": index}
+        monkeypatch.setattr(imgui, "combo", lambda label, now, *_, c=chosen: (label in c, c.get(label, now)))
+        desk.frames(1)
+        now = desk.session.scene.sky
+        assert (now is None) if kind == "none" else now.kind == kind
+    desk.release()
 
 
 def test_a_lamp_that_was_switched_off_keeps_its_colour(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
