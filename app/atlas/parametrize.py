@@ -76,7 +76,7 @@ def parametrize(
     share) is called from time to time and may raise to cancel.
     Raises UserError for a density or number out of range, or when more than 16 777 216 texels are needed.
     """
-    _check(density, texels)
+    check(density, texels)
     report = progress or (lambda stage, share: None)
     report("sides", 0.0)
     lit = lit_sides(scene)
@@ -128,7 +128,8 @@ def default_texels(sides: int, roots: bool) -> int:
     return uniform // ROOT_SHARE if roots else uniform
 
 
-def _check(density: float | None, texels: int | None) -> None:
+def check(density: float | None, texels: int | None) -> None:
+    """Raises UserError for a density or number out of range."""
     if density is not None and texels is not None:
         raise UserError(f"--density {density:g} --texels {texels}: only one of the two can be set")
     if density is not None and not (math.isfinite(density) and density > 0):

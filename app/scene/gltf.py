@@ -25,6 +25,7 @@ from app.scene.gltf_schema import Light as GltfLight
 from app.scene.gltf_schema import Mesh, Node, Primitive
 from app.scene.lights import LUMENS_PER_WATT, Light
 from app.scene.model import F64, Camera, Material, Scene
+from app.scene.outline import Outline, colour_textures
 from app.scene.validate import Part, check_triangle_count, counted, validate
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
@@ -44,33 +45,67 @@ class _Shape:
     colours: NDArray[Any] | None
 
 
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """A shape once for each of (k, 4, 4) matrices."""
+
+    shape: _Shape
+    worlds: F64
+    object_id: int
+    material: int
+
+    @property
+    def triangles(self) -> int:
+        return len(self.worlds) * len(self.shape.triangles)
+
+
 @np.errstate(all="ignore")
 def load_gltf(path: Path) -> Scene:
     """Read a .glb or .gltf file. SceneError for anything that makes it unusable."""
-    file = GltfFile(path)
-    reader = _Reader(file)
+    reader = _Reader(GltfFile(path))
     reader.walk()
-    materials, notes = read_materials(file, reader.used_materials)
-    if reader.unpainted:
-        materials.append(Material("no material", UNKNOWN_ALBEDO))
-    return validate(
-        path,
-        path.stem,
-        reader.parts,
-        reader.objects,
-        materials,
-        reader.cameras,
-        [*reader.warnings(), *notes],
-        reader.lights,
+    materials, notes = reader.read_materials()
+    parts = [_part(placed) for placed in reader.placed]
+    notes = [*reader.warnings(), *notes]
+    return validate(path, path.stem, parts, reader.objects, materials, reader.cameras, notes, reader.lights)
+
+
+@np.errstate(all="ignore")
+def outline_gltf(path: Path, most: int) -> Outline | None:
+    """Of a file with more than so many triangles; None where it has no more. Nothing is placed, and nothing checked that only a
+    Scene must be. SceneError as for ``load_gltf``."""
+    reader = _Reader(GltfFile(path))
+    reader.walk()
+    if sum(placed.triangles for placed in reader.placed) <= most:
+        return None
+    materials, notes = reader.read_materials()
+    sides = [1 + materials[placed.material].double_sided for placed in reader.placed]
+    boxes = np.concatenate([_boxes(placed) for placed in reader.placed if placed.triangles])
+    return Outline(
+        name=path.stem,
+        triangles=sum(placed.triangles for placed in reader.placed),
+        sides=sum(n * placed.triangles for n, placed in zip(sides, reader.placed, strict=True)),
+        area=sum(n * _area(placed) for n, placed in zip(sides, reader.placed, strict=True)),
+        lower=boxes.min(axis=(0, 1)),
+        upper=boxes.max(axis=(0, 1)),
+        objects=len(reader.objects),
+        materials=len(materials),
+        emitting_materials=sum(m.emits for m in materials),
+        textures=colour_textures(materials, coloured=any(p.shape.colours is not None for p in reader.placed)),
+        lights=tuple(reader.lights),
+        cameras=tuple(camera.name for camera in reader.cameras),
+        sky=None,
+        warnings=(*reader.warnings(), *notes),
+        exact=False,
     )
 
 
 class _Reader:
-    """Walks the node tree of one file and collects parts, objects and cameras."""
+    """Walks the node tree of one file and collects shapes as they are placed, objects and cameras."""
 
     def __init__(self, file: GltfFile) -> None:
         self.file = file
-        self.parts: list[Part] = []
+        self.placed: list[_Placed] = []
         self.objects: list[str] = []
         self.cameras: list[Camera] = []
         self.lights: list[Light] = []
@@ -89,6 +124,13 @@ class _Reader:
             (self._not_pinholes, "camera", "cameras", "without perspective left out"),
         ]
         return [f"{counted(n, one, many)} {text}" for n, one, many, text in notes if n]
+
+    def read_materials(self) -> tuple[list[Material], list[str]]:
+        """After the walk: all materials, with the pictures of those that are used, and warnings."""
+        materials, notes = read_materials(self.file, self.used_materials)
+        if self.unpainted:
+            materials.append(Material("no material", UNKNOWN_ALBEDO))
+        return materials, notes
 
     def walk(self) -> None:
         """Visit every node of the default scene once, parents first."""
@@ -141,7 +183,7 @@ class _Reader:
             self._triangle_count += len(worlds) * len(shape.triangles)
             check_triangle_count(self.file.path, self._triangle_count)
             material = len(self.file.document.materials) if shape.material is None else shape.material
-            self.parts.append(_placed(shape, worlds, len(self.objects) - 1, material))
+            self.placed.append(_Placed(shape, worlds, len(self.objects) - 1, material))
 
     def _instances(self, node: Node) -> F64:
         """(k, 4, 4) node-from-instance matrices; one identity without EXT_mesh_gpu_instancing."""
@@ -280,8 +322,9 @@ def _transforms(translation: NDArray[Any], rotation: NDArray[Any], scale: NDArra
     return matrices
 
 
-def _placed(shape: _Shape, worlds: F64, object_id: int, material: int) -> Part:
-    """The shape once for each of (k, 4, 4) matrices; mirrored copies keep their front."""
+def _part(placed: _Placed) -> Part:
+    """All copies of the shape; mirrored ones keep their front."""
+    shape, worlds = placed.shape, placed.worlds
     k, n, m = len(worlds), len(shape.positions), len(shape.triangles)
     linear = worlds[:, :3, :3]
     positions = np.einsum("kij,nj->kni", linear, shape.positions) + worlds[:, None, :3, 3]
@@ -294,10 +337,26 @@ def _placed(shape: _Shape, worlds: F64, object_id: int, material: int) -> Part:
     return Part(
         positions.reshape(-1, 3),
         triangles.reshape(k * m, 3),
-        object_id,
-        material,
+        placed.object_id,
+        placed.material,
         None if shape.uv0 is None else np.tile(shape.uv0, (k, 1)),
         None if shape.uv1 is None else np.tile(shape.uv1, (k, 1)),
         normals,
         None if shape.colours is None else np.tile(shape.colours[:, :3], (k, 1)),
     )
+
+
+def _boxes(placed: _Placed) -> F64:
+    """(k, 2, 3) lower and upper corner of a box around each copy: around the shape's own box, turned."""
+    low, high = placed.shape.positions.min(axis=0), placed.shape.positions.max(axis=0)
+    linear, middle, half = placed.worlds[:, :3, :3], (low + high) / 2, (high - low) / 2
+    centre, reach = linear @ middle + placed.worlds[:, :3, 3], np.abs(linear) @ half
+    return np.stack([centre - reach, centre + reach], axis=1)
+
+
+def _area(placed: _Placed) -> float:
+    """Of all copies [m²], as if each were scaled evenly."""
+    a, b, c = np.moveaxis(placed.shape.positions[placed.shape.triangles], 1, 0)
+    area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
+    scale: F64 = np.abs(np.linalg.det(placed.worlds[:, :3, :3])) ** (2 / 3)
+    return area * float(scale.sum())

@@ -13,10 +13,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from PIL import Image
+from scene_files import Gltf
 
+import app.commands.info as info_module
 from app.cli import run
+from app.scene import shapes
+from app.scene.load import load_scene
 
 ROOT = Path(__file__).parent.parent.parent
 FEW = ["--texels", "2000", "--shots", "8"]  # enough to have run through everything
@@ -274,6 +279,53 @@ def test_info_foretells_the_solve(folder: Path, scene: str, storage: str, capsys
     assert told["memory_mib"] == pytest.approx(came["memory_mib"], rel=0.01)
 
 
+def test_info_of_a_large_scene_neither_unfolds_nor_places(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A box 40 times, turned, scaled and mirrored; counts, area and density as of the whole scene, marked as estimates."""
+    gltf, rng = Gltf(), np.random.default_rng(3)
+    box = shapes.box((1.0, 2.0, 0.5))
+    primitive = {"attributes": {"POSITION": gltf.accessor(box.positions.astype(np.float32))}, "material": 0}
+    primitive["indices"] = gltf.accessor(box.triangles.astype(np.uint16).reshape(-1))
+    turns = rng.normal(size=(40, 4))
+    places = {
+        "TRANSLATION": gltf.accessor((10 * rng.random((40, 3))).astype(np.float32)),
+        "ROTATION": gltf.accessor((turns / np.linalg.norm(turns, axis=1)[:, None]).astype(np.float32)),
+        "SCALE": gltf.accessor(np.repeat(rng.choice([-1.0, 0.5, 2.0], (40, 1)), 3, axis=1).astype(np.float32)),
+    }
+    gltf.json |= {
+        "meshes": [{"primitives": [primitive]}],
+        "nodes": [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": places}}}],
+        "materials": [{"doubleSided": True, "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}}],
+    }
+    Path("boxes.glb").write_bytes(gltf.glb())
+    whole = load_scene("boxes.glb")
+    exact = json_of(capsys, ["info", "boxes.glb", "--json"])
+    assert exact["estimated"] == ["seconds_to_open"]
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("unfolds")
+
+    monkeypatch.setattr(info_module, "COUNTED", 100)
+    monkeypatch.setattr(info_module, "read_and_unfold", refuse)
+    told = json_of(capsys, ["info", "boxes.glb", "--json"])
+    area = 2 * whole.normals_areas[1].sum()
+    assert told["texels"] == pytest.approx(told["texels_per_metre"] ** 2 * area)
+    assert told["texels"] == pytest.approx(exact["texels"], rel=0.1)  # texels on the outlines of small rectangles
+    monkeypatch.setattr(info_module, "READ", 100)
+    monkeypatch.setattr(info_module, "load_scene", refuse)
+    estimated = ["lit_sides", "texels_per_metre", "texels", "tiles", "memory_mib", "seconds_to_open"]
+    assert told.pop("estimated") == estimated
+    outlined = json_of(capsys, ["info", "boxes.glb", "--json"])
+    assert outlined.pop("estimated") == ["triangles", "size_m", *estimated]
+    size = whole.bounds[1] - whole.bounds[0]
+    assert (outlined["size_m"] >= size - 1e-9).all() and outlined.pop("size_m") == pytest.approx(size, rel=0.2)
+    assert told.pop("size_m") == pytest.approx(size)
+    told["cameras"] = []  # that which a scene gets if it has none
+    assert outlined.pop("texels_per_metre") == pytest.approx(told.pop("texels_per_metre"))
+    assert outlined == told
+
+
 def test_info_foretells_how_quadtrees_begin(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Before anything has split. Memory without the tables of leaves and materials: within 2 %."""
     told = json_of(capsys, ["info", "cornell-box", "--json", "--adaptive"])
@@ -350,7 +402,10 @@ def no_screen():
     raise Exception("no X11")  # as glcontext raises
 
 glcontext.default_backend = no_screen
+import app.commands.info as info_module
 from app.cli import run
+from app.scene import shapes
+from app.scene.load import load_scene
 sys.exit(run(["doctor"]))
 """
 
