@@ -39,10 +39,9 @@ class Seams:
         return len(self.own)
 
     def points(self, step: float) -> tuple[F64, F64, F64]:
-        """Places along the edges, each edge once, about so many texels apart: in its own chart (n, 2) and in the other (n, 2);
-        the way into its own chart (n, 2), one texel long."""
-        once = slice(0, len(self) // 2)
-        own, other = self.own[once], self.other[once]
+        """Places along the edges, from both sides, about so many texels apart: in their own chart (n, 2) and in the other (n, 2);
+        the way into their own chart (n, 2), one texel long."""
+        own, other = self.own, self.other
         way = own[:, 1] - own[:, 0]
         length = np.linalg.norm(way, axis=1)
         count = np.maximum(np.ceil(length / step), 1).astype(np.int64)

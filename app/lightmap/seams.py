@@ -46,23 +46,38 @@ def finished(values: F32, covered: NDArray[np.bool_], charts: Charts) -> F32:
 
 def jumps(image: F32, charts: Charts) -> Jumps:
     """Of a finished image (H, W, 3)."""
-    finer = image.shape[0] // charts.size[1]
-    grey = image.mean(2, dtype=np.float64, keepdims=True)
-    own, other, inward = charts.seams.points(STEP / finer)
-    inside = [_at(grey, (own + k * inward / finer) * finer) for k in (0.5, 1.5)]
-    pairs = [(_at(grey, own * finer), _at(grey, other * finer)), (inside[0], inside[1])]
-    least = DARK * max(float(np.mean(pairs[0])), np.finfo(float).tiny) if len(own) else 0.0
-    bright = np.min(pairs, axis=(0, 1)) > least if len(own) else np.zeros(0, bool)
-    across, within = (_quantiles(a[bright], b[bright]) for a, b in pairs)
+    own, other, inward, grey = _beside(image, charts)
+    if not len(own):
+        return Jumps(0, (0.0, 0.0), (0.0, 0.0))
+    pairs = [
+        (bilinear(grey, a), bilinear(grey, b)) for a, b in ((own, other), (own + 0.5 * inward, own + 1.5 * inward))
+    ]
+    bright = np.min(pairs, axis=(0, 1)) > DARK * np.mean(pairs[0])
+    across, within = (_quantiles(_over_mean(a, b)[bright]) for a, b in pairs)
     return Jumps(int(bright.sum()), across, within)
 
 
-def _at(grey: F64, place: F64) -> F64:
-    return np.asarray(bilinear(grey, place)[:, 0])
+def places_and_jumps(image: F32, charts: Charts) -> tuple[F64, F64]:
+    """Places in texels along seams, on both sides (n, 2) [texels of level 0], and how far a finished image (H, W, 3) jumps there,
+    over its mean, or where that is dark over what counts as dark (n,)."""
+    own, other, inward, grey = _beside(image, charts)
+    pair = bilinear(grey, own), bilinear(grey, other)
+    least = DARK * float(np.mean(pair)) if len(own) else 0.0
+    finer = image.shape[0] // charts.size[1]
+    return (own + 0.5 * inward) / finer, _over_mean(*pair, least=least)[:, 0]
 
 
-def _quantiles(a: F64, b: F64) -> tuple[float, float]:
-    if not len(a):
-        return 0.0, 0.0
-    jump = np.abs(a - b) / ((a + b) / 2)
-    return float(np.median(jump)), float(np.quantile(jump, 0.9))
+def _beside(image: F32, charts: Charts) -> tuple[F64, F64, F64, F64]:
+    """Places along seams from both sides, own and other, and the way into the own chart (n, 2) each, [texels of the image]; the
+    image in grey (H, W, 1)."""
+    finer = image.shape[0] // charts.size[1]
+    own, other, inward = charts.seams.points(STEP / finer)
+    return own * finer, other * finer, inward, image.mean(2, dtype=np.float64, keepdims=True)
+
+
+def _over_mean(a: F64, b: F64, least: float = np.finfo(float).tiny) -> F64:
+    return np.asarray(np.abs(a - b) / np.maximum((np.abs(a) + np.abs(b)) / 2, max(least, np.finfo(float).tiny)))
+
+
+def _quantiles(jump: F64) -> tuple[float, float]:
+    return (float(np.median(jump)), float(np.quantile(jump, 0.9))) if len(jump) else (0.0, 0.0)

@@ -25,7 +25,14 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec.709 [IEC 61966-2-1]
 SHARES = (1.0, 99.0)
 DECADES = (0.5, 3.0)  # of a logarithmic scale: fewer would be noise, more cannot be told apart
 NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # ends of a scale, times a power of ten
-UNITS = {"illuminance": "lx", "luminance": "cd/m²", "error": "%", "expected error": "%", "rays": "per texel"}
+UNITS = {
+    "illuminance": "lx",
+    "luminance": "cd/m²",
+    "error": "%",
+    "expected error": "%",
+    "jump at seams": "%",
+    "rays": "per texel",
+}
 LAYER = {"illuminance": "irradiance", "luminance": "combined"}  # the layer whose radiance is measured
 VIRIDIS = np.array(
     [

@@ -7,13 +7,16 @@ from dataclasses import dataclass
 
 from app.render.options import LAYERS
 
+SEAMS = "seams"  # see seam_jumps.py
+
 
 @dataclass(frozen=True)
 class Layer:
     """shader: its file. light: the lightmap's texture that it shows as radiance, exposed; None for what is no light and
     is shown as it is. smooth: whether its texels may be interpolated. checker: depth of the texel checker. compares: whether it
     is of a reference, too. measures: in false colour, whatever the display says, what it measures. offered: what a solver must
-    know of every texel for it, see app/solvers/base.py. defines: those of the lightmap's that the shader declares."""
+    know of every texel for it, see app/solvers/base.py, or SEAMS, which is known of any light. defines: those of the lightmap's
+    that the shader declares."""
 
     shader: str
     light: str | None = None
@@ -44,10 +47,11 @@ LAYER_SHADERS = {
     "rays": Layer("count", measures="rays", offered="rays"),
     "expected-error": Layer("deviation", "t_irradiance", measures="expected error", offered="variance"),
     "local": Layer("local_set", smooth=False, offered="local"),
+    "seams": Layer("count", measures="jump at seams", offered=SEAMS),
 }
 assert tuple(LAYER_SHADERS) == LAYERS
 
 
 def layers_with(offered: Container[str]) -> tuple[str, ...]:
     """Those that can be shown where a solver offers so much."""
-    return tuple(name for name, layer in LAYER_SHADERS.items() if not layer.offered or layer.offered in offered)
+    return tuple(n for n, layer in LAYER_SHADERS.items() if layer.offered in ("", SEAMS) or layer.offered in offered)

@@ -8,7 +8,7 @@ from app.options import Options, option
 
 LAYERS = (
     *("combined", "irradiance", "residual", "albedo", "charts", "leaves", "texels", "error"),
-    *("direct", "indirect", "rays", "expected-error", "local"),
+    *("direct", "indirect", "rays", "expected-error", "local", "seams"),
 )
 TONE_MAPS = ("clamp", "reinhard", "aces", "agx", "neutral")
 INTERPOLATIONS = ("nearest", "bilinear", "bicubic")
@@ -20,8 +20,8 @@ FALSE_COLOURS = ("off", "illuminance", "luminance")  # lux, cd/m²
 class DisplayOptions(Options):
     layer: str = option(
         "combined",
-        "what is shown: B, H, r, albedo, charts, quadtree levels, texel density or error; where the solver has it direct or "
-        "indirect light, rays per texel, the error that it expects, or the local set around the observer",
+        "what is shown: B, H, r, albedo, charts, quadtree levels, texel density, error or jumps at seams; where the "
+        "solver has it direct or indirect light, rays per texel, the error that it expects, or the local set around the observer",
         choices=LAYERS,
     )
     show: str = option("solution", "whose light: the solution's, a reference's, or both side by side", choices=SHOWN)

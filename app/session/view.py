@@ -17,11 +17,12 @@ from app.render.camera import CameraView
 from app.render.exposure import exposure_of
 from app.render.false_colour import Scale, false_colour_scale
 from app.render.frame import FrameRenderer
-from app.render.layers import LAYER_SHADERS, layers_with
+from app.render.layers import LAYER_SHADERS, SEAMS, layers_with
 from app.render.options import DisplayOptions
 from app.render.pick import with_texel
 from app.render.ray_picture import RayPicture
 from app.render.resolve import Reference
+from app.render.seam_jumps import SeamJumps
 from app.render.surfaces import Rect
 from app.scene.model import Camera
 from app.session.picking import Picked, picked_from_hit
@@ -43,6 +44,7 @@ class View:
         self.camera: CameraView
         self.marked: tuple[int, int] | None = None
         self._renderer, self._rays = FrameRenderer(session.gpu), RayPicture(session.gpu)
+        self._seams = SeamJumps(session.gpu)
         self._rays_of: object = None
         self._rays_due = 0.0
         session.follow(self._prepare, self._opened)
@@ -92,7 +94,7 @@ class View:
             self.camera,
             self.shown,
             reference=self._reference(whole=whole),
-            offered=self._offered,
+            offered=self._offered(whole=whole),
             shooter=self._last_shooter,
             rays=self._marked_rays(whole=whole),
             scale=scale,
@@ -102,12 +104,14 @@ class View:
 
     def false_colour_scale(self) -> Scale:
         """Of what is shown, which is in false colour. Waits for the GPU."""
-        return false_colour_scale(self.shown, self.session.lightmap, self._offered)
+        return false_colour_scale(self.shown, self.session.lightmap, self._offered(whole=False))
 
-    @property
-    def _offered(self) -> Mapping[str, Texture]:
-        """What the layer that is shown needs of the solver."""
-        return self.session.solver.layers if LAYER_SHADERS[self.shown.layer].offered else {}
+    def _offered(self, *, whole: bool) -> Mapping[str, Texture]:
+        """What the layer that is shown needs of the solver, or of seams."""
+        offered = LAYER_SHADERS[self.shown.layer].offered
+        if offered == SEAMS:
+            return {SEAMS: self._seams.of(self.session.lightmap, whole=whole)}
+        return self.session.solver.layers if offered else {}
 
     def expose(self) -> None:
         """Set the exposure from the light of the scene."""
@@ -202,4 +206,5 @@ class View:
 
     def release(self) -> None:
         self._rays.release()
+        self._seams.release()
         self._renderer.release()

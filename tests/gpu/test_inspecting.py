@@ -11,7 +11,7 @@ import pytest
 from app.atlas.options import AtlasOptions
 from app.cli import run
 from app.gpu import Gpu, Texture
-from app.render.layers import LAYER_SHADERS
+from app.render.layers import LAYER_SHADERS, SEAMS
 from app.render.tone_mapping import encode_srgb
 from app.scene.model import F64
 from app.session.run import Stop
@@ -56,7 +56,9 @@ def test_a_solver_fills_the_layers_that_its_family_names(gpu: Gpu, view: View, n
     session.work(8)
     layers = session.solver.layers
     assert tuple(layers) == SOLVERS[name].layers and set(layers) <= set(LAYERS)
-    assert {layer.offered for layer in LAYER_SHADERS.values()} - {""} == set(LAYERS), "each is shown by some layer"
+    assert {layer.offered for layer in LAYER_SHADERS.values()} - {"", SEAMS} == set(LAYERS), (
+        "each is shown by some layer"
+    )
     for texture in layers.values():
         assert texture.size == session.lightmap.size
     session.release()
@@ -79,7 +81,7 @@ def test_a_layer_is_shown_where_the_solver_has_it(view: View, layer: str) -> Non
     view.display = view.display.replace(layer="combined", exposure=1.0)
     light = picture(view, SIZE)
     view.display = view.display.replace(layer=layer)
-    there = LAYER_SHADERS[layer].offered in SOLVERS["gathering"].layers
+    there = LAYER_SHADERS[layer].offered in (SEAMS, *SOLVERS["gathering"].layers)
     assert (layer in view.layers) == there and view.shown.layer == (layer if there else "combined")
     image = picture(view, SIZE)
     assert image.std() > 5 and (image == light).all() != there

@@ -14,10 +14,11 @@ from app.cli import run
 from app.gpu import Gpu
 from app.lightmap.collapse import collapse
 from app.lightmap.gutter import fill_gutter
-from app.lightmap.seams import finished
+from app.lightmap.seams import finished, places_and_jumps
 from app.render.ages import LeafAges
 from app.render.options import DisplayOptions
 from app.render.resolve import BORDER, DisplayTexels
+from app.render.seam_jumps import SeamJumps
 from app.render.seam_texels import shown_at_seams
 from app.scene.load import load_scene
 
@@ -68,3 +69,24 @@ def test_a_bake_says_how_far_light_jumps_at_seams(tmp_path: Path, capsys: pytest
     assert f"light jumps by {seams['after'][0]:.1%} at seams ({seams['before'][0]:.1%} before" in said
     for nth in (0, 1):
         assert seams["after"][nth] < 0.5 * min(seams["before"][nth], seams["beside"][nth])
+
+
+@pytest.mark.parametrize("level", [0, 1])
+def test_what_is_left_is_shown_beside_seams(gpu: Gpu, rng: np.random.Generator, level: int) -> None:
+    """On texels that cover something, whatever leaf they are in."""
+    trees, shown = Forest(gpu, load_scene("textured-room"), texels=12000), SeamJumps(gpu)
+    for _ in range(level):
+        trees.grow(0.5, rng)
+    trees.write_noise(rng)
+    texture = shown.of(trees.lightmap, whole=True)
+    left = trees.pool.tiles_from_image(np.frombuffer(texture.read(), np.float32).reshape(*texture.size[::-1], 1))[
+        ..., 0
+    ]
+    covered = trees.pool.surfaces.area > 0
+    _, jump = places_and_jumps(
+        finished(*collapse(trees.pool, trees.lightmap.irradiance(ambient=True)), trees.pool.charts), trees.pool.charts
+    )
+    assert left.max() == pytest.approx(jump.max()) and (left > 0).sum() > 50
+    assert left[covered].sum() > 0.95 * left.sum(), "a texel that a seam only touches may cover nothing"
+    shown.release()
+    trees.lightmap.release()
