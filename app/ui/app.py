@@ -123,7 +123,13 @@ class Ui:
         """Whether a hand is at a control or moves the view."""
         self.use()
         state = self.state
-        return bool(imgui.is_any_item_active()) or state.drag_button >= 0 or state.split_held or state.flying
+        return (
+            bool(imgui.is_any_item_active())
+            or state.drag_button >= 0
+            or state.split_held
+            or state.light_held
+            or state.flying
+        )
 
     def take_requests(self) -> list[Request]:
         """What the host has to do, once."""

@@ -10,6 +10,8 @@ from imgui_bundle import imgui
 
 from app.ui import theme
 from app.ui.divider import divider
+from app.ui.light_gizmos import light_gizmos
+from app.ui.on_screen import on_screen
 from app.ui.state import Flight, State
 
 if TYPE_CHECKING:
@@ -37,7 +39,7 @@ def navigate(view: View, state: State, seconds: float) -> None:
     left, top, width, height = state.view_px
     x, y = io.mouse_pos.x - left, io.mouse_pos.y - top
     inside = 0 <= x < width and 0 <= y < height and not io.want_capture_mouse
-    taken = divider(view, state)
+    taken = divider(view, state) or light_gizmos(view, state)
     for button in range(3):
         if inside and not (taken and button == 0) and imgui.is_mouse_clicked(button) and state.drag_button < 0:
             state.drag_button, state.flight = button, None
@@ -139,13 +141,9 @@ def _marker(view: View, state: State) -> None:
     view.marked = state.picked.texel if drawn and state.picked is not None else None
     if state.picked is None:
         return
-    left, top, width, height = state.view_px
-    space = view.session.lightmap.space
-    local = np.append(space.local_from_world(np.asarray(state.picked.position, np.float64)), 1.0)
-    x, y, _, w = view.camera.clip_from_local(width / height, space) @ local
-    if w <= 0 or abs(x) > w or abs(y) > w:
+    at = on_screen(view, state, np.asarray(state.picked.position))
+    if at is None:
         return
-    at = imgui.ImVec2(left + (x / w + 1) / 2 * width, top + (1 - y / w) / 2 * height)
     draw_list = imgui.get_background_draw_list()
     draw_list.add_circle(at, MARKER_PX + 1, theme.colour_u32((0, 0, 0, 0.6)), 0, 3.0)
     draw_list.add_circle(at, MARKER_PX + 1, theme.colour_u32(theme.AMBER), 0, 1.5)

@@ -79,7 +79,7 @@ class State:
     texture_id: makes a texture of the host drawable; legend: the scale of what is shown now; stats: of the session,
     asked once per frame (None without a scene). atlas, adaptive: edited, not yet applied. view_px: the 3-D view (left, top,
     width, height) [display units]. inspected: what the solver showed last, and of which light. draw_rays: those of the
-    picked texel, in the room. reference: of a solve in the
+    picked texel, in the room. draw_lights: lamps without area, in the view. reference: of a solve in the
     background; layer: to go back to from the error.
     """
 
@@ -113,6 +113,9 @@ class State:
     compared: bool = False
     flight: Flight | None = None
     material: int = 0
+    light: int = 0
+    light_held: bool = False
+    draw_lights: bool = True
     atlas: AtlasOptions | None = None
     adaptive: bool | None = None
     emission_colours: dict[int, RGB] = field(default_factory=dict)
@@ -149,6 +152,6 @@ class State:
         if lightmap is not self._known[1]:
             self.picked = self.atlas = self.adaptive = None
         if scene is not self._known[0]:
-            self.flight, self.material = None, 0
+            self.flight, self.material, self.light = None, 0, 0
             self.emission_colours.clear()
         self._known = scene, lightmap

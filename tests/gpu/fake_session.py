@@ -99,7 +99,7 @@ class FakeSession:
         self.estimate = SimpleNamespace(share=1.0)
         cameras = (SimpleNamespace(name="front", world_from_camera=np.eye(4), yfov=0.7),)
         self.scene = SimpleNamespace(
-            materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras, sky=None
+            materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras, sky=None, lights=()
         )
         self.unedited = self.scene
         self.charts = SimpleNamespace(density=40.0, tile=16, warnings=(), size=(160, 96))

@@ -19,6 +19,7 @@ from app.errors import UserError
 from app.gpu import Gpu, ShaderError
 from app.options import Options, specs
 from app.render.options import DisplayOptions
+from app.scene.lights import Light
 from app.scene.sky import Sky, Sun
 from app.solvers import SOLVERS, ShootingOptions
 from app.ui import overlays, widgets
@@ -239,6 +240,37 @@ def test_a_lamp_that_was_switched_off_keeps_its_colour(desk: Desk, monkeypatch: 
         monkeypatch.setattr(imgui, "slider_float", lambda label, *_, s=strength: (label == "##strength", s))
         desk.frames()
     np.testing.assert_allclose(desk.session.scene.materials[3].emission, (5.0, 5 * 12 / 17, 5 * 4 / 17), rtol=1e-12)
+
+
+def test_editing_a_light_tells_the_session(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    lights = (Light("a", intensity=(4.0, 2.0, 1.0)), Light("b", "spot"))
+    told: list[tuple[Light, ...]] = []
+    desk.session.scene.lights = lights
+    desk.session.set_lights = told.append  # type: ignore[attr-defined]
+    desk.session.scene.bounds = (np.zeros(3), np.ones(3))
+    desk.frames()
+    assert not told
+    monkeypatch.setattr(imgui, "slider_float", lambda label, value, *_: (label == "##strength", 2 * value))
+    desk.frames(1)
+    assert told[-1] == (replace(lights[0], intensity=(8.0, 4.0, 2.0)), lights[1])  # colour kept, strength doubled
+
+
+def test_a_light_is_dragged_by_its_handle(desk: Desk) -> None:
+    """In the plane that faces the eye, and the view stays."""
+    light = Light("a", position=tuple((desk.session.camera.eye + desk.session.camera.forward).tolist()))
+    desk.session.scene.lights, desk.session.scene.bounds = (light,), (np.zeros(3), np.ones(3))
+
+    def follow(lights: tuple[Light, ...]) -> None:
+        desk.session.scene.lights = lights
+
+    desk.session.set_lights = follow  # type: ignore[attr-defined]
+    eye = desk.session.camera.world_from_camera.copy()
+    left, top, width, height = desk.ui.state.view_px
+    x, y = left + width / 2, top + height / 2
+    desk.drag((x, y), (x + 100, y))
+    moved = np.subtract(desk.session.scene.lights[0].position, light.position)
+    assert moved == pytest.approx([2 * np.tan(desk.session.camera.yfov / 2) * 100 / height, 0, 0], rel=0.05)
+    assert (desk.session.camera.world_from_camera == eye).all()
 
 
 @pytest.mark.parametrize("solver", list(SOLVERS))

@@ -13,7 +13,7 @@ from app.lightmap.options import QUADTREE
 from app.render.tone_mapping import encode_srgb
 from app.scene.model import MOST_ALBEDO
 from app.ui import theme, widgets
-from app.ui.panels import sky
+from app.ui.panels import lights, sky
 from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ def draw(view: View, state: State) -> None:
         _editor(view, state, view.session.materials[state.material])
     if view.session.family.relights:
         _flicker(view, state)
+    lights.draw(view, state)
     sky.draw(view, state)
     if widgets.fold("Texels", opened=has_room()):
         _atlas(view, state)
