@@ -26,11 +26,13 @@ from app.bench.accuracy.error_report import TITLE
 from app.bench.accuracy.methods import DEFAULT_METHODS, METHODS, Method, Setup, method_names
 from app.bench.peers.peers import PEERS
 from app.cli import ERROR_SCENES, build_parser, run
+from app.errors import UserError
 from app.lightmap.options import LightmapOptions
 from app.options import Options, specs
 from app.reference import irradiance
 from app.scene.load import load_scene
 from app.scene.model import Scene
+from app.session.loading import read_and_unfold
 from app.solvers import DEFAULT_SOLVER, SOLVERS, ShootingOptions
 from app.util.console import Console
 from app.util.tables import FLIP, missing
@@ -177,6 +179,25 @@ def test_a_furnace_from_the_command_line(
         assert missing(FLIP) or 0 < last["flip"] < 0.15
     drawn = (tmp_path / "out/furnace.png").exists()
     assert drawn != ("no plots: pip install" in err)
+
+
+def test_points_lie_on_the_triangles_that_methods_see(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wall on a floor cuts it: a triangle's number means another one then."""
+    material = "[[material]]\nname = 'paint'\nexitance = 1\n"
+    floor = "[[quad]]\nmaterial = 'paint'\norigin = [0, 0, 0]\nedge_u = [0, 0, 2]\nedge_v = [2, 0, 0]\n"
+    wall = "[[quad]]\nmaterial = 'paint'\norigin = [0.5, 0, 0.5]\nedge_u = [0, 1, 0]\nedge_v = [1, 0, 0]\n"
+    file = tmp_path / "wall.toml"
+    file.write_text(material + floor + wall)
+    given: list[Scene] = []
+
+    def judged(scene: Scene, *_: object) -> None:
+        given.append(scene)
+        raise UserError("enough")
+
+    monkeypatch.setattr(error, "reference_irradiance", judged)
+    run(["bench", "error", str(file), "--methods", "uniform", "--reference", "dense", "-o", str(tmp_path / "out")])
+    seen, _, _ = read_and_unfold(str(file), AtlasOptions(texels=500), False, silent)
+    assert len(given[0].corners) == len(seen.corners) > 4 and (given[0].corners == seen.corners).all()
 
 
 def test_any_family_of_solvers_is_a_method(

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from app import __version__
+from app.atlas.cuts import cut_at_contacts
 from app.bake import prepare_directory
 from app.bench.accuracy.error_curve import look_at, solve_curve
 from app.bench.accuracy.error_report import SceneCurves, document, plot, write
@@ -127,9 +128,10 @@ def _measure(gpu: Gpu, one: SceneCurves, plan: Plan, console: Console, tell: Tel
     def told(text: str, share: float) -> None:
         tell(f"{one.name}, {text}", share)
 
+    scene = cut_at_contacts(one.scene).scene  # as methods see it: points are told by its triangles
     try:
-        reference = reference_irradiance(one.scene, one.compared_with, plan.paths, told)
-        picture = reference_picture(gpu, one.scene, reference, plan.paths, told)
+        reference = reference_irradiance(scene, one.compared_with, plan.paths, told)
+        picture = reference_picture(gpu, scene, reference, plan.paths, told)
     except UserError as error:
         console.warn(f"{one.name}: left out: {error}")
         return
@@ -138,16 +140,17 @@ def _measure(gpu: Gpu, one: SceneCurves, plan: Plan, console: Console, tell: Tel
     for i, name in enumerate(names):
         tell(f"{one.name}, {name}", i / len(names))
         try:
-            one.curves[name] = _curve(gpu, one, reference, name, plan)
+            if name in PEERS:
+                task = Task(scene, reference, picture, plan.setup("uniform").atlas, plan.seconds)
+                one.curves[name] = PEERS[name].curve(task)
+            else:
+                one.curves[name] = _curve(gpu, one, reference, name, plan)
         except (UserError, MemoryError) as error:
             console.warn(f"{one.name}, {name}: left out: {error or 'not enough memory'}")
 
 
 def _curve(gpu: Gpu, one: SceneCurves, reference: ReferenceIrradiance, name: str, plan: Plan) -> list[Row]:
-    """Of a method or a peer. Raises UserError."""
-    if name in PEERS:
-        atlas = plan.setup("uniform").atlas
-        return PEERS[name].curve(Task(one.scene, reference, one.picture, atlas, plan.seconds))
+    """Of a method. Raises UserError."""
     setup = plan.setup(name)
     with opened(gpu, one.scene, setup.atlas, setup.light, setup.options, setup.solver) as (lightmap, solver):
         estimator, looks = ErrorEstimator(gpu, lightmap, NODES), itertools.count()

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from app.atlas.cuts import cut_at_contacts
 from app.atlas.options import AtlasOptions
 from app.bench.papers.kahl_verdicts import verdicts
 from app.bench.papers.published import KAHL
@@ -46,7 +47,7 @@ SMALL, LARGE = (64, 128), (256, 512)
 @functools.cache
 def reference() -> ReferenceIrradiance:
     """At random points of the scene. Takes a minute or more the first time."""
-    scene = load_scene(SCENE)
+    scene = cut_at_contacts(load_scene(SCENE)).scene
     return reference_irradiance(scene, choose_reference(scene), SAMPLES, lambda text, share: None)
 
 
@@ -100,7 +101,7 @@ def bounces(solver: Pairs, count: int) -> Iterator[float]:
 
 def cell_of(right: ReferenceIrradiance) -> Any:
     """(n,) a number for each cell of the room, and way that a surface faces, of the points."""
-    scene = load_scene(SCENE)
+    scene = cut_at_contacts(load_scene(SCENE)).scene
     positions, normals = right.points.positions_normals(scene)
     lower, upper = scene.bounds
     cells = np.floor((positions - lower) / (upper - lower).max() * CELLS * 0.999).astype(np.int64)
