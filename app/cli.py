@@ -108,6 +108,9 @@ def _bench_flags(parser: Parser, family: Family) -> None:
         "rays": Command(
             "millions of rays a second, and what the tree they walk takes to build", _rays_flags, _bench_rays
         ),
+        "open": Command(
+            "seconds from a file to its first light, by stage, new and from the caches", _open_flags, _bench_open
+        ),
         "edits": Command("milliseconds from an edit of a material to its light", _edits_flags, _bench_edits),
         "frames": Command("milliseconds per frame of the viewer, by part", _frames_flags, _bench_frames),
         "tables": Command("the papers' tables, ours beside theirs; minutes", _tables_flags, _bench_tables),
@@ -204,6 +207,12 @@ def _rays_flags(rays: Parser, family: Family) -> None:
         "--seconds", type=positive(float), default=2.0, metavar="S", help="of each figure, about (default %(default)s)"
     )
     json_flag(rays)
+
+
+def _open_flags(opening: Parser, family: Family) -> None:
+    scene_flags(opening, optional=True)
+    json_flag(opening)
+    solver_flags(opening, family)
 
 
 def _edits_flags(edits: Parser, family: Family) -> None:
@@ -365,6 +374,12 @@ def _bench_rays(flags: argparse.Namespace) -> int:
     from app.bench.speed.rays import bench_rays
 
     return bench_rays(flags)
+
+
+def _bench_open(flags: argparse.Namespace) -> int:
+    from app.bench.speed.opening import bench_open
+
+    return bench_open(flags)
 
 
 def _bench_edits(flags: argparse.Namespace) -> int:

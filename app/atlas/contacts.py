@@ -303,8 +303,9 @@ def _caps(points: F64, triangles: I32, double_sided: NDArray[np.bool_], flat: fl
 
 def _edges(triangles: I32) -> tuple[I64, I64]:
     """The number of each edge of each triangle (3 m,), and how many triangles have it (edges,)."""
-    ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], 2).reshape(-1, 2), axis=1)
-    _, which, uses = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    start, end = triangles.reshape(-1).astype(np.int64), np.roll(triangles, -1, axis=1).reshape(-1)
+    key = np.minimum(start, end) * (int(triangles.max(initial=0)) + 1) + np.maximum(start, end)
+    _, which, uses = np.unique(key, return_inverse=True, return_counts=True)
     return which.reshape(-1), uses
 
 
