@@ -143,8 +143,8 @@ def test_a_furnace_with_a_board_in_it_stays_one(gpu: Gpu, solver: str, board: st
     solution.release()
 
 
-@pytest.mark.parametrize("what", ["sky", "point"])
-def test_sky_and_lights_without_area_shine_through_a_board(gpu: Gpu, what: str) -> None:
+@pytest.mark.parametrize(("what", "way"), [("sky", "gathering"), ("point", "gathering"), ("point", "hemicube")])
+def test_sky_and_lights_without_area_shine_through_a_board(gpu: Gpu, what: str, way: str) -> None:
     """The floor receives the mean of what it does without a board, and under one that is closed, past which it sees the
     horizon."""
     power = []
@@ -155,6 +155,6 @@ def test_sky_and_lights_without_area_shine_through_a_board(gpu: Gpu, what: str) 
             scene = scene.with_sky(Sky())
         else:
             scene = scene.with_lights((Light("bulb", position=(2.0, 2.0, 2.0)),))
-        power.append(lit(gpu, scene, *WAYS["gathering"])[0])
+        power.append(lit(gpu, scene, *WAYS[way])[0])
     assert power[2] == pytest.approx((power[0] + power[1]) / 2, rel=0.02)
     assert power[1] < 0.6 * power[0]

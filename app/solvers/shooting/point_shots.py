@@ -32,6 +32,8 @@ from app.visibility.occluders import Occluders
 PLACES = 32  # in the sphere of a light with a radius
 ASIDE = np.array([0.5319, 0.7023, 0.4733]) / np.linalg.norm([0.5319, 0.7023, 0.4733])  # a direction that no wall has
 GOLDEN = (5**0.5 - 1) / 2
+# solver space: the radius that any light has at least where something is blended, so that several maps choose what stops there
+APART = 1e-5
 LEAST = 1e-9  # of the strongest, that a difference has to be
 
 Sources = dict[Light, F64]  # intensity of each, RGB [W/sr], by the light without it
@@ -52,6 +54,8 @@ class PointShots:
         self._gpu, self._lightmap, self._occluders = gpu, lightmap, occluders
         self._receivers, self._shooters, self._ledger = receivers, shooters, ledger
         self._lights = gpu.texture((4, BATCH), 4, "f4")
+        blended = any(not m.opaque and m.opacity_cutoff is None for m in lightmap.scene.materials)
+        self._apart = APART * lightmap.space.scale if blended else 0.0
         self._see: See | None = None
         self._given: Sources = {}
         self._queue: list[tuple[Light, F64, F64]] = []  # source, intensity, axis of its map
@@ -72,7 +76,7 @@ class PointShots:
     def change(self, lights: tuple[Light, ...]) -> None:
         """Other lights: the difference to what was given is to come, the strongest first."""
         self._given = self._shot()
-        wanted = sources_of(lights)
+        wanted = sources_of(lights, self._apart)
         change = {s: wanted.get(s, np.zeros(3)) - self._given.get(s, np.zeros(3)) for s in {**self._given, **wanted}}
         power = {source: float(np.abs(i).sum()) * source.solid_angle for source, i in change.items()}
         least = LEAST * max(
@@ -152,15 +156,15 @@ class PointShots:
         self._gpu.release_all(self._lights)
 
 
-def sources_of(lights: tuple[Light, ...]) -> Sources:
-    """Points that shoot for these lights, and with what intensity; those at the same place added up."""
+def sources_of(lights: tuple[Light, ...], least: float) -> Sources:
+    """Points that shoot for these lights, and with what intensity; those at the same place added up. least: radius of each, at
+    least [m]."""
     found: Sources = {}
     for light in lights:
         if light.from_afar or not light.emits:
             continue
-        places = np.array(light.position) + light.radius * (
-            _in_a_ball(PLACES) if light.radius > 0 else np.zeros((1, 3))
-        )
+        radius = max(light.radius, least)
+        places = np.array(light.position) + radius * (_in_a_ball(PLACES) if radius > 0 else np.zeros((1, 3)))
         for x, y, z in places.tolist():
             source = replace(light, name="", intensity=(1.0, 1.0, 1.0), position=(x, y, z), radius=0.0)
             found[source] = found.get(source, np.zeros(3)) + np.array(light.intensity) / len(places)
