@@ -25,7 +25,7 @@ from app.atlas.sides import FLAT, distinct_rows, facets, scene_size, weld
 from app.scene.model import F32, F64, I32, Scene
 from app.scene.validate import has_area
 
-MOST_PIECES = 4096  # that are parted, beyond which none is: each takes milliseconds
+MOST_PIECES = 4096  # that are parted, beyond which none is: each takes a millisecond
 MOST_ENDS = 64  # of feet in one flat piece, that are drawn on: those of grass are not
 GOES_ON, ENDS, JUMPS = 0, 1, 2  # at an edge: nothing; a chart; a chart, since something stands there and light may jump
 
@@ -114,8 +114,8 @@ def cut_at_contacts(scene: Scene) -> Cut:
     nodes = _Nodes(places)
     for piece in pieces:
         _add_border_nodes(nodes, piece, corners)
-    made = [_cut_piece(nodes, piece, corners) for piece in _with_neighbours(nodes, pieces, places, corners, facet)]
-    return _joined(scene, nodes, corners, [m for m in made if m is not None], origin, size)
+    sheet = _Sheet.of(list(_with_neighbours(nodes, pieces, places, corners, facet)))
+    return _joined(scene, nodes, corners, _cut(nodes, sheet, corners), origin, size)
 
 
 # -- what parts a flat piece -------------------------------------------------------------------------------------------
@@ -172,16 +172,21 @@ def _on_rims(corners: F64, triangles: I32, facet: I32, found: Contacts) -> Mask:
 
 def _piece(corners: F64, members: I64) -> _Piece:
     """A flat piece of triangles (m, 3, 3), not parted."""
-    edges = corners[members, 1:] - corners[members, :1]
-    normals = np.cross(edges[:, 0], edges[:, 1])
+    axes = _axes(corners[members])
+    flat = corners[members] @ axes
+    polygons = shapely.polygons(_on_grid(flat))
+    whole = polygons[0] if len(polygons) == 1 else shapely.union_all(polygons, grid_size=FLAT)
+    return _Piece(members, flat, axes, shapely.boundary(whole), *np.empty((2, 0, 2, 2)))
+
+
+def _axes(corners: F64) -> F64:
+    """(3, 2) of the plane of triangles (t, 3, 3), which are counter-clockwise there."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal = normals[np.linalg.norm(normals, axis=1).argmax()]
     normal = normal / np.linalg.norm(normal)
     across = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
     across /= np.linalg.norm(across)
-    axes = np.stack([across, np.cross(normal, across)], axis=1)
-    flat = corners[members] @ axes
-    whole = shapely.union_all(shapely.polygons(_on_grid(flat)), grid_size=FLAT)
-    return _Piece(members, flat, axes, shapely.boundary(whole), *np.empty((2, 0, 2, 2)))
+    return np.stack([across, np.cross(normal, across)], axis=1)
 
 
 def _drawn_on(segments: F64, border: shapely.Geometry) -> tuple[F64, int]:
@@ -274,9 +279,11 @@ def _with_neighbours(nodes: _Nodes, pieces: list[_Piece], places: F64, corners: 
         yield dataclasses.replace(piece, members=piece.members[which], flat=piece.flat[which])
     parted = np.zeros(int(facet.max()) + 1, bool)
     parted[facet[[piece.members[0] for piece in pieces]]] = True
-    triangles = places[corners]
-    for triangle in np.flatnonzero(noded & ~parted[facet]):
-        yield _piece(triangles, np.array([triangle]))
+    others = np.flatnonzero(noded & ~parted[facet])
+    none = np.empty((0, 2, 2))
+    for triangle, own in zip(others[:, None], places[corners[others]], strict=True):
+        axes = _axes(own[None])
+        yield _Piece(triangle, own[None] @ axes, axes, shapely.Point(), none, none)
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,52 +297,89 @@ class _Made:
     ends: NDArray[np.uint8]
 
 
-def _cut_piece(nodes: _Nodes, piece: _Piece, corners: I32) -> _Made | None:
-    """What takes the place of a piece's triangles."""
-    number: dict[int, int] = {}
-    outlines = []
-    for triangle, flat in zip(piece.members.tolist(), piece.flat, strict=True):
-        own = corners[triangle].tolist()
-        for k in range(3):
-            run = [own[k], *nodes.along(own[k], own[(k + 1) % 3]), own[(k + 1) % 3]]
-            at = np.stack([flat[k], *(nodes.place(n) @ piece.axes for n in run[1:-1]), flat[(k + 1) % 3]])
-            number |= zip(_keys(at).tolist(), run, strict=True)
-            outlines.append(np.stack([at[:-1], at[1:]], axis=1))
-    around = np.concatenate(outlines)
-    parts = _snapped(piece.parts, around[:, 0])
+@dataclass(frozen=True, eq=False)
+class _Sheet:
+    """Pieces side by side in one plane, where they are cut at once: of each triangle its number in the scene and its piece (t,),
+    corners (t, 3, 2), axes (t, 3, 2) and shift (t, 2) from its own plane; stands, parts (n, 2, 2) as of a _Piece."""
+
+    members: I64
+    piece: I64
+    flat: F64
+    axes: F64
+    shift: F64
+    stands: F64
+    parts: F64
+
+    @staticmethod
+    def of(pieces: list[_Piece]) -> _Sheet:
+        columns = int(np.ceil(np.sqrt(len(pieces))))
+        cells = np.stack([np.arange(len(pieces)) % columns, np.arange(len(pieces)) // columns], axis=1)
+        least = np.array([piece.flat.min((0, 1)) for piece in pieces])
+        shifts = 2.0 * cells - np.floor(least / FLAT) * FLAT  # none is wider than the scene, which is 1
+        count = [len(piece.members) for piece in pieces]
+        return _Sheet(
+            np.concatenate([piece.members for piece in pieces]),
+            np.repeat(np.arange(len(pieces)), count),
+            np.concatenate([piece.flat + shift for piece, shift in zip(pieces, shifts, strict=True)]),
+            np.repeat([piece.axes for piece in pieces], count, axis=0),
+            np.repeat(shifts, count, axis=0),
+            np.concatenate([piece.stands + shift for piece, shift in zip(pieces, shifts, strict=True)]),
+            np.concatenate([piece.parts + shift for piece, shift in zip(pieces, shifts, strict=True)]),
+        )
+
+
+def _cut(nodes: _Nodes, sheet: _Sheet, corners: I32) -> _Made:
+    """What takes the place of a sheet's triangles."""
+    own, flat = corners[sheet.members], sheet.flat
+    number = dict(zip(_keys(flat).reshape(-1).tolist(), own.reshape(-1).tolist(), strict=True))
+    around = _outlines(nodes, sheet, own, number)
+    parts = _snapped(sheet.parts, around[:, 0])
     noded = _merged(
         _noded(np.concatenate([around, parts])), _keys(np.concatenate([around[:, 0], parts.reshape(-1, 2)]))
     )
     cells = shapely.get_parts(shapely.polygonize(shapely.linestrings(noded)))
     inside, cell = shapely.STRtree(shapely.point_on_surface(cells)).query(
-        shapely.polygons(piece.flat), predicate="intersects"
+        shapely.polygons(sheet.flat), predicate="intersects"
     )
-    if not len(cell):
-        return None
     made, which = shapely.get_parts(shapely.constrained_delaunay_triangles(cells[cell]), return_index=True)
     flat = shapely.get_coordinates(made).reshape(-1, 4, 2)[:, :3]
     a, b = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     turned = a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0]
     flat[turned] = flat[turned][:, [0, 2, 1]]
-    parent = inside[which]
-    keys = _keys(flat)
+    parent, keys = inside[which], _keys(flat)
     exact = dict(zip(_keys(parts).reshape(-1).tolist(), parts.reshape(-1, 2), strict=True))
     unrounded = np.array(
         [exact.get(key, at) for key, at in zip(keys.reshape(-1).tolist(), flat.reshape(-1, 2), strict=True)]
     )
-    weights = _weights(unrounded.reshape(-1, 3, 2), piece.flat[parent])
+    weights = _weights(unrounded.reshape(-1, 3, 2), sheet.flat[parent])
     for nth, key in enumerate(keys.reshape(-1).tolist()):
         if key not in number:
-            triangle = piece.members[parent[nth // 3]]
-            number[key] = nodes.add(weights[nth // 3, nth % 3] @ nodes.places[corners[triangle]])
+            number[key] = nodes.add(weights[nth // 3, nth % 3] @ nodes.places[own[parent[nth // 3]]])
     numbers = np.array([number[key] for key in keys.reshape(-1).tolist()], np.int64).reshape(-1, 3)
-    at = np.stack([nodes.place(n) for n in numbers.reshape(-1).tolist()])
-    # rounding may have moved nodes onto a line
-    solid = has_area(np.concatenate([at, [[0.0] * 3, [1.0] * 3]]), np.arange(len(at)).reshape(-1, 3))
+    solid = has_area(
+        np.concatenate([nodes.places, np.reshape(nodes.new, (-1, 3))]), numbers
+    )  # nodes may have moved onto a line
     parent, numbers, weights, flat = parent[solid], numbers[solid], weights[solid], flat[solid]
-    stands, parted = (_along(lines, flat, numbers) for lines in (piece.stands, parts))
+    stands, parted = (_along(lines, flat, numbers, sheet.piece[parent]) for lines in (sheet.stands, parts))
     ends = np.where(stands, JUMPS, np.where(parted, ENDS, GOES_ON)).astype(np.uint8)
-    return _Made(piece.members[parent], numbers, weights, ends)
+    return _Made(sheet.members[parent], numbers, weights, ends)
+
+
+def _outlines(nodes: _Nodes, sheet: _Sheet, own: I32, number: dict[int, int]) -> F64:
+    """The edges of a sheet's triangles, of corners own (t, 3), in pieces between new nodes (n, 2, 2), which are numbered."""
+    start, end = sheet.flat.reshape(-1, 2), np.roll(sheet.flat, -1, axis=1).reshape(-1, 2)
+    a, b = own.reshape(-1).astype(np.int64), np.roll(own, -1, axis=1).reshape(-1).astype(np.int64)
+    edges = np.array(list(nodes.on_edge), np.int64).reshape(-1, 2)
+    count = len(nodes.places)
+    noded = np.isin(np.minimum(a, b) * count + np.maximum(a, b), edges[:, 0] * count + edges[:, 1])
+    found = [np.stack([start, end], axis=1)[~noded]]
+    for nth in np.flatnonzero(noded).tolist():
+        run = nodes.along(int(a[nth]), int(b[nth]))
+        between = [nodes.place(n) @ sheet.axes[nth // 3] + sheet.shift[nth // 3] for n in run]
+        number |= zip(_keys(np.reshape(between, (-1, 2))).tolist(), run, strict=True)
+        at = np.stack([start[nth], *between, end[nth]])
+        found.append(np.stack([at[:-1], at[1:]], axis=1))
+    return np.concatenate(found)
 
 
 def _snapped(parts: F64, places: F64) -> F64:
@@ -369,8 +413,8 @@ def _weights(places: F64, corners: F64) -> F64:
     return np.concatenate([1 - rest.sum(2, keepdims=True), rest], axis=2)
 
 
-def _along(parts: F64, flat: F64, numbers: I64) -> Mask:
-    """(t, 3) which edges of triangles (t, 3, 2), of nodes (t, 3), run along the segments."""
+def _along(parts: F64, flat: F64, numbers: I64, piece: I64) -> Mask:
+    """(t, 3) which edges of triangles (t, 3, 2), of nodes (t, 3) and of pieces (t,), run along the segments."""
     if not len(parts):
         return np.zeros(flat.shape[:2], bool)
     follows = np.roll(flat, -1, axis=1)
@@ -387,16 +431,15 @@ def _along(parts: F64, flat: F64, numbers: I64) -> Mask:
     sliver = np.flatnonzero(on.all(1))
     on[sliver, far[sliver].argmax(1)] = False
     ends = np.sort(np.stack([numbers, np.roll(numbers, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    edge = distinct_rows(*ends.T)[1]
+    edge = distinct_rows(*ends.T, np.repeat(piece, 3))[1]
     both = np.ones(edge.max() + 1, bool)
     np.logical_and.at(both, edge, on.reshape(-1))
     return np.asarray(both[edge].reshape(on.shape))
 
 
-def _joined(scene: Scene, nodes: _Nodes, corners: I32, made: list[_Made], origin: F64, size: float) -> Cut:
+def _joined(scene: Scene, nodes: _Nodes, corners: I32, made: _Made, origin: F64, size: float) -> Cut:
     """The scene with triangles in the places of those that they were made of."""
-    parent, numbers = np.concatenate([m.parent for m in made]), np.concatenate([m.nodes for m in made])
-    weights, ends = np.concatenate([m.weights for m in made]), np.concatenate([m.ends for m in made])
+    parent, numbers, weights, ends = made.parent, made.nodes, made.weights, made.ends
     count, welded = len(scene.triangles), len(nodes.places)
     gone = np.zeros(count, bool)
     gone[parent] = True
