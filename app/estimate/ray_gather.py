@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.points import Points
+from app.direct_light.punctual import light_rows
 from app.direct_light.sky_light import sun_uniform
 from app.direct_light.sky_map import SkyMap
 from app.gpu import Gpu, Pass, ReadBack, Texture, glsl_constant
@@ -67,15 +68,21 @@ class RayGather:
         self._link_target = gpu.target(self._textures["hits"], self._textures["albedo"])
         light = lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE") | self._rays.defines
         self._links = Pass(gpu, "estimate/links", defines=light)
-        self._light, self._gather = light, dict[bool, Pass]()
+        self._light, self._gather = light, dict[tuple[bool, bool], Pass]()
         self._sky: tuple[Sky, SkyMap] | None = None
+        self._lights = gpu.texture((1, 1), 4, "f4")  # see common/light.glsl
+        self._light_count = 0
         self._add = Pass(gpu, "estimate/add", defines={"BLOCK": BLOCK})
         self._nearest = Pass(gpu, "estimate/nearest_seen", defines=self._rays.defines)
 
     def find_lamps(self) -> bool:
-        """Use the lamps and the sky of the scene as it is now. False where nothing sends light."""
+        """Use the lamps, with an area or without, and the sky of the scene as it is now. False where nothing sends light."""
         scene = self._lightmap.scene
         self._find_sky(scene.sky if scene.lit_by_sky else None)
+        lights = [light for light in scene.lights if light.emits]
+        self._light_count = len(lights)
+        if lights:
+            self._lights = write_table(self._gpu, self._lights, light_rows(lights, self._lightmap))
         power = np.array([np.mean(m.emission) for m in scene.materials])[scene.material_ids] * np.pi * self._area
         lamps = np.flatnonzero(power > 0)
         self._lamp_count, self._power = len(lamps), float(power.sum())
@@ -83,7 +90,7 @@ class RayGather:
         table[: len(lamps), 0] = np.cumsum(power[lamps]) / max(self._power, 1e-300)
         table[: len(lamps), 1] = self._slot[lamps]
         self._lamps = write_table(self._gpu, self._lamps, table.reshape(-1, LAMPS_A_ROW, 4))
-        return len(lamps) > 0 or scene.lit_by_sky
+        return len(lamps) > 0 or scene.lit_by_sky or self._light_count > 0
 
     def _find_sky(self, sky: Sky | None) -> None:
         if self._sky is not None and self._sky[0] is not sky:
@@ -91,8 +98,15 @@ class RayGather:
             self._sky = None
         if sky is not None and self._sky is None:
             self._sky = sky, SkyMap(self._gpu, sky)
-        if (lit := sky is not None) not in self._gather:
-            self._gather[lit] = Pass(self._gpu, "estimate/gather", defines=self._light | {"SKY": lit})
+
+    @property
+    def _gathering(self) -> Pass:
+        """The program for what there is now."""
+        kind = self._sky is not None, self._light_count > 0
+        if kind not in self._gather:
+            more = dict(zip(("SKY", "LIGHTS"), kind, strict=True))
+            self._gather[kind] = Pass(self._gpu, "estimate/gather", defines=self._light | more)
+        return self._gather[kind]
 
     # -- light ---------------------------------------------------------------------------------------------------------
 
@@ -100,13 +114,16 @@ class RayGather:
         """What nodes receive now, on its way; ``irradiance`` reads it. position (n, 3) [m], normal (n, 3), shifts (n, SHIFTS)
         from 0 to 1; n at most ``rows``. rays: a multiple of BLOCK."""
         self._write_nodes(position, normal, shifts)
-        sky, scale = dict[str, Texture](), dict[str, object]()
+        more, values = dict[str, Texture](), dict[str, object]()
         if self._sky is not None:
-            sky, scale = self._sky[1].textures, sky_uniforms(self._sky[0])
-        self._gather[self._sky is not None].draw(
+            more, values = self._sky[1].textures, sky_uniforms(self._sky[0])
+        if self._light_count:
+            more = more | {"t_lights": self._lights}
+            values = values | {"u_lights": self._light_count, "u_rays": rays}
+        self._gathering.draw(
             self._targets["samples"],
-            textures={"t_nodes": self._textures["nodes"], "t_lamps": self._lamps} | self._seen_textures() | sky,
-            uniforms={"u_lamps": self._lamp_count, "u_power": max(self._power, 1e-30)} | self._uniforms() | scale,
+            textures={"t_nodes": self._textures["nodes"], "t_lamps": self._lamps} | self._seen_textures() | more,
+            uniforms={"u_lamps": self._lamp_count, "u_power": max(self._power, 1e-30)} | self._uniforms() | values,
             viewport=(0, 0, rays, len(position)),
         )
         self._add.draw(self._targets["sums"], textures={"t_samples": self._textures["samples"]})
@@ -168,7 +185,7 @@ class RayGather:
         if self._sky is not None:
             self._sky[1].release()
         self._gpu.release_all(self._link_target, *self._targets.values())
-        self._gpu.release_all(self._lamps, self._all_nodes, *self._textures.values())
+        self._gpu.release_all(self._lamps, self._lights, self._all_nodes, *self._textures.values())
 
     def _faces(self) -> F32:
         """See surface.glsl."""

@@ -22,6 +22,8 @@ def no_furnace(scene: Scene) -> str | None:
     """Why a scene is no furnace, None if it is one: every side alike, and one closed shell with its fronts inwards."""
     if scene.lit_by_sky:
         return "light comes from the sky"
+    if scene.lit_by_lights:
+        return "light comes from lamps without area"
     used = [scene.materials[k] for k in np.unique(scene.material_ids)]
     looks = {(m.albedo, m.emission, m.albedo_texture, m.emission_texture, m.double_sided) for m in used}
     albedo, _, *textures, double_sided = looks.pop()

@@ -47,14 +47,30 @@ def solve_dense(scene: Scene, max_patches: int = 400, samples: int = 2) -> Dense
     F = to_points.reshape(len(points), samples**2, -1).mean(axis=1)
     F /= np.maximum(F.sum(axis=1, keepdims=True), 1.0)
     B = np.empty_like(patches.exitance)
+    direct = from_lights(scene, points.reshape(-1, 3), normals).reshape(len(points), samples**2, 3).mean(axis=1)
+    sent = patches.exitance + patches.albedo * direct
     for c in range(3):
-        B[:, c] = np.linalg.solve(np.eye(len(F)) - patches.albedo[:, c, None] * F, patches.exitance[:, c])
-    return DenseSolution(patches, F, F @ B, B, samples)
+        B[:, c] = np.linalg.solve(np.eye(len(F)) - patches.albedo[:, c, None] * F, sent[:, c])
+    return DenseSolution(patches, F, direct + F @ B, B, samples)
 
 
 def irradiance_at(solution: DenseSolution, scene: Scene, points: F64, normals: F64) -> F64:
     """H (n, 3) [W/m²] at surface ``points`` (n, 3) [m] with unit ``normals`` (n, 3), gathered from all patches."""
-    return form_factors(points, normals, solution.patches, solution.samples, scene) @ solution.B
+    direct = from_lights(scene, points, normals)
+    return direct + form_factors(points, normals, solution.patches, solution.samples, scene) @ solution.B
+
+
+def from_lights(scene: Scene, points: F64, normals: F64) -> F64:
+    """(n, 3) [W/m²] that surface ``points`` (n, 3) [m] receive of lamps without area, as points: their shadows are sharp."""
+    H, beyond = np.zeros((len(points), 3)), 2 * float(np.linalg.norm(np.ptp(np.array(scene.bounds), axis=0)))
+    for light in scene.lights:
+        E = light.irradiance(points, normals)
+        lit = np.flatnonzero(E.any(axis=1))
+        ends = points[lit] - beyond * np.array(light.direction)
+        if not light.from_afar:
+            ends = np.broadcast_to(light.position, ends.shape)
+        H[lit] += E[lit] * visible(points[lit], ends, scene.corners)[:, None]
+    return H
 
 
 def form_factors(points: F64, normals: F64, patches: Patches, samples: int, scene: Scene) -> F64:

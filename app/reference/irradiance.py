@@ -131,6 +131,8 @@ def _closed_form(scene: Scene, samples: int, tell: Tell) -> ReferenceIrradiance:
 def _too_many_triangles(scene: Scene) -> str | None:
     if scene.lit_by_sky:
         return "its matrix knows no sky"
+    if any(light.emits and (light.radius or light.angle) for light in scene.lights):
+        return "its lights cast no soft shadows"
     count = len(scene.triangles)
     return None if count <= DENSE_TRIANGLES else f"{count:,} triangles are more than {DENSE_TRIANGLES}"
 

@@ -58,6 +58,7 @@ class Tracer:
         ]
         parts = {f"shape{i}": shape for i, shape in enumerate(shapes)} | _sky(scene)
         self._scene = mi.load_dict({"type": "scene"} | parts)
+        self._lights = _Lights(scene, self._centre, self._scale) if scene.lit_by_lights else None
         self._sampler = mi.load_dict({"type": "independent"})
         self._sheer = not all(scene.materials[k].opaque for k in np.unique(scene.material_ids))
 
@@ -81,7 +82,7 @@ class Tracer:
             corner = mi.Point2f(mi.Float(path % across), mi.Float(path // across % across))
             u = (corner + self._sampler.next_2d()) / mi.Float(across)
             dr.eval(x, n, u)
-            L = _trace(self._scene, self._sampler, x, n, u, self._sheer)
+            L = _trace(self._scene, self._sampler, self._lights, x, n, u, self._sheer)
             dr.eval(L)
             for k, component in enumerate((L.x, L.y, L.z)):
                 estimates = np.array(component, np.float64).reshape(count, samples)
@@ -129,6 +130,27 @@ class Tracer:
             colours = scene.colours[mine][:, order] * np.array(material.albedo, np.float32)
             mesh.add_attribute(PAINT, 3, colours.astype(np.float32).ravel())
         return mesh
+
+
+class _Lights:
+    """Lamps without area, as the scene is traced: arrays of ``count``. No dataclass, or a loop would take it for its state. away:
+    1 without a place; spread: radius, or cosine of half the angle; slope: see Light."""
+
+    def __init__(self, scene: Scene, centre: F64, scale: float) -> None:
+        lights = [light for light in scene.lights if light.emits]
+
+        def column(values: list[Any]) -> Any:
+            return np.array(values, np.float32).T
+
+        self.count = len(lights)
+        strength = [np.array(s.intensity) * (1.0 if s.from_afar else scale**2) for s in lights]
+        self.intensity = mi.Color3f(column(strength))
+        self.position = mi.Point3f(column([(np.array(s.position) - centre) * scale for s in lights]))
+        self.direction = mi.Vector3f(column([s.direction for s in lights]))
+        self.away = mi.Float(column([float(s.from_afar) for s in lights]))
+        self.spread = mi.Float(column([np.cos(s.angle / 2) if s.from_afar else s.radius * scale for s in lights]))
+        self.slope = mi.Vector2f(column([s.slope for s in lights]))
+        self.inverse_range = mi.Float(column([1 / (s.range * scale) for s in lights]))
 
 
 def _variant() -> str:
@@ -236,8 +258,39 @@ def _first_hit(scene: Any, sampler: Any, origin: Any, direction: Any, reach: Any
     return hit
 
 
+def _from_lights(
+    scene: Any, sampler: Any, lights: _Lights | None, origin: Any, n: Any, active: Any, sheer: bool
+) -> Any:
+    """E/π of one of the lamps without area, times their number: to its point, or to one of its sphere or its disc."""
+    if lights is None:
+        return mi.Color3f(0)
+    k = dr.minimum(mi.UInt32(sampler.next_1d(active) * lights.count), lights.count - 1)
+    direction, away = dr.gather(mi.Vector3f, lights.direction, k), dr.gather(mi.Float, lights.away, k) > 0
+    spread, slope = dr.gather(mi.Float, lights.spread, k), dr.gather(mi.Vector2f, lights.slope, k)
+    way = dr.select(away, -direction, dr.gather(mi.Point3f, lights.position, k) - origin)
+    r = dr.norm(way)
+    axis = way / r
+    near = dr.sqrt(1 - dr.minimum(dr.square(spread / r), 1))
+    local = mi.warp.square_to_uniform_cone(sampler.next_2d(active), dr.select(away, spread, near))
+    towards = mi.Frame3f(axis).to_world(local)
+    along = local.z * r
+    chord = along - dr.sqrt(dr.maximum(dr.square(along) - dr.square(r) + dr.square(spread), 0))
+    far = dr.select(away, 4 * SIZE, dr.maximum(chord, 0))
+    cone = dr.square(dr.clip(slope.y - slope.x * dr.dot(axis, direction), 0, 1))
+    window = dr.maximum(1 - dr.square(dr.square(r * dr.gather(mi.Float, lights.inverse_range, k))), 0)
+    E = dr.gather(mi.Color3f, lights.intensity, k) * dr.dot(n, axis)
+    E *= dr.select(away, 1, cone * window / dr.square(r))
+    lit = active & (dr.dot(n, axis) > 0) & (dr.dot(n, towards) > 0)
+    lit &= ~(
+        _first_hit(scene, sampler, origin, towards, far, lit).is_valid()
+        if sheer
+        else scene.ray_test(_ray(origin, towards, far), lit)
+    )
+    return dr.select(lit, E * (lights.count / dr.pi), 0)
+
+
 @dr.syntax
-def _trace(scene: Any, sampler: Any, x: Any, n: Any, u: Any, sheer: bool) -> Any:
+def _trace(scene: Any, sampler: Any, lights: _Lights | None, x: Any, n: Any, u: Any, sheer: bool) -> Any:
     """Estimates of E/π at points x with normals n; u: what chooses the first direction; sheer: whether there is what is not
     opaque."""
     L, throughput = mi.Color3f(0), mi.Color3f(1)
@@ -260,6 +313,8 @@ def _trace(scene: Any, sampler: Any, x: Any, n: Any, u: Any, sheer: bool) -> Any
             lit &= ~scene.ray_test(_ray(origin, towards / distance, distance), lit)
         density = cosine / dr.pi
         L[lit] += throughput * radiance * density * dr.select(lamp.delta, 1.0, lamp.pdf / (lamp.pdf + density))
+
+        L += throughput * _from_lights(scene, sampler, lights, origin, n, active, sheer)
 
         # A direction by its cosine
         local = mi.warp.square_to_cosine_hemisphere(u)

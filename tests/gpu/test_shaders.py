@@ -75,6 +75,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "PICTURE": FLAG,
     "SKY": FLAG,
     "LIGHT": FLAG,
+    "LIGHTS": FLAG,
     "PIXELS": (1024,),
     "SUN": FLAG,
     "GATHERED": FLAG,

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from solver_scenes import Solution, begin, grey, quads_scene, room
 
+from app.estimate.ray_gather import SHIFTS, RayGather
 from app.gpu import Gpu
+from app.reference.dense import irradiance_at, solve_dense
 from app.scene.lights import Light
 from app.scene.model import Scene
 
@@ -19,6 +21,7 @@ FLOOR = [[0, 0, 2], [2, 0, 2], [2, 0, 0], [0, 0, 0]]  # faces up
 POINT = Light("point", intensity=(1.0, 2.0, 3.0), position=(0.8, 1.3, 0.9))
 DOWN = (0.0, -1.0, 0.0)
 SLANTED = (0.6, -0.8, 0.0)
+SPOT = Light("spot", "spot", (5.0, 5.0, 5.0), (1.0, 1.5, 1.0), DOWN, 0.2, 0.7)
 
 
 def solved(gpu: Gpu, scene: Scene, solver: str) -> Solution:
@@ -43,7 +46,7 @@ def solved(gpu: Gpu, scene: Scene, solver: str) -> Solution:
         replace(POINT, range=2.0),
         replace(POINT, radius=0.2),
         replace(POINT, position=(1.0, 9.0, 3.0)),  # farther than the scene is wide
-        Light("spot", "spot", (5.0, 5.0, 5.0), (1.0, 1.5, 1.0), DOWN, 0.2, 0.7),
+        SPOT,
         Light("sun", "directional", (1.0, 2.0, 3.0), direction=SLANTED),
         Light("disc", "directional", (1.0, 2.0, 3.0), direction=SLANTED, angle=0.1),
     ],
@@ -111,4 +114,32 @@ def test_light_follows_an_edit(gpu: Gpu, solver: str) -> None:
         lit.settle()
         expected = light.irradiance(lit.position, lit.normal)
         assert np.abs(lit.H - expected).max() < 0.01 * max(float(expected.max()), 1.0)
+    lit.release()
+
+
+def test_references_know_them() -> None:
+    """The dense matrix: the law on an open floor, and in a closed room of albedo 1/2 twice what is sent out."""
+    floor = quads_scene([FLOOR], [grey(0.0)]).with_lights((POINT, replace(SPOT, name="second")))
+    points, up = np.array([[0.3, 0.0, 0.4], [1.0, 0.0, 1.1]]), np.tile([0.0, 1.0, 0.0], (2, 1))
+    expected = sum(light.irradiance(points, up) for light in floor.lights)
+    assert np.allclose(irradiance_at(solve_dense(floor, 8, 1), floor, points, up), expected, rtol=1e-9)
+    closed = quads_scene(room((2.0, 2.0, 2.0)), [grey(0.5)]).with_lights((POINT,))
+    solution = solve_dense(closed, 300, 2)
+    received = (solution.H * solution.patches.areas[:, None]).sum(0)
+    # 2 × 2 points of a patch of 0.3 m say what it receives 0.7 m from a lamp to a hundredth
+    assert np.allclose(received, 2 * 4 * math.pi * np.array(POINT.intensity), rtol=0.01)
+
+
+def test_the_estimate_of_error_looks_at_them(gpu: Gpu) -> None:
+    """Any number of rays: each light gets as many, and what is a point is known from one."""
+    lights = (POINT, replace(SPOT, intensity=(1.0, 1.0, 1.0)), Light("sun", "directional", direction=SLANTED))
+    lit = begin(gpu, quads_scene([FLOOR], [grey(0.0)]).with_lights(lights), density=8)
+    gather = RayGather(gpu, lit.lightmap, 4)
+    assert gather.find_lamps()
+    points, up = np.array([[0.3, 0.0, 0.4], [1.0, 0.0, 1.1]]), np.tile([0.0, 1.0, 0.0], (2, 1))
+    for rays in (32, 512):
+        found = gather.irradiance(gather.look(points, up, np.full((2, SHIFTS), 0.3), rays), 2, rays)
+        expected = sum(light.irradiance(points, up) for light in lights)
+        assert np.allclose(found[:, :3], expected, rtol=1e-4) and np.allclose(found[:, 3], expected.mean(1), rtol=1e-4)
+    gather.release()
     lit.release()

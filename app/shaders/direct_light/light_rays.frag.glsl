@@ -4,7 +4,7 @@
 //
 // To a lamp with a radius, or an angle, the ray goes to a point of its sphere, or its disc. Blended.
 #define PASS  // shadow rays
-#include "common/light.glsl"
+#include "direct_light/light_sample.glsl"
 #include "visibility/origin.glsl"
 #include "visibility/rays.glsl"
 
@@ -17,23 +17,9 @@ layout(location = 1) out vec4 out_all;
 
 float mean_of(vec3 w) { return dot(w, vec3(1.0 / 3.0)); }
 
-// Evenly within a cone of directions; ``height``: 1 - cosine of half its angle.
-vec3 direction_in(vec3 axis, float height, vec2 share) {
-    float z = 1.0 - share.x * height, r = sqrt(max(1.0 - z * z, 0.0)), phi = 2.0 * PI * share.y;
-    return frame_of(axis) * vec3(r * cos(phi), r * sin(phi), z);
-}
-
 bool sees(Light light, vec3 from, vec3 normal, vec2 share) {
-    vec3 way = light.from_afar ? -light.direction : light.position - from;
-    float r = length(way), far = light.from_afar ? 2.0 * FAR : r;
-    way /= r;
-    if (light.extent > 0.0) {
-        float sine2 = min(light.extent * light.extent / (r * r), 1.0);
-        vec3 axis = way;
-        way = direction_in(axis, light.from_afar ? light.extent : 1.0 - sqrt(1.0 - sine2), share);
-        float along = dot(way, axis) * r;  // the near end of the sphere's chord
-        if (!light.from_afar) far = max(along - sqrt(max(along * along - r * r + light.extent * light.extent, 0.0)), 0.0);
-    }
+    float far;
+    vec3 way = towards(light, from, share, far);
     return dot(way, normal) > 0.0 && !any_hit(from, way, 0.0, far);
 }
 

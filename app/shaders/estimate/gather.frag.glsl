@@ -4,6 +4,8 @@
 //
 // Lamps are chosen by the power of their triangles, points on them evenly.
 #define SKY 0
+#define LIGHTS 0  // 1: there are lamps without area
+#include "common/hemisphere.glsl"
 #include "estimate/node.glsl"
 #include "estimate/surface.glsl"
 
@@ -12,6 +14,11 @@
 #include "direct_light/sun.glsl"
 uniform vec3 u_sky;           // scale of its map [W/(sr m²)]
 uniform vec3 u_facing_sun;    // what faces the sun receives of it [W/m²]
+#endif
+#if LIGHTS
+#include "direct_light/light_sample.glsl"
+uniform int u_lights;  // how many
+uniform int u_rays;    // of a node
 #endif
 uniform sampler2D t_lamps;  // a triangle each: share of the power up to it, slot
 uniform int u_lamps;
@@ -115,8 +122,25 @@ vec4 from_lamp(Node node, int ray) {
     return vec4(E, dot(E, vec3(1.0 / 3.0)));
 }
 
+// The light of one of the lamps without area: each gets as many rays; where there are more of them than rays, some are chosen.
+vec4 from_lights(Node node, int ray) {
+#if LIGHTS
+    vec3 u = fract(node.lamp_shift + float(ray) * R3);
+    int each = u_rays / u_lights, nth = each > 0 ? ray / each : int(u.z * float(u_lights));
+    if (nth >= u_lights) return vec4(0.0);
+    Light light = load_light(nth);
+    float far;
+    vec3 way = towards(light, node.origin, u.xy, far), E = unoccluded(light, node.origin, node.normal);
+    if (E == vec3(0.0) || dot(way, node.normal) <= 0.0 || any_hit(node.origin, way, 0.0, far)) return vec4(0.0);
+    E *= each > 0 ? float(u_rays) / float(each) : float(u_lights);
+    return vec4(E, dot(E, vec3(1.0 / 3.0)));
+#else
+    return vec4(0.0);
+#endif
+}
+
 void main() {
     Node node = node_of(int(gl_FragCoord.y));
     int ray = int(gl_FragCoord.x);
-    out_light = along_cosine(node, ray) + from_lamp(node, ray) + from_sky(node, ray);
+    out_light = along_cosine(node, ray) + from_lamp(node, ray) + from_sky(node, ray) + from_lights(node, ray);
 }
