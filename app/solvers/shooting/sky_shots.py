@@ -13,6 +13,7 @@ be missed.
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,6 +28,8 @@ from app.solvers.shooting.records import BATCH, OPEN
 from app.visibility.occluders import Occluders
 
 PIXELS = 1024  # along the edge of a map
+# rad, that a directional light is seen under at least where something is blended, so that several maps choose what stops there
+APART = 1e-4
 ROWS = 4  # texels of a direction: axes of its map, the direction, irradiance
 
 
@@ -49,21 +52,26 @@ class SkyShots:
         self._depth = gpu.depth_texture(self._items.size)
         self._target = gpu.target(self._items, depth=self._depth)
         self._shots = gpu.texture((ROWS, BATCH), 4, "f4")
+        blended = any(not m.opaque and m.opacity_cutoff is None for m in lightmap.scene.materials)
+        self._apart = APART if blended else 0.0
         self._given = self._wanted = self._sky = directions_of(None)
         self._at = self.made = 0
 
     def begin(self, sky: Sky | None, lights: tuple[Light, ...]) -> None:
         """Nothing has been shot. Of the lights the directional ones are."""
-        self._given, self._sky = directions_of(None), directions_of(sky, lights)
+        self._given, self._sky = directions_of(None), self._directions(sky, lights)
         self._wanted, self._at, self.made = self._sky, 0, 0
 
     def change(self, sky: Sky | None, lights: tuple[Light, ...]) -> None:
         """Another sky, or other directional lights: what was given is taken back, and what they give is to come, the
         strongest first."""
-        given, self._sky = self._shot(), directions_of(sky, lights)
+        given, self._sky = self._shot(), self._directions(sky, lights)
         queue = _together(Directions(given.towards, -given.irradiance), self._sky)
         order = np.argsort(-np.abs(queue.irradiance).sum(1), kind="stable")
         self._given, self._wanted, self._at = given, Directions(*(part[order] for part in queue)), 0
+
+    def _directions(self, sky: Sky | None, lights: tuple[Light, ...]) -> Directions:
+        return directions_of(sky, [replace(light, angle=max(light.angle, self._apart)) for light in lights])
 
     def _shot(self) -> Directions:
         """What has been given so far, less what was taken back."""
