@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.atlas.charts import Charts
-from app.atlas.cuts import cut_at_contacts
+from app.atlas.charts_cache import charts_of
 from app.atlas.options import AtlasOptions
-from app.atlas.parametrize import parametrize
 from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import Array, TilePool
@@ -54,17 +53,8 @@ def read_and_unfold(
     scene = source if isinstance(source, Scene) else load_scene(source, file, default_light=default_light, sky=sky)
     middle = time.perf_counter()
     tell("unfolding", 0.1)
-    cut = cut_at_contacts(scene)
-    charts = parametrize(
-        cut.scene,
-        ends=cut.ends,
-        density=atlas.density,
-        texels=atlas.texels,
-        tile=atlas.tile,
-        roots=roots,
-        progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share),
-    )
-    return cut.scene, charts, {"read": middle - start, "unfold": time.perf_counter() - middle}
+    scene, charts = charts_of(scene, atlas, roots=roots, progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share))
+    return scene, charts, {"read": middle - start, "unfold": time.perf_counter() - middle}
 
 
 def load(

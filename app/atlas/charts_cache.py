@@ -1,0 +1,103 @@
+"""Charts of many triangles are kept on disk, with the triangles that were cut for them: reading takes a tenth of making them.
+
+They are known by all that they follow from: the scene's geometry, how finely it is cut, and the program that does it. Those that
+come with warnings are not kept: a machine that was too busy for xatlas may not be the next time.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.charts import Charts
+from app.atlas.cuts import cut_at_contacts
+from app.atlas.options import AtlasOptions
+from app.atlas.parametrize import parametrize
+from app.atlas.seams import Seams
+from app.scene.model import Scene
+from app.util import cache
+
+FEWEST = 16384  # triangles that a file is worth
+CACHE_FILES = 8  # kept, newest first: of a million triangles a file takes 150 MB
+BY_TRIANGLE = ("material_ids", "object_ids", "uv0", "uv1", "normals", "colours")  # of a scene, that cutting changes
+GEOMETRY = ("positions", "triangles", *BY_TRIANGLE)
+LIBRARIES = ("numpy", "scipy", "shapely", "xatlas")
+SCENE, SEAMS = "scene_", "seams_"  # before the names of what is theirs
+APART = ("seams", "warnings")
+
+
+def charts_of(
+    scene: Scene, atlas: AtlasOptions, *, roots: bool = False, progress: Callable[[str, float], None] | None = None
+) -> tuple[Scene, Charts]:
+    """The scene, cut where its surfaces meet, and its charts; see ``cut_at_contacts`` and ``parametrize``."""
+    if len(scene.triangles) < FEWEST:
+        return _made(scene, atlas, roots, progress)
+    file = cache.entry("charts", cache.digest(_maker(), _given(scene, atlas, roots)))
+    found = _read(scene, cache.read(file))
+    if found is None:
+        found = _made(scene, atlas, roots, progress)
+        if not found[1].warnings:
+            cache.store(cache.content(_content(scene, *found)), file, CACHE_FILES)
+    return found
+
+
+def _made(
+    scene: Scene, atlas: AtlasOptions, roots: bool, progress: Callable[[str, float], None] | None
+) -> tuple[Scene, Charts]:
+    if progress is not None:
+        progress("contacts", 0.0)
+    cut = cut_at_contacts(scene)
+    charts = parametrize(
+        cut.scene,
+        ends=cut.ends,
+        density=atlas.density,
+        texels=atlas.texels,
+        tile=atlas.tile,
+        roots=roots,
+        progress=progress,
+    )
+    return cut.scene, charts
+
+
+def _maker() -> bytes:
+    """This program as far as it makes charts, and what it makes them with."""
+    modules = [file.read_bytes() for file in sorted(Path(__file__).parent.glob("*.py"))]
+    return b"".join([*modules, *(version(library).encode() for library in LIBRARIES)])
+
+
+def _given(scene: Scene, atlas: AtlasOptions, roots: bool) -> cache.Arrays:
+    geometry = {name: value for name in GEOMETRY if (value := getattr(scene, name)) is not None}
+    sides = np.array([(m.double_sided, m.opaque) for m in scene.materials])
+    open_to = np.array([scene.sky is not None, bool(scene.lights)])
+    asked = np.array([atlas.density or 0.0, atlas.texels or 0, atlas.tile, roots], np.float64)
+    return {**geometry, "sides": sides, "open_to": open_to, "asked": asked}
+
+
+def _content(scene: Scene, cut: Scene, charts: Charts) -> cache.Arrays:
+    changed = {SCENE + name: getattr(cut, name) for name in GEOMETRY if getattr(cut, name) is not getattr(scene, name)}
+    notes = {SCENE + "warnings": np.array(cut.warnings[len(scene.warnings) :], np.str_)}
+    own = {field.name: getattr(charts, field.name) for field in dataclasses.fields(Charts) if field.name not in APART}
+    seams = {SEAMS + name: value for name, value in vars(charts.seams).items()}
+    return {name: np.asarray(value) for name, value in (own | seams | changed | notes).items()}
+
+
+def _read(scene: Scene, data: cache.Arrays | None) -> tuple[Scene, Charts] | None:
+    """The answer that a file holds; None where it is none."""
+    if data is None or not {field.name for field in dataclasses.fields(Charts)} - set(APART) < data.keys():
+        return None
+    changed = {name.removeprefix(SCENE): array for name, array in data.items() if name.startswith(SCENE)}
+    warnings = (*scene.warnings, *map(str, changed.pop("warnings")))
+    seams = {name.removeprefix(SEAMS): array for name, array in data.items() if name.startswith(SEAMS)}
+    own = {name: _plain(array) for name, array in data.items() if not name.startswith((SCENE, SEAMS))}
+    own |= {"size": tuple(data["size"].tolist()), "seams": Seams(**seams)}
+    return dataclasses.replace(scene, **changed, warnings=warnings), Charts(**own)  # type: ignore[arg-type]  # names are not known
+
+
+def _plain(array: NDArray[Any]) -> Any:
+    return array if array.ndim else array.item()

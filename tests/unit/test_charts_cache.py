@@ -1,0 +1,78 @@
+"""Charts that are kept: the same again, and made anew where anything differs that they follow from."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import platformdirs
+import pytest
+from atlas_scenes import box_room, own_cache, scene_of
+
+from app.atlas import charts_cache
+from app.atlas.charts import Charts
+from app.atlas.charts_cache import charts_of
+from app.atlas.options import AtlasOptions
+from app.atlas.seams import Seams
+from app.scene import shapes
+from app.scene.model import Material, Scene
+from app.scene.sky import Sky
+
+__all__ = ["own_cache"]
+
+ATLAS = AtlasOptions(texels=3000)
+
+
+@pytest.fixture
+def scene(monkeypatch: pytest.MonkeyPatch) -> Scene:
+    """A room with a ball, and a sheet that stands on its floor, so that this is cut."""
+    monkeypatch.setattr(charts_cache, "FEWEST", 0)
+    sheet = shapes.quad((-1.0, -1.5, 0.3), (1.7, 0, 0), (0, 1, 0))
+    return scene_of([box_room(), shapes.icosphere(0.4, 2), sheet], [Material("a"), Material("b", double_sided=True)])
+
+
+def _same(one: object, other: object) -> bool:
+    """Values and types of all fields, but for what is cached beside them."""
+    if isinstance(one, np.ndarray):
+        return isinstance(other, np.ndarray) and one.dtype == other.dtype and np.array_equal(one, other)
+    if isinstance(one, Scene | Charts | Seams):
+        return all(_same(getattr(one, f.name), getattr(other, f.name)) for f in dataclasses.fields(one))
+    return type(one) is type(other) and one == other
+
+
+def _refuse(*_: object, **__: object) -> Charts:
+    raise AssertionError("makes them")
+
+
+def test_what_is_kept_is_the_same_again(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = charts_of(scene, ATLAS)
+    assert len(first[0].triangles) > len(scene.triangles)
+    monkeypatch.setattr(charts_cache, "parametrize", _refuse)
+    again = charts_of(scene, ATLAS)
+    assert all(_same(one, other) for one, other in zip(first, again, strict=True))
+    assert charts_of(scene.with_materials((Material("red", albedo=(1, 0, 0)), scene.materials[1])), ATLAS)
+
+
+@pytest.mark.parametrize("other", ["density", "sides", "moved", "roots", "sky"])
+def test_they_are_made_anew_where_they_would_differ(scene: Scene, other: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    charts_of(scene, ATLAS)
+    monkeypatch.setattr(charts_cache, "parametrize", _refuse)
+    atlas = ATLAS.replace(texels=3001) if other == "density" else ATLAS
+    if other == "sides":
+        scene = scene.with_materials((Material("a", double_sided=True), scene.materials[1]))
+    if other == "moved":
+        scene = dataclasses.replace(scene, positions=scene.positions + 1e-9)
+    if other == "sky":
+        scene = scene.with_sky(Sky())
+    with pytest.raises(AssertionError, match="makes them"):
+        charts_of(scene, atlas, roots=other == "roots")
+
+
+def test_a_damaged_file_is_made_again(scene: Scene) -> None:
+    first = charts_of(scene, ATLAS)
+    folder = Path(platformdirs.user_cache_dir("glowtree")) / "charts"
+    newest = max(folder.glob("*.npz"), key=lambda path: path.stat().st_mtime_ns)
+    newest.write_bytes(newest.read_bytes()[:1000])
+    assert _same(charts_of(scene, ATLAS)[1], first[1])
+    assert newest.stat().st_size > 1000
