@@ -34,6 +34,7 @@ DEFAULT_TEXELS = (32_000, 2_000_000)  # from a plain room to what two cores stil
 LEAST_BY_AREA = 0.5  # of the texels asked for, that surfaces have by their area, whatever small charts need beside them
 ROOT_SHARE = 16  # of the texels that uniform ones would have: two levels below the roots are as fine as these
 MAX_TEXELS = 1 << 24
+MUCH = 0.1  # of all area: so much of it smaller than a texel is worth a word
 WHOLE_PATCHES_FROM = 6  # texels: shorter sides of rectangles are not rounded to whole patches
 
 
@@ -103,6 +104,8 @@ def parametrize(
             f"{hidden.left_out} sides share a plane with thousands of loose pieces: what stands there leaves dark feet"
         )
         warnings = (*warnings, soup)
+    if not roots:
+        warnings += _too_small(layout, density)
     return Charts(
         size=size,
         tile=tile,
@@ -120,6 +123,22 @@ def parametrize(
         hidden_uv=hidden.uv,
         hidden_face=hidden.face,
     )
+
+
+def _too_small(layout: Layout, density: float) -> tuple[str, ...]:
+    """What to say of surfaces that are smaller than a texel, where they have much of the area: a density at which nine tenths of
+    that are not."""
+    width, area = np.sqrt(layout.area), layout.area * layout.sides
+    order = np.argsort(width)
+    small = order[: np.count_nonzero(width * density < 1)]
+    held = np.cumsum(area[small])
+    if not len(small) or held[-1] < MUCH * area.sum():
+        return ()
+    enough = 1.05 / float(width[small[np.searchsorted(held, 0.1 * held[-1])]])
+    what = (
+        f"{len(small):,} of {len(order):,} surfaces, {held[-1] / area.sum():.0%} of the area, are smaller than a texel"
+    )
+    return (f"{what}: --density {enough:.2g} would do",)
 
 
 def default_texels(sides: int, roots: bool) -> int:

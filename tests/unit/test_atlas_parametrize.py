@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from atlas_scenes import TURN, box_room, face_areas, moved, own_cache, scene_of, split_grid
+from solver_scenes import grey, quads_scene, room
 
 from app.atlas.charts import ALIGN, Charts
 from app.atlas.parametrize import MAX_TEXELS, parametrize
@@ -205,3 +208,15 @@ def test_progress_and_method() -> None:
     assert stages[0] == "sides" and stages[-1] == "pack"
     assert charts.method.startswith("12 rectangles, ") and charts.method.endswith(" xatlas charts")
     assert charts.dark_faces == 0 and charts.warnings == ()
+
+
+def test_surfaces_that_are_smaller_than_a_texel_are_said() -> None:
+    """With a density that would do."""
+    boxes = [0.3 * room()[:, ::-1] + (k % 10, 0.0, k // 10) for k in range(100)]
+    scene = quads_scene([*room((10.0, 0.5, 10.0)), *np.concatenate(boxes)], [grey(0.5)])
+    said = re.match(
+        r"480 of 486 surfaces, .* smaller than a texel: --density (.*) would do",
+        parametrize(scene, density=2.0).warnings[0],
+    )
+    assert said is not None
+    assert parametrize(scene, density=float(said[1])).warnings == ()
