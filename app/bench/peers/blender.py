@@ -84,6 +84,8 @@ def _described(scene: Scene, charts: Charts) -> dict[str, Any]:
         raise UserError("Cycles is not given vertex colours: compare with another")
     if scene.lit_by_sky:
         raise UserError("Cycles is not given the sky")
+    if scene.lit_by_lights:
+        raise UserError("Cycles is not given lamps without area")
     double = np.array([m.double_sided for m in scene.materials])[scene.material_ids]
     triangle = np.concatenate([np.arange(len(double)), np.flatnonzero(double)])
     back = np.arange(len(triangle)) >= len(double)

@@ -93,7 +93,7 @@ class PointShots:
     def _shot(self) -> Sources:
         """What has been given so far; of a source whose other half is still to come all."""
         given = dict(self._given)
-        for source, intensity, _ in self._queue[: self._at : 1]:
+        for source, intensity, _ in self._queue[: self._at]:
             given[source] = given.get(source, np.zeros(3)) + intensity * _half(source)
         return {source: intensity for source, intensity in given.items() if intensity.any()}
 
@@ -101,12 +101,6 @@ class PointShots:
     def left(self) -> int:
         """Shots that are to come."""
         return len(self._queue) - self._at
-
-    @property
-    def share_left(self) -> float:
-        """Of the light that was to come when it last changed."""
-        power = [float(np.abs(intensity).sum()) * source.solid_angle for source, intensity, _ in self._queue]
-        return sum(power[self._at :]) / max(sum(power), 1e-300)
 
     @property
     def flux(self) -> F64:

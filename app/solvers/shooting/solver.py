@@ -112,7 +112,7 @@ class Shooting:
         self.issued += made
         self.batch.ledger.from_points = points.flux
         self.batch.ledger.follow_emission()
-        self._progress = replace(self._progress, done=self.issued, remaining=points.share_left)
+        self._progress = replace(self._progress, done=self.issued)  # what surfaces reflect of it is all to come
         if not points.left:
             self._patches_go_on()
         return made
@@ -283,7 +283,7 @@ class Shooting:
     def settle(self) -> Progress:
         """End the work under way, and measure what is unshot."""
         self.poll(wait=True)
-        to_come = 0.0 if self._points is None else self._points.share_left
+        to_come = float(self._points_left)
         if self._sky is not None and self._sky_left:
             to_come = max(to_come, self._sky.share_left)
         if self._sky_shoots:
