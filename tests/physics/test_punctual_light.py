@@ -143,3 +143,22 @@ def test_the_estimate_of_error_looks_at_them(gpu: Gpu) -> None:
         assert np.allclose(found[:, :3], expected, rtol=1e-4) and np.allclose(found[:, 3], expected.mean(1), rtol=1e-4)
     gather.release()
     lit.release()
+
+
+def test_quadtrees_hold_what_point_and_spot_lights_give(gpu: Gpu) -> None:
+    """Leaves that come later have all of it, not what they inherit; another place of a light, too."""
+    board = np.array([[0.75, 0.75, 1.25], [1.25, 0.75, 1.25], [1.25, 0.75, 0.75], [0.75, 0.75, 0.75]])
+    light = replace(POINT, position=(1.0, 1.5, 1.0))
+    scene = quads_scene([FLOOR, board], [grey(0.2, double_sided=True)]).with_lights((light, SPOT))
+    lit = begin(gpu, scene, density=4, adaptive=True, depth=2)
+    lit.settle()
+    for _ in range(2):
+        assert lit.lightmap.pool.leaves.level.max() > 0
+        floor = (lit.object == 0) & (lit.normal[:, 1] > 0)
+        away = np.abs(lit.position[floor][:, [0, 2]] - np.array(light.position)[[0, 2]]).max(1)
+        free = sum(light.irradiance(lit.position, lit.normal) for light in lit.lightmap.scene.lights)[floor].mean(1)
+        outside = away > 0.5 + 1 / 8  # a texel of the roots
+        assert np.allclose(lit.H[floor].mean(1)[outside], free[outside], rtol=0.05, atol=0.02)
+        lit.solver.set_lights((replace(light, intensity=(3.0, 3.0, 3.0)), SPOT))
+        lit.settle()
+    lit.release()

@@ -9,13 +9,13 @@ seen. All of them shoot before the first patch does; an edit shoots the differen
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from app.direct_light.punctual import light_rows
-from app.gpu import Gpu
+from app.gpu import Framebuffer, Gpu, Mesh
 from app.lightmap.lightmap import Lightmap
 from app.scene.lights import Light
 from app.scene.model import F64
@@ -58,7 +58,7 @@ class PointShots:
         self._apart = APART * lightmap.space.scale if blended else 0.0
         self._see: See | None = None
         self._given: Sources = {}
-        self._queue: list[tuple[Light, F64, F64]] = []  # source, intensity, axis of its map
+        self._queue: list[tuple[Light, F64, F64]] = []  # see _queue_of
         self._at = 0
 
     def set_options(self, options: ShootingOptions, resolution: int) -> None:
@@ -83,11 +83,7 @@ class PointShots:
             (float(np.abs(i).sum()) * s.solid_angle for s, i in {**self._given, **wanted}.items()), default=0
         )
         some = [source for source in change if power[source] > least]
-        self._queue = [
-            (source, change[source], axis)
-            for source in sorted(some, key=lambda source: -power[source])
-            for axis in ((np.array(source.direction),) if source.kind == "spot" else (ASIDE, -ASIDE))
-        ]
+        self._queue = _queue_of({source: change[source] for source in sorted(some, key=lambda source: -power[source])})
         self._at = 0
 
     def _shot(self) -> Sources:
@@ -123,6 +119,20 @@ class PointShots:
         self._ledger.enter(self._see.maps, count)
         self._at += count
         return count
+
+    def replay(self, target: Framebuffer, meshes: Mapping[bool, Mesh], bands: int) -> Generator[None, None, None]:
+        """Add to a target, on some receivers only, all that was given so far, in parts."""
+        again = _queue_of(self._shot())
+        assert self._see is not None
+        for first in range(0, len(again), BATCH):
+            some = again[first : first + BATCH]
+            self._write(some)
+            for start, count in self._see.groups(len(some)):
+                self._see.draw(start, count)
+                yield
+                for band in range(bands):
+                    self._receive.draw_into(target, start, count, meshes=meshes, band=band, bands=bands, in_place=False)
+                    yield
 
     def _write(self, shots: list[tuple[Light, F64, F64]]) -> None:
         """As the shooters of the batch. Their axes are so long that all of the scene is nearer than FAR in them."""
@@ -163,6 +173,15 @@ def sources_of(lights: tuple[Light, ...], least: float) -> Sources:
             source = replace(light, name="", intensity=(1.0, 1.0, 1.0), position=(x, y, z), radius=0.0)
             found[source] = found.get(source, np.zeros(3)) + np.array(light.intensity) / len(places)
     return found
+
+
+def _queue_of(sources: Sources) -> list[tuple[Light, F64, F64]]:
+    """The shots of these: source, intensity, axis of the map."""
+    return [
+        (source, intensity, axis)
+        for source, intensity in sources.items()
+        for axis in ((np.array(source.direction),) if source.kind == "spot" else (ASIDE, -ASIDE))
+    ]
 
 
 def _half(source: Light) -> float:

@@ -26,6 +26,7 @@ from app.lightmap.textures import QUAD_FORMAT, quads
 from app.lightmap.tile_pool import Moves
 from app.scene.model import F64
 from app.solvers.shooting.material_edits import MaterialEdits
+from app.solvers.shooting.point_shots import PointShots
 from app.solvers.shooting.receive import Receive
 from app.solvers.shooting.receivers import receiver_meshes
 from app.solvers.shooting.see import See
@@ -151,11 +152,15 @@ class Replay:
         self.under_way = Pending(self._gpu, self._lightmap, slots, end)
         self._subtract_inherited(self.under_way)
 
-    def work(self, see: See, receive: Receive, bands: int) -> Generator[None, None, int]:
-        """One batch of the log once more, for fresh leaves only, in parts; after the last, its sum takes the place of what was
-        inherited, and nothing is under way. How many shots."""
+    def work(self, see: See, receive: Receive, points: PointShots | None, bands: int) -> Generator[None, None, int]:
+        """What point and spot lights gave, or one batch of the log once more, for fresh leaves only, in parts; after the last,
+        its sum takes the place of what was inherited, and nothing is under way. How many shots."""
         pending = self.under_way
         assert pending is not None
+        if points is not None and not pending.points_done:
+            yield from points.replay(self._correction_target, pending.receivers, bands)
+            pending.points_done = True
+            return 0
         if pending.next < pending.end:
             shots = min(self.log.recall(pending.next), pending.end - pending.next)
             for first, some in see.groups(shots):
@@ -220,6 +225,7 @@ class Pending:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, slots: NDArray[np.int64], shots: int) -> None:
         self._gpu, self.slots, self.next, self.end, self.weak = gpu, slots, 0, shots, False
+        self.points_done = False  # whether it has what point and spot lights gave
         place = lightmap.pool.corners(slots)
         self.quads = Mesh(gpu, quads(place, lightmap.pool.tile, place).tobytes(), QUAD_FORMAT, per_instance=True)
         self.receivers = receiver_meshes(gpu, lightmap.pool, slots)

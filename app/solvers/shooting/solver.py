@@ -37,7 +37,7 @@ LOOK_AFTER = 32  # shots, or a quarter of all, between two looks at leaves that 
 SIGHT = "What the last shooter saw"
 PICTURES = {SIGHT: "All that the patch that shot last sees, one colour per surface"}
 NO_SKY = "--solver shooting: quadtrees do not follow the light of the sky; uniform texels do, and --solver gathering"
-NO_LIGHTS = "--solver shooting: quadtrees do not follow lamps without area; uniform texels do, and --solver gathering"
+NO_LIGHTS = "--solver shooting: quadtrees do not follow directional lights; uniform texels do, and --solver gathering"
 CHANGES_PER_SHOT = 8  # leaves that split or merge, for each shot of a piece of work: bounded work for a frame
 
 
@@ -178,6 +178,11 @@ class Shooting:
         self.poll(wait=True)
         if self._sky_shoots:
             self._enter_sky()
+        if self.lightmap.refinement is not None and self.batch.replay is not None:
+            self.lightmap.refinement.begin_again()
+            self.batch.replay.stop()
+            self.batch.replay.forget_strong()
+            self._look_at = 0
         if self._points is not None and points:
             self._points.change(scene.lights)
         if self._sky is not None:
@@ -197,7 +202,7 @@ class Shooting:
         assert refinement is not None and replay is not None
         made, done = 0, bool(replay.log.count) and self._all_shot
         if replay.under_way is not None:
-            made = yield from replay.work(self.batch.see, self.batch.receive, bands)
+            made = yield from replay.work(self.batch.see, self.batch.receive, self._points, bands)
             if replay.under_way is None:
                 self._corrected()
         elif replay.fresh and (refinement.stable if done or replay.all_again else replay.is_cheap):
@@ -478,7 +483,7 @@ def _check_sky(lightmap: Lightmap, sky: Sky | None) -> None:
 
 def _check_lights(lightmap: Lightmap, lights: tuple[Light, ...]) -> None:
     """Raise UserError for lamps without area whose light cannot be shot."""
-    if lightmap.refinement is not None and any(light.emits for light in lights):
+    if lightmap.refinement is not None and any(light.emits and light.from_afar for light in lights):
         raise UserError(NO_LIGHTS)
 
 
