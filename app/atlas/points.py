@@ -44,10 +44,15 @@ class SideIndex:
 
     def of(self, points: Points) -> NDArray[np.int64]:
         """(n,) which of the sides each point lies on."""
-        wanted = 2 * points.triangle.astype(np.int64) + points.back
+        found = self.find(points.triangle, points.back)
+        assert (found >= 0).all(), "a point on a side without texels"
+        return found
+
+    def find(self, triangle: NDArray[np.integer], back: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """(n,) which of the sides are of these triangles (n,), and backs; -1 where there is none."""
+        wanted = 2 * triangle.astype(np.int64) + back
         place = np.minimum(np.searchsorted(self._keys, wanted), len(self._keys) - 1)
-        assert (self._keys[place] == wanted).all(), "a point on a side without texels"
-        return np.asarray(self._order[place])
+        return np.where(self._keys[place] == wanted, self._order[place], -1)
 
 
 def random_points(scene: Scene, count: int, seed: int) -> Points:

@@ -52,8 +52,11 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
         if stop_of(flags).by_error and session.run.converged:
             estimate(session, flags, console)
         session.compare(wait=True)
+        trapped = view.look_for_light()
+        if trapped is not None:
+            console.warn(trapped)
         if flags.exposure is None:
-            view.expose()
+            view.expose(flags.size)
         walked = None
         if path is None:
             save_png(flags.output, _draw(view, flags))
@@ -62,6 +65,8 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
             walked = _walk(view, path.first_only if stopped else path, flags, console)
             failure = failure or walked.failure
         result = {"output": str(flags.output), **report(session), **(walked.report(session) if walked else {})}
+        if trapped is not None:
+            result["warnings"].append(trapped)
         line = summary(session, result)
         view.release()
         session.release()

@@ -31,42 +31,39 @@ SEED = 2
 
 
 class Forecast(NamedTuple):
-    """Points, each for an ``area`` (n,) [m²] of surface around it: albedo and H to come, (n, 3) [W/m²]."""
+    """Points, each for an ``area`` (n,) [m²] of surface around it: H to come (n, 3) [W/m²]. asked: that of the texels that were
+    asked for."""
 
     area: F64
-    albedo: F64
     irradiance: F64
+    asked: F64
 
 
 def forecast(
     surfaces: TexelSurfaces,
     albedo: NDArray[np.floating],
     exitance: NDArray[np.floating],
+    asked: NDArray[np.int64],
     sky: Sky | None = None,
     lights: Sequence[Light] = (),
 ) -> Forecast:
-    """albedo, exitance E [W/m²]: of each texel (tiles, t, t, 3). sky, and lights without area: seen by each point as far as it
-    sees no other."""
+    """albedo, exitance E [W/m²]: of each texel (tiles, t, t, 3). asked: the numbers of some texels. sky, and lights without area:
+    seen by each point as far as it sees no other."""
     at, area = _points(surfaces.area.ravel(), exitance.max(-1).ravel())
     rho, E = (texels.reshape(-1, 3)[at].astype(np.float64) for texels in (albedo, exitance))
     shining = [light for light in lights if light.emits]
     if not E.any() and sky is None and not shining:
-        return Forecast(area, rho, np.zeros_like(E))
+        return Forecast(area, np.zeros_like(E), np.zeros((len(asked), 3)))
     grid = _Grid(surfaces)
-    F = _form_factors(surfaces, at, area, grid)
-    direct = F @ E
-    p, n = surfaces.position.reshape(-1, 3)[at], surfaces.normal.reshape(-1, 3)[at].astype(np.float64)
-    if sky is not None or shining:
-        direct = direct + _from_beyond(p, n, grid, sky, shining)
-    for light in shining:
-        if not light.from_afar:
-            end = np.broadcast_to(light.position, p.shape)
-            away = (p - end) / np.maximum(np.linalg.norm(p - end, axis=1, keepdims=True), 1e-30)
-            direct = direct + light.irradiance(p, n) * grid.free(p, n, end, away)[:, None]
-    H = direct
+    F, towards = (_form_factors(surfaces, grid, texels, at, area) for texels in (at, asked))
+    total = np.maximum(F.sum(1), 1.0)
+    F /= np.maximum(total[:, None], total)
+    towards /= np.maximum(towards.sum(1, keepdims=True), 1.0)
+    from_lights, asked_from_lights = (_from_lights(surfaces, grid, texels, sky, shining) for texels in (at, asked))
+    H = direct = F @ E + from_lights
     for _ in range(BOUNCES):
         H = direct + F @ (rho * H)
-    return Forecast(area, rho, H)
+    return Forecast(area, H, towards @ (E + rho * H) + asked_from_lights)
 
 
 def _points(area: F64, exitance: NDArray[np.floating]) -> tuple[NDArray[np.int64], F64]:
@@ -88,6 +85,22 @@ def _points(area: F64, exitance: NDArray[np.floating]) -> tuple[NDArray[np.int64
     return (np.concatenate(points), np.concatenate(areas)) if points else (np.zeros(0, np.int64), np.zeros(0))
 
 
+def _from_lights(
+    surfaces: TexelSurfaces, grid: _Grid, at: NDArray[np.int64], sky: Sky | None, lights: Sequence[Light]
+) -> F64:
+    """(n, 3) what texels receive of the sky and of lights without area [W/m²]."""
+    p, n = (values.reshape(-1, 3)[at].astype(np.float64) for values in (surfaces.position, surfaces.normal))
+    H = np.zeros((len(at), 3))
+    if sky is not None or lights:
+        H += _from_beyond(p, n, grid, sky, lights)
+    for light in lights:
+        if not light.from_afar:
+            end = np.broadcast_to(light.position, p.shape)
+            away = (p - end) / np.maximum(np.linalg.norm(p - end, axis=1, keepdims=True), 1e-30)
+            H += light.irradiance(p, n) * grid.free(p, n, end, away)[:, None]
+    return H
+
+
 def _from_beyond(p: F64, n: F64, grid: _Grid, sky: Sky | None, lights: Sequence[Light]) -> F64:
     """(n, 3) what points p (n, 3) with normals n (n, 3) receive of sky, sun and directional lights [W/m²]."""
     towards, irradiance = directions_of(sky, lights, SKY_ERROR)
@@ -98,19 +111,19 @@ def _from_beyond(p: F64, n: F64, grid: _Grid, sky: Sky | None, lights: Sequence[
     return np.asarray(light @ irradiance)
 
 
-def _form_factors(surfaces: TexelSurfaces, at: NDArray[np.int64], area: F64, grid: _Grid) -> F64:
-    """(n, n) from each point to the disc around each other one."""
-    p, n = surfaces.position.reshape(-1, 3)[at], surfaces.normal.reshape(-1, 3)[at].astype(np.float64)
-    way = p[None] - p[:, None]
+def _form_factors(
+    surfaces: TexelSurfaces, grid: _Grid, asked: NDArray[np.int64], at: NDArray[np.int64], area: F64
+) -> F64:
+    """(asked, at) from each texel asked for to the disc around each point."""
+    p, n = (values.reshape(-1, 3)[asked].astype(np.float64) for values in (surfaces.position, surfaces.normal))
+    q, m = (values.reshape(-1, 3)[at].astype(np.float64) for values in (surfaces.position, surfaces.normal))
+    way = q[None] - p[:, None]
     squared = np.maximum((way**2).sum(-1), 1e-30)
-    leaves, arrives = np.einsum("ijk,ik->ij", way, n), -np.einsum("ijk,jk->ij", way, n)
+    leaves, arrives = np.einsum("ijk,ik->ij", way, n), -np.einsum("ijk,jk->ij", way, m)
     F = np.maximum(leaves, 0) * np.maximum(arrives, 0) / squared * area / (np.pi * squared + area / 4)
-    i, j = np.nonzero(np.triu(F))
-    free = np.zeros(F.shape, bool)
-    free[i, j] = free[j, i] = grid.free(p[i], n[i], p[j], n[j])
-    F *= free
-    total = np.maximum(F.sum(1), 1.0)
-    return np.asarray(F / np.maximum(total[:, None], total))
+    i, j = np.nonzero(F)
+    F[i, j] *= grid.free(p[i], n[i], q[j], m[j])
+    return np.asarray(F)
 
 
 class _Grid:

@@ -249,9 +249,14 @@ class TilePool:
 
     def slot_at(self, uv: tuple[float, float]) -> int:
         """The slot of the leaf at a place of the virtual atlas [texels of level 0]; -1 where there is none."""
-        tile = np.floor(np.array(uv)[:, None] / self.tile * 2.0**self.leaves.level).astype(np.int64)
-        found = np.flatnonzero(self.used & (self.leaves.x == tile[0]) & (self.leaves.y == tile[1]))
-        return int(found[0]) if len(found) else -1
+        return int(self.slots_at(np.array([uv]))[0])
+
+    def slots_at(self, uv: F64) -> NDArray[np.int64]:
+        """(n,) the same at places (n, 2)."""
+        cell = np.floor(uv * self.pages_per_texel).astype(np.int64)
+        inside = np.all((cell >= 0) & (cell < self._pages.shape[::-1]), axis=1)
+        column, row = np.where(inside[:, None], cell, 0).T
+        return np.where(inside, self._pages[row, column].astype(np.int64) - 1, -1)
 
     def atlas_rect(self, corner: tuple[int, int], size: int) -> tuple[float, float, float, float]:
         """The square of ``size`` texels at ``corner`` of the tile pool, as (u, v, u, v) in the virtual atlas."""

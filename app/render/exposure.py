@@ -1,4 +1,8 @@
-"""Automatic exposure: 2^EV = key / exp(mean ln L) [Reinhard02, equation 1], L the luminance that surfaces reflect, ρ (H + A) / π.
+"""Automatic exposure: 2^EV = key / exp(mean ln L) [Reinhard02, equation 1], L the luminance that surfaces reflect, ρ (H + A) / π,
+where the camera sees them; lamps and the sky are to be bright, whatever they are.
+
+L counts as no more than what one pixel in a hundred exceeds, a glare beside a lamp, and not at all where it is RANGE below that:
+no exposure that shows the rest shows it, and of what light hardly reaches there is no end of darkness [Ward97].
 
 Light not yet shot counts as an even ambient A = r̄ / (1 − ρ̄) [Cohen88, section 5]. Before the first shot that is too bright
 by what escapes, and by how unevenly light will fall (the mean logarithm of the Cornell box's light lies 1.2 EV below that of
@@ -16,43 +20,66 @@ from app.lightmap.tile_pool import TilePool
 from app.options import specs
 from app.render.false_colour import LUMINANCE
 from app.render.options import DisplayOptions
-from app.render.sample import sampled_colours, sampled_irradiance, sampled_tiles
+from app.render.sample import irradiance_at, sampled_colours, sampled_tiles
+from app.render.seen import Texels
 from app.scene.model import F64
 
 KEY = 0.18  # mid grey [Reinhard02]
+BRIGHT = 0.99  # quantile of what is seen
+FORECAST = 128  # texels of those seen whose light is forecast, at most
+RANGE = 2.0**-8  # what is darker than that beside what is bright, a screen of 8 bits shows as black
 EXPOSURES = next((s.minimum, s.maximum) for s in specs(DisplayOptions) if s.name == "exposure")  # that can be set
+TRAPPED = 1e-4  # of that even light: what leaks from texel to texel through closed corners is less
 LEAST_ABSORBED = 0.01  # 1 − ρ̄: in a furnace of ρ̄ = 1 light never ends, but its exposure may
 
 
-def first_exposure(pool: TilePool) -> float:
-    """EV for the light to come, before the first shot; 0 where nothing emits. Needs no GPU."""
+def first_exposure(pool: TilePool, seen: Texels) -> float:
+    """EV for the light to come on what is seen, before the first shot; 0 where there is none. Needs no GPU."""
     materials = pool.scene.materials
     albedo = sampled_colours(pool, [m.albedo for m in materials], pool.albedo_tiles, slice(None))
     emission = sampled_colours(pool, [m.emission for m in materials], pool.emission_tiles, slice(None))
+    some = Texels(*(values[:: -(-len(seen.slot) // FORECAST) or 1] for values in seen))
+    asked = (some.slot * pool.tile + some.row) * pool.tile + some.column
     sky = pool.scene.sky if pool.scene.lit_by_sky else None
-    light = forecast(pool.surfaces, albedo, np.float32(np.pi) * emission, sky, pool.scene.lights)
-    return _exposure(light.albedo * light.irradiance, light.area)
+    light = forecast(pool.surfaces, albedo, np.float32(np.pi) * emission, asked, sky, pool.scene.lights)
+    return _exposure(albedo[some] * light.asked)
 
 
-def exposure_of(lightmap: Lightmap, mean_residual: F64) -> float:
-    """EV for the light as it is; 0 where there is none. Waits for the GPU.
+def exposure_of(lightmap: Lightmap, seen: Texels, mean_residual: F64) -> float:
+    """EV for the light as it is on what is seen; 0 where there is none. Waits for the GPU.
 
     mean_residual: r̄ over all texels, RGB [W/m²], as the energy book has it.
     """
     pool = lightmap.pool
     sample = sampled_tiles(pool)
     area = pool.surfaces.area[sample]
-    albedo = sampled_colours(pool, [m.albedo for m in lightmap.scene.materials], pool.albedo_tiles, sample)
+    factors = [m.albedo for m in lightmap.scene.materials]
+    albedo = sampled_colours(pool, factors, pool.albedo_tiles, sample)
     mean_albedo = np.einsum("tijc,tij->c", albedo, area) / max(float(area.sum()), 1e-30)
     ambient = mean_residual / np.maximum(1 - mean_albedo, LEAST_ABSORBED)
-    return _exposure(albedo * (sampled_irradiance(lightmap) + ambient), area)
+    material = pool.scene.material_ids[pool.charts.face_triangle[pool.surfaces.face[seen]]]
+    own = np.array(factors)[material] * (1.0 if pool.albedo_tiles is None else pool.albedo_tiles[seen])
+    return _exposure(own * (irradiance_at(lightmap, seen) + ambient))
 
 
-def _exposure(reflected: NDArray[np.floating], area: F64) -> float:
-    """reflected: ρ (H + A) (..., 3) [W/m²] of surfaces of that area (...) [m²]."""
+def is_trapped(lightmap: Lightmap, seen: Texels, even: float) -> bool:
+    """Whether no light to speak of is where the camera sees surfaces, and no lamp either. Waits for the GPU.
+
+    even: H if all that is emitted fell evenly on all surfaces, mean over RGB [W/m²].
+    """
+    pool = lightmap.pool
+    material = pool.scene.material_ids[pool.charts.face_triangle[pool.surfaces.face[seen]]]
+    emits = np.array([m.emits for m in lightmap.scene.materials])[material].any()
+    return bool(len(material) and not emits and irradiance_at(lightmap, seen).mean() < TRAPPED * even)
+
+
+def _exposure(reflected: NDArray[np.floating]) -> float:
+    """reflected: ρ (H + A) (n, 3) [W/m²] of what is seen, each as large in the picture."""
     luminance = reflected @ LUMINANCE / np.pi
-    lit = (luminance > 0) & (area > 0)
-    if not lit.any():
+    if not (luminance > 0).any():
         return 0.0
-    exposure = np.log2(KEY) - np.average(np.log2(luminance[lit]), weights=area[lit])
+    bright = np.quantile(luminance, BRIGHT)
+    bright = bright if bright > 0 else luminance.max()
+    counted = np.minimum(luminance[luminance > RANGE * bright], bright)
+    exposure = np.log2(KEY) - np.log2(counted).mean()
     return float(np.clip(exposure, *EXPOSURES))

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import STORAGE
 from app.lightmap.tile_pool import TilePool
+from app.render.seen import Texels
 from app.scene.model import F32, RGB
 
 SAMPLED = 1 << 18  # texels that means are taken over, evenly spread
@@ -27,9 +31,23 @@ def sampled_colours(pool: TilePool, factors: list[RGB], colours: F32 | None, sam
 
 def sampled_irradiance(lightmap: Lightmap) -> F32:
     """H of the sampled tiles (tiles, t, t, 3) [W/m²]."""
+    pool = lightmap.pool
+    cells, unit = _stored_irradiance(lightmap)
+    tile = np.arange(pool.tiles)[sampled_tiles(pool)]
+    return cells[tile // pool.columns, :, tile % pool.columns, :, :3].astype(np.float32) * unit
+
+
+def irradiance_at(lightmap: Lightmap, texels: Texels) -> F32:
+    """H of these texels (n, 3) [W/m²]."""
+    cells, unit = _stored_irradiance(lightmap)
+    columns = lightmap.pool.columns
+    slot, row, column = texels
+    return cells[slot // columns, row, slot % columns, column, :3].astype(np.float32) * unit
+
+
+def _stored_irradiance(lightmap: Lightmap) -> tuple[NDArray[Any], np.float32]:
+    """All of the texture (rows of tiles, t, columns of tiles, t, 4), and what 1 in it stands for [W/m²]."""
     pool, texture = lightmap.pool, lightmap.texture("t_irradiance")
     dtype = {"f4": np.float32, "f2": np.float16, "f1": np.uint8}[STORAGE[lightmap.storage]]
     cells = np.frombuffer(texture.read(), dtype).reshape(pool.rows, pool.tile, pool.columns, pool.tile, 4)
-    tile = np.arange(pool.tiles)[sampled_tiles(pool)]
-    stored = cells[tile // pool.columns, :, tile % pool.columns, :, :3].astype(np.float32)
-    return stored * np.float32(lightmap.unit / (255 if dtype is np.uint8 else 1))
+    return cells, np.float32(lightmap.unit / (255 if dtype is np.uint8 else 1))

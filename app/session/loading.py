@@ -13,6 +13,7 @@ from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import Array, TilePool
 from app.render.exposure import first_exposure
+from app.render.seen import seen_texels
 from app.scene.load import load_scene
 from app.scene.model import Scene
 from app.scene.options import FileOptions
@@ -79,7 +80,10 @@ def load(
     start = time.perf_counter()
     tell("cutting into texels", 0.6)
     pool = quadtree_pool(scene, charts) if options.adaptive else TilePool(scene, charts)
-    exposure, arrays = first_exposure(pool) if expose else None, pool.arrays
+    exposure, arrays = None, pool.arrays
+    if expose:
+        camera = scene.cameras[0]
+        exposure = first_exposure(pool, seen_texels(pool, camera.world_from_camera, camera.yfov))
     _ = pool.emission_weights, pool.visible_mesh  # cached here: the window, which reads them next, does not wait
     seconds["texels"] = time.perf_counter() - start
     if rays:

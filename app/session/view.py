@@ -14,7 +14,7 @@ import numpy as np
 from app.gpu import Framebuffer, Texture
 from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
-from app.render.exposure import exposure_of
+from app.render.exposure import exposure_of, is_trapped
 from app.render.false_colour import Scale, false_colour_scale
 from app.render.frame import FrameRenderer
 from app.render.layers import LAYER_SHADERS, SEAMS, layers_with
@@ -23,12 +23,15 @@ from app.render.pick import with_texel
 from app.render.ray_picture import RayPicture
 from app.render.resolve import Reference
 from app.render.seam_jumps import SeamJumps
+from app.render.seen import Texels, seen_texels
 from app.render.surfaces import Rect
 from app.scene.model import Camera
 from app.session.picking import Picked, picked_from_hit
 from app.session.session import Session
 from app.solvers import HEMISPHERE, Inspection, Rays
 
+SIZE = (1280, 720)  # px, of a picture before the first one
+TRAPPED = "the light is trapped: none of it reaches what the camera sees"
 RAYS_SECONDS = 0.25  # between two looks at the rays that are drawn, while light moves
 
 
@@ -43,6 +46,8 @@ class View:
         self.session, self.display = session, display or DisplayOptions()
         self.camera: CameraView
         self.marked: tuple[int, int] | None = None
+        self._size = SIZE
+        self._looked_at: object = None
         self._renderer, self._rays = FrameRenderer(session.gpu), RayPicture(session.gpu)
         self._seams = SeamJumps(session.gpu)
         self._rays_of: object = None
@@ -87,6 +92,7 @@ class View:
         whole: bool = True,
     ) -> None:
         """The picture of the solution as it is now; if not ``whole``, brought up to date over several frames."""
+        self._size = size
         self._renderer.render(
             target,
             size,
@@ -113,11 +119,33 @@ class View:
             return {SEAMS: self._seams.of(self.session.lightmap, whole=whole)}
         return self.session.solver.layers if offered else {}
 
-    def expose(self) -> None:
-        """Set the exposure from the light of the scene."""
+    def expose(self, size: tuple[int, int] | None = None) -> None:
+        """Set the exposure from the light on what the camera sees in a picture of that size [px], else in one like the last."""
+        width, height = size or self._size
         balance = self.session.run.energy
         mean_residual = balance.unshot / max(balance.area, 1e-300)
-        self.display = self.display.replace(exposure=exposure_of(self.session.lightmap, mean_residual))
+        self.display = self.display.replace(
+            exposure=exposure_of(self.session.lightmap, self._seen(width / height), mean_residual)
+        )
+
+    def look_for_light(self) -> str | None:
+        """What to say where all light has been distributed and none of it is where the camera sees anything. Looked up once for a
+        solution; it becomes the session's message, too."""
+        session = self.session
+        state = session.lightmap, session.solver.issued
+        if not session.opened or not session.run.converged or state == self._looked_at:
+            return None
+        self._looked_at = state
+        balance = session.run.energy
+        even = float(np.mean(balance.emitted)) / max(balance.area, 1e-300)
+        width, height = self._size
+        if not is_trapped(session.lightmap, self._seen(width / height), even):
+            return None
+        session.message = TRAPPED
+        return TRAPPED
+
+    def _seen(self, aspect: float) -> Texels:
+        return seen_texels(self.session.lightmap.pool, self.camera.world_from_camera, self.camera.yfov, aspect)
 
     def atlas_image(self, size: tuple[int, int], *, turned: bool = False) -> Texture | None:
         """The virtual atlas with what was drawn last, v up or to the right; None before the first picture."""

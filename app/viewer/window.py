@@ -221,6 +221,7 @@ class ViewerWindow(WindowConfig):
         try:
             session.poll(interactive=self._ui.held)
             self._view.tell_observer()
+            self._view.look_for_light()
             solve, look = self._turns.next(frame_time) if session.solving else (False, True)
             if solve:
                 pace = state.pace

@@ -8,9 +8,10 @@ from boxes import SIZE, STEP, box, cornell, even, picture, put
 
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
-from app.render.exposure import exposure_of
+from app.render.exposure import BRIGHT, exposure_of
 from app.render.false_colour import LUMINANCE, colour_map, false_colour_scale
 from app.render.options import DisplayOptions
+from app.render.seen import Texels, seen_texels
 
 __all__ = ["box", "cornell"]
 
@@ -67,17 +68,51 @@ def test_scale_and_exposure_come_from_the_light(box: Lightmap) -> None:
     assert 179 / np.pi * brightest <= luminance.high <= 1.5 * 179 / np.pi * brightest
     assert luminance.unit == "cd/m²"
 
-    exposure = exposure_of(box, mean_residual(box))
-    area = box.pool.surfaces.area
-    mean = np.average(np.log((box.albedo() * H @ LUMINANCE)[area > 0] / np.pi), weights=area[area > 0])
-    assert 2.0**exposure * np.exp(mean) == pytest.approx(0.18, rel=1e-5)
+    seen = seen_by_first(box)
+    exposure = exposure_of(box, seen, mean_residual(box))
+    L = (box.albedo() * H @ LUMINANCE)[seen] / np.pi
+    L = np.minimum(L[L > 0], np.quantile(L, BRIGHT))  # the lamp reflects nothing
+    assert 2.0**exposure * np.exp(np.log(L).mean()) == pytest.approx(0.18, rel=1e-5)
     put(box, "t_irradiance", even(box, H) * 8)
-    assert exposure_of(box, mean_residual(box)) == pytest.approx(exposure - 3, abs=1e-5)
+    assert exposure_of(box, seen, mean_residual(box)) == pytest.approx(exposure - 3, abs=1e-5)
+
+
+def seen_by_first(lightmap: Lightmap) -> Texels:
+    camera = lightmap.scene.cameras[0]
+    return seen_texels(lightmap.pool, camera.world_from_camera, camera.yfov)
+
+
+def test_glare_and_darkness_do_not_change_the_exposure(box: Lightmap) -> None:
+    put(box, "t_residual", even(box, (0.0, 0.0, 0.0)))
+    seen = seen_by_first(box)
+    rng = np.random.default_rng(3)
+    lit = even(box, (1.0, 1.0, 1.0))
+    put(box, "t_irradiance", lit)
+    exposure = exposure_of(box, seen, np.zeros(3))
+    kept = rng.random(lit.shape[:3]) < 0.5
+    put(box, "t_irradiance", np.where(kept[..., None], lit, np.float32(1e-6)))
+    assert exposure_of(box, seen, np.zeros(3)) == pytest.approx(exposure, abs=0.2), "half of it is next to black"
+    glare = rng.random(lit.shape[:3]) < 0.005
+    put(box, "t_irradiance", np.where(glare[..., None], np.float32(1e4), lit))
+    assert exposure_of(box, seen, np.zeros(3)) == pytest.approx(exposure, abs=0.05)
+
+
+def test_what_the_camera_does_not_see_does_not_change_the_exposure(box: Lightmap) -> None:
+    put(box, "t_residual", even(box, (0.0, 0.0, 0.0)))
+    seen = seen_by_first(box)
+    lit = even(box, (1.0, 1.0, 1.0))
+    put(box, "t_irradiance", lit)
+    exposure = exposure_of(box, seen, np.zeros(3))
+    faces = np.unique(box.pool.surfaces.face[seen])
+    hidden = ~np.isin(box.pool.surfaces.face, faces)
+    assert hidden[box.pool.surfaces.face >= 0].any()
+    put(box, "t_irradiance", np.where(hidden[..., None], np.float32(1e-6), lit))
+    assert exposure_of(box, seen, np.zeros(3)) == pytest.approx(exposure, abs=1e-6)
 
 
 def test_a_scene_just_opened_is_exposed_for_the_light_to_come(box: Lightmap) -> None:
-    exposure = exposure_of(box, mean_residual(box))
+    exposure = exposure_of(box, seen_by_first(box), mean_residual(box))
     assert np.isfinite(exposure)
     assert abs(exposure) < 4, "the lamp of the Cornell box gives about as much light as the exposure of 0 is for"
     put(box, "t_residual", even(box, (0.0, 0.0, 0.0)))
-    assert exposure_of(box, mean_residual(box)) == 0.0, "no light at all"
+    assert exposure_of(box, seen_by_first(box), mean_residual(box)) == 0.0, "no light at all"

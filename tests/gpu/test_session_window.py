@@ -14,6 +14,7 @@ from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
 from app.render.exposure import first_exposure
 from app.render.options import DisplayOptions
+from app.render.seen import seen_texels
 from app.session.loading import load
 from app.session.pacing import FAST_FRAME, SLOW_FRAME, Turns
 from app.session.session import Session
@@ -63,7 +64,9 @@ def test_a_scene_opens_in_parts_and_is_exposed(view: View, session: Session) -> 
     assert frames(session, lambda: session.opened) > 3, "upload and programs are spread over frames"
     assert session.solver.issued == 0 and session.stats.remaining == 1.0, "warming up leaves no light behind"
     assert session.stats.unshot == pytest.approx(session.stats.emitted)
-    assert view.display.exposure == pytest.approx(first_exposure(session.lightmap.pool))
+    camera = session.scene.cameras[0]
+    seen = seen_texels(session.lightmap.pool, camera.world_from_camera, camera.yfov)
+    assert view.display.exposure == pytest.approx(first_exposure(session.lightmap.pool, seen))
 
 
 def test_an_exposure_that_was_given_stays(gpu: Gpu) -> None:
@@ -214,9 +217,11 @@ def test_books_that_take_long_are_made_rarely(session: Session, monkeypatch: pyt
 def test_exposure_follows_the_lamp(session: Session) -> None:
     pool = load("cornell-box", SMALL).pool
     brighter = [dataclasses.replace(m, emission=tuple(8 * e for e in m.emission)) for m in pool.scene.materials]
-    before = first_exposure(pool)
+    camera = pool.scene.cameras[0]
+    seen = seen_texels(pool, camera.world_from_camera, camera.yfov)
+    before = first_exposure(pool, seen)
     pool.scene = pool.scene.with_materials(tuple(brighter))
-    assert first_exposure(pool) == pytest.approx(before - 3)  # 2³ times the light
+    assert first_exposure(pool, seen) == pytest.approx(before - 3)  # 2³ times the light
 
 
 def test_a_frame_that_does_not_look_shows_the_view_as_it_was(view: View, gpu: Gpu, session: Session) -> None:

@@ -174,7 +174,7 @@ def _taken(view: View, taken: Picture, size: tuple[int, int]) -> np.ndarray[Any,
     view.session.solve(Stop(work=taken.work))
     view.display = DisplayOptions(**taken.display)
     if taken.exposure is None:
-        view.expose()
+        view.expose(size)
     else:
         view.display = view.display.replace(exposure=taken.exposure)
     return picture(view, size)

@@ -20,6 +20,7 @@ from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import upload
 from app.render.exposure import exposure_of
+from app.render.seen import seen_texels
 from app.scene.model import F64
 from app.solvers.local.patches import Patches
 from app.solvers.local.solver import Local
@@ -74,7 +75,9 @@ def _solve(made: Local, direct: F64) -> WholeSolution:
     albedo = patches.albedo(lightmap.scene.materials, lightmap.scene.material_ids, lightmap.charts.face_triangle)[nodes]
     indirect = reflected(F, albedo, direct)
     write_light(lightmap, patches, direct + indirect)
-    return WholeSolution(direct, indirect, exposure_of(lightmap, np.zeros(3)), F.nnz)
+    camera = lightmap.scene.cameras[0]
+    seen = seen_texels(lightmap.pool, camera.world_from_camera, camera.yfov)
+    return WholeSolution(direct, indirect, exposure_of(lightmap, seen, np.zeros(3)), F.nnz)
 
 
 def all_factors(made: Local, nodes: I64) -> csr_array[np.float64]:
