@@ -258,10 +258,11 @@ def _depths(corners: F64, triangles: I32, facet: I32, normals: F64, flat: float)
     behind and face away. 0 where it ends none."""
     count, centre = len(triangles), corners.mean(1)
     has = coo_array((np.ones(3 * count, bool), (np.repeat(np.arange(count), 3), _edges(triangles)[0]))).tocsr()
+    of_edge = has.T.tocsr()
     deep = np.zeros(int(facet.max(initial=-1)) + 1)
     wrong = np.zeros(len(deep), bool)
     for first in range(0, count, BLOCK):
-        one, other = (has[first : first + BLOCK] @ has.T).nonzero()
+        one, other = (has[first : first + BLOCK] @ of_edge).nonzero()
         one = one + first
         one, other = one[facet[one] != facet[other]], other[facet[one] != facet[other]]
         heights = np.einsum("pck,pk->pc", corners[other] - corners[one, :1], normals[one])

@@ -12,15 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.sides import distinct_rows, groups_of, totals
+from app.atlas.sides import SPREAD, distinct_rows, groups_of, totals
 from app.scene.model import F64, I32
 
 LEAST = 32  # triangles of a surface that is looked for: fewer cost no time to unfold
 SAME = 1e-4  # of a shape's radius, that a corner of a copy may be off: charts have at most some thousand texels
 ROUNDS = 8  # shapes told apart among surfaces that seem alike; what is left then is unfolded by itself
 BLOCK = 1 << 20  # corners compared at a time
-# Odd multiplier that spreads bits [Knuth, multiplicative hashing by the golden ratio].
-HASH = np.uint64(0x9E3779B97F4A7C15)
 
 I64 = NDArray[np.int64]
 
@@ -82,7 +80,7 @@ def _names(vertices: I64, first: I64, count: I64) -> I64:
 def _digest(named: I64, first: I64) -> NDArray[np.uint64]:
     """(s,) equal for surfaces that name their corners alike."""
     place = np.arange(named.size) - np.repeat(3 * first, 3 * np.diff(np.append(first, len(named))))
-    mixed = (named.reshape(-1) + 1).astype(np.uint64) * HASH * (2 * place + 1).astype(np.uint64)
+    mixed = (named.reshape(-1) + 1).astype(np.uint64) * SPREAD * (2 * place + 1).astype(np.uint64)
     return np.asarray(np.add.reduceat(mixed ^ (mixed >> np.uint64(29)), 3 * first), np.uint64)
 
 

@@ -27,6 +27,8 @@ FLAT = 1e-6  # distance from a plane that still counts as on it
 # Radians between two normals of one plane: what FLAT allows over a triangle a thousandth of the scene high.
 FLAT_ANGLE = 1e-3
 BLOCK = 1 << 22  # numbers in a temporary array
+# Odd multiplier that spreads bits [Knuth, multiplicative hashing by the golden ratio].
+SPREAD = np.uint64(0x9E3779B97F4A7C15)
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,6 +193,13 @@ def _coplanar(corners: F64, normals: F64, i: NDArray[np.int64], j: NDArray[np.in
     return np.asarray((np.maximum(np.abs(off_i), np.abs(off_j)) < FLAT) & (turn < FLAT_ANGLE))
 
 
+def _not_alone(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The rows (n, k) that have an equal one; few others, that only seem to have."""
+    mixed = (rows.astype(np.uint64) * np.cumprod(np.full(rows.shape[1], SPREAD))).sum(axis=1)
+    _, which, uses = np.unique(mixed ^ (mixed >> np.uint64(29)), return_inverse=True, return_counts=True)
+    return np.flatnonzero(uses[which] > 1)
+
+
 def _t_junctions(corners: F64, normals: F64, materials: I32, half: NDArray[np.int64]) -> NDArray[np.int64]:
     """Pairs of triangles whose edges overlap in part: one long edge against several short ones.
 
@@ -207,7 +216,10 @@ def _t_junctions(corners: F64, normals: F64, materials: I32, half: NDArray[np.in
     along[~forward] *= -1
     foot = p - np.einsum("ek,ek->e", p, along)[:, None] * along
     key = np.round(np.concatenate([foot, along, normals[t]], axis=1) / (10 * FLAT)).astype(np.int64)
-    line = distinct_rows(*key.T, materials[t])[1]
+    shared = _not_alone(key)
+    t, forward = t[shared], forward[shared]
+    p, q, along, length = p[shared], q[shared], along[shared], length[shared]
+    line = distinct_rows(*key[shared].T, materials[t])[1]
     low = np.einsum("ek,ek->e", np.where(forward[:, None], p, q), along)
     order = np.lexsort((low, line))
     line, low, high, forward = line[order], low[order], (low + length)[order], forward[order]
