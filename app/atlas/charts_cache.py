@@ -50,8 +50,8 @@ def charts_of(
 def _made(
     scene: Scene, atlas: AtlasOptions, roots: bool, progress: Callable[[str, float], None] | None
 ) -> tuple[Scene, Charts]:
-    if progress is not None:
-        progress("contacts", 0.0)
+    report = progress or (lambda stage, share: None)
+    report("contacts", 0.0)
     cut = cut_at_contacts(scene)
     charts = parametrize(
         cut.scene,
@@ -60,7 +60,7 @@ def _made(
         texels=atlas.texels,
         tile=atlas.tile,
         roots=roots,
-        progress=progress,
+        progress=lambda stage, share: report(stage, 0.15 + 0.85 * share),
     )
     return cut.scene, charts
 

@@ -35,6 +35,7 @@ LEAST_BY_AREA = 0.5  # of the texels asked for, that surfaces have by their area
 ROOT_SHARE = 16  # of the texels that uniform ones would have: two levels below the roots are as fine as these
 MAX_TEXELS = 1 << 24
 MUCH = 0.1  # of all area: so much of it smaller than a texel is worth a word
+UNFOLDED = 0.7  # of the work, that is done by then
 WHOLE_PATCHES_FROM = 6  # texels: shorter sides of rectangles are not rounded to whole patches
 
 
@@ -81,11 +82,12 @@ def parametrize(
     report = progress or (lambda stage, share: None)
     report("sides", 0.0)
     lit = lit_sides(scene)
-    report("weld", 0.0)
+    report("weld", 0.05)
     points, corners = weld(scene)
+    report("flat pieces", 0.1)
     facet = facets(points, corners, scene.material_ids, scene_size(scene))
-    layout, method, warnings = _unfold(scene, lit, points, corners, facet, ends, time_limit, progress)
-    report("pack", 0.0)
+    layout, method, warnings = _unfold(scene, lit, points, corners, facet, ends, time_limit, report)
+    report("pack", UNFOLDED)
     if density is None:
         aim = texels if texels is not None else default_texels(len(lit.triangle), roots)
         density = _density_for(layout, aim)
@@ -96,7 +98,7 @@ def parametrize(
             f"--density {density:g} needs {need:,.0f} texels: the limit is {MAX_TEXELS:,} (density {best:.3g})"
         )
     charts = _place(layout, lit, facet, density, tile)
-    report("pack", 1.0)
+    report("what lies on surfaces", 0.8)
     face_uv, face_chart, face_facet, rects, size = charts
     hidden = hidden_pieces(scene, points, corners, facet, lit.triangle, lit.back, face_uv, density)
     if hidden.left_out:
@@ -106,6 +108,7 @@ def parametrize(
         warnings = (*warnings, soup)
     if not roots:
         warnings += _too_small(layout, density)
+    report("seams", 0.95)
     return Charts(
         size=size,
         tile=tile,
@@ -165,9 +168,10 @@ def _unfold(
     facet: I32,
     ends: NDArray[np.uint8] | None,
     time_limit: float | None,
-    progress: Progress | None,
+    report: Progress,
 ) -> tuple[Layout, str, tuple[str, ...]]:
     """Charts in metres for every triangle with a lit side; their story in words; warnings."""
+    report("rectangles", 0.2)
     used = np.unique(lit.triangle)
     rectangles = find_rectangles(points, corners[used], scene.material_ids[used], facet[used])
     slot = np.full(int(facet.max()) + 1, -1, np.int32)
@@ -185,7 +189,7 @@ def _unfold(
         scene.material_ids[rest],
         facet[rest],
         time_limit=time_limit,
-        progress=progress,
+        progress=lambda stage, share: report(stage, 0.3 + (UNFOLDED - 0.3) * share),
     )
     chart[rest], uv[rest] = count + unfolded.chart, unfolded.uv
     flat = int(unfolded.chart.max(initial=-1)) + 1 - unfolded.by_xatlas

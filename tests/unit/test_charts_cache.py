@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from app.atlas.seams import Seams
 from app.scene import shapes
 from app.scene.model import Material, Scene
 from app.scene.sky import Sky
+from app.util.background import CancelledError
 
 __all__ = ["own_cache"]
 
@@ -26,10 +28,13 @@ ATLAS = AtlasOptions(texels=3000)
 
 @pytest.fixture
 def scene(monkeypatch: pytest.MonkeyPatch) -> Scene:
-    """A room with a ball, and a sheet that stands on its floor, so that this is cut."""
+    """A room with a drum, and a sheet that stands on its floor, so that this is cut."""
     monkeypatch.setattr(charts_cache, "FEWEST", 0)
     sheet = shapes.quad((-1.0, -1.5, 0.3), (1.7, 0, 0), (0, 1, 0))
-    return scene_of([box_room(), shapes.icosphere(0.4, 2), sheet], [Material("a"), Material("b", double_sided=True)])
+    return scene_of(
+        [box_room(), shapes.cylinder(0.41, 1.07, 14).moved(1, 0, 1), sheet],
+        [Material("a"), Material("b", double_sided=True)],
+    )
 
 
 def _same(one: object, other: object) -> bool:
@@ -76,3 +81,23 @@ def test_a_damaged_file_is_made_again(scene: Scene) -> None:
     newest.write_bytes(newest.read_bytes()[:1000])
     assert _same(charts_of(scene, ATLAS)[1], first[1])
     assert newest.stat().st_size > 1000
+
+
+def test_progress_goes_on_and_each_stage_can_be_the_last(scene: Scene) -> None:
+    told: list[tuple[str, float]] = []
+    charts_of(scene, ATLAS.replace(texels=3002), progress=lambda stage, share: told.append((stage, share)))
+    shares = [share for _, share in told]
+    assert shares == sorted(shares) and shares[0] == 0.0 and 0.9 < shares[-1] <= 1.0
+    stages = list(dict.fromkeys(stage for stage, _ in told))
+    assert len(stages) >= 8
+
+    def cancel_at(last: str) -> Callable[[str, float], None]:
+        def progress(stage: str, share: float) -> None:
+            if stage == last:
+                raise CancelledError
+
+        return progress
+
+    for k, last in enumerate(stages):
+        with pytest.raises(CancelledError):
+            charts_of(scene, ATLAS.replace(texels=3100 + k), progress=cancel_at(last))
