@@ -30,7 +30,7 @@ from app.scene.lights import Light
 from app.scene.model import F32, F64, Material
 from app.scene.sky import Sky
 
-NEAR_LIGHT = 0.25  # solver space: how far lights without area are from what they light most, about
+LOOKED_AT = 8192  # texels, to find what lamps without area give at most
 LIGHT = ("t_irradiance", "t_residual")
 QUAD_FORMAT = {"in_rect": "4f", "in_from": "2f"}  # see common/rects.vert.glsl
 BYTES = {"f4": 4, "u4": 4, "f2": 2, "f1": 1}
@@ -117,16 +117,32 @@ class LightTextures:
         strongest = max((np.pi * max(m.emission) for m in self.scene.materials), default=0.0)
         if self.scene.sky is not None:
             strongest = max(strongest, self.scene.sky.most_irradiance)
-        near = (NEAR_LIGHT * self.pool.space.scale) ** 2
-        for light in self.scene.lights:
-            strongest = max(strongest, max(light.intensity) / (1.0 if light.from_afar else near) * light.on)
-        self.unit = strongest or 1.0
+        self.unit = max(strongest, self._strongest_light) or 1.0
         self.light_target.clear()
         self.ambient_target.clear()
         self._emit.draw(
             self.residual_target,
             textures=self.textures("t_position_area", "t_normal_ids", "t_materials", "t_emission"),
             uniforms={"u_unit": self.unit},
+        )
+
+    @property
+    def _strongest_light(self) -> float:
+        """About the most that a texel receives of one lamp without area, in any colour [W/m²], as some of them say: of a point at
+        most half of what it sends out, over the texel's area."""
+        lights = [light for light in self.scene.lights if light.emits]
+        if not lights:
+            return 0.0
+        surfaces = self.pool.surfaces
+        some = np.flatnonzero(surfaces.area.ravel() > 0)
+        some = some[:: max(len(some) // LOOKED_AT, 1)]
+        position, normal = (of.reshape(-1, 3)[some].astype(np.float64) for of in (surfaces.position, surfaces.normal))
+        most = 2 * np.pi / surfaces.area.ravel()[some]
+        return max(
+            float(np.minimum(light.irradiance(position, normal).max(1), max(light.intensity) * most).max())
+            if not light.from_afar
+            else max(light.intensity)
+            for light in lights
         )
 
     @property

@@ -86,7 +86,7 @@ class Light:
         share = np.ones(len(positions))
         if not self.from_afar:
             away = np.array(self.position) - positions
-            distance = np.linalg.norm(away, axis=1)
+            distance = np.maximum(np.linalg.norm(away, axis=1), 1e-12)
             towards, (s, o) = away / distance[:, None], self.slope
             cone = np.clip(-s * towards @ np.array(self.direction) + o, 0.0, 1.0) ** 2
             share = cone * np.clip(1 - (distance / self.range) ** 4, 0.0, 1.0) / distance**2
