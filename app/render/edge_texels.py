@@ -20,8 +20,9 @@ IN_A_ROW = 16  # instances whose texels are made side by side
 class EdgeTexels:
     """Where they are, and the batches in which they are made. Whoever makes it releases it."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, border: int) -> None:
-        self._gpu, self._lightmap, self._border = gpu, lightmap, border
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, border: int, dtype: str) -> None:
+        """dtype: of display texels."""
+        self._gpu, self._lightmap, self._border, self._dtype = gpu, lightmap, border, dtype
         self._found = unequal_edges(lightmap.pool, border, np.flatnonzero(lightmap.pool.used))
         self._of_rows: dict[tuple[int, int], list[_Batch]] = {}
         self._place = Pass(gpu, "render/border", vertex="common/rects", label="edges")
@@ -69,20 +70,20 @@ class EdgeTexels:
                 most = IN_A_ROW * self._gpu.limits.max_texture
                 for start in range(0, len(some), most):
                     part = some[start : start + most]
-                    batches.append(_Batch(self._gpu, kind, part, kind.along(tile, border), border))
+                    batches.append(_Batch(self._gpu, kind, part, kind.along(tile, border), border, self._dtype))
         return self._of_rows[key]
 
 
 class _Batch:
     """Border texels of one kind: their instances, a texture in which they are made side by side, and their places."""
 
-    def __init__(self, gpu: Gpu, kind: Kind, found: F64, along: int, border: int) -> None:
+    def __init__(self, gpu: Gpu, kind: Kind, found: F64, along: int, border: int, dtype: str) -> None:
         self._gpu, self.kind = gpu, kind
         rows = -(-len(found) // IN_A_ROW)
         table = np.zeros((rows * IN_A_ROW, 4), np.float32)
         table[: len(found)] = found[:, 1:]
         self.edges = gpu.texture((IN_A_ROW, rows), 4, "f4", table.tobytes())
-        self.made = gpu.texture((IN_A_ROW * along * border, rows), 4, "f1")
+        self.made = gpu.texture((IN_A_ROW * along * border, rows), 4, dtype)
         self.target = gpu.target(self.made)
         upright = found[:, 4] == 0
         size = np.where(upright[:, None], (border, along), (along, border))

@@ -42,12 +42,14 @@ class Reference(NamedTuple):
 
 
 class DisplayTexels:
-    """The display texels of one lightmap; border: see BORDER. Whoever makes it releases it."""
+    """The display texels of one lightmap; border: see BORDER. linear: they hold light as it is, exposed, and pixels develop it.
+    Whoever makes it releases it."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, ages: LeafAges, border: int) -> None:
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, ages: LeafAges, border: int, *, linear: bool = False) -> None:
         self._gpu, self._lightmap, self._ages, self._border = gpu, lightmap, ages, border
         self.size = display_size(lightmap, border)
-        self._colour = gpu.texture(self.size, 4, "f1")
+        self._linear, dtype = linear, "f4" if linear else "f1"
+        self._colour = gpu.texture(self.size, 4, dtype)
         self._target = gpu.target(self._colour)
         self._target.clear()
         sides = np.array([m.double_sided for m in lightmap.scene.materials], np.uint32)
@@ -63,7 +65,7 @@ class DisplayTexels:
             "t_source": gpu.texture(self.size, 1, "u4"),
         }
         self._write_places()
-        self._edges = EdgeTexels(gpu, lightmap, border)
+        self._edges = EdgeTexels(gpu, lightmap, border, dtype)
         self._seams = DisplaySeams(gpu, lightmap, border)
         self._stale = np.empty(0, np.int64)  # slots whose display texels are of other leaves
         defines = lightmap.defines("TILE") | {"BORDER": border}
@@ -216,6 +218,7 @@ class DisplayTexels:
         if key not in self._passes:
             own = ("TILE",) if name in ("edges", "seams") else ()
             defines = self._lightmap.defines(*layer.defines, *own) | more
+            defines |= {"LINEAR": True} if self._linear and name != "unlit" else {}
             slots = {"layer": f"render/layers/{layer.shader}.glsl", "curve": f"render/{shader}.glsl"}
             vertex = "common/rects" if rects else FULLSCREEN
             self._passes[key] = Pass(

@@ -11,12 +11,15 @@ from app.render.ages import LATER, LeafAges
 from app.render.false_colour import Scale
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
-from app.render.resolve import BORDER, PLACES_WIDTH, DisplayTexels, Reference
+from app.render.resolve import BORDER, PLACES_WIDTH, DisplayTexels, Reference, declared
 from app.render.surface_mesh import SurfaceMesh
+from app.render.textured_mesh import TexturedMesh, textured_materials
+from app.render.tone_mapping import curve
 from app.scene.model import F64
 
 Rect = tuple[float, float, float, float]
 Part = tuple[int, int, int, int] | None
+SHARP = ("combined", "albedo")  # layers of what textures multiply
 NOWHERE: Rect = (-1e6, -1e6, -1e6, -1e6)
 
 
@@ -29,6 +32,10 @@ class Surfaces:
         self.mesh = SurfaceMesh(gpu, lightmap.pool)
         self._texels = DisplayTexels(gpu, lightmap, self._ages, BORDER[interpolation])
         self._others: DisplayTexels | None = None  # of a reference's light
+        textured = textured_materials(lightmap.scene)
+        self._textured = TexturedMesh(gpu, lightmap.pool, textured) if textured else None
+        self._light: dict[bool, DisplayTexels] = {}  # that falls on them, and that of a reference
+        self._textured_passes: dict[tuple[object, ...], Pass] = {}
         self._sides = True, False  # whether the solution and the reference were shown last
         self._passes = {(overlay, False, False): self._pass(overlay, bicubic=False) for overlay in (False, True)}
         self._blend: Callable[[Framebuffer], None] | None = None
@@ -66,6 +73,8 @@ class Surfaces:
         elif reference is None and self._others is not None:
             self._others.release()
             self._others = None
+            if True in self._light:
+                self._light.pop(True).release()
         if left is not None:
             self._texels, fresh = self._fitting(self._texels, display)
             now = whole or fresh or not self._sides[0]
@@ -83,6 +92,14 @@ class Surfaces:
         program, mesh = self._pass_of(overlay, bicubic), self.mesh.seen(clip_from_local)
         for textures, part in shown:
             program.draw(target, textures=textures, uniforms=uniforms, mesh=mesh, depth=True, scissor=part)
+        if self._textured is not None and layer_name in SHARP:
+            uniforms |= {"u_clip_from_local": uniform_matrix(clip_from_local)}
+            for (_, part), instead in zip(
+                shown, [True] * (right is not None) + [False] * (left is not None), strict=True
+            ):
+                self._draw_textured(
+                    target, layer_name, display, uniforms, part, instead, wanted, overlay=overlay, whole=whole
+                )
         if (sheer := self.mesh.sheer) is None:
             return
         program, cut_by = self._pass_of(overlay, bicubic, sheer=True), sheer.textures
@@ -111,19 +128,65 @@ class Surfaces:
 
         self._blend = blend
 
+    def _draw_textured(
+        self,
+        target: Framebuffer,
+        layer_name: str,
+        display: DisplayOptions,
+        uniforms: Mapping[str, object],
+        part: Part,
+        instead: bool,
+        wanted: Mapping[str, Any],
+        *,
+        overlay: bool,
+        whole: bool,
+    ) -> None:
+        """Materials with textures over what was drawn of them. instead: by the light of the reference."""
+        assert self._textured is not None
+        lit, bicubic = LAYER_SHADERS[layer_name].light is not None, display.interpolation == "bicubic"
+        shader, developed = curve(display, wanted["scale"], exposed=lit)
+        textures = self._shown
+        if lit:
+            light, fresh = self._fitting(self._light.get(instead), display, linear=True)
+            self._light[instead] = light
+            textures = light.resolve("irradiance", display, whole=whole or fresh, instead=instead, **wanted)
+        key = shader, overlay, bicubic, lit
+        if key not in self._textured_passes:
+            defines = {"OVERLAY": overlay, "BICUBIC": bicubic, "LIT": lit, "PLACES_WIDTH": PLACES_WIDTH}
+            slots = {"curve": f"render/{shader}.glsl"}
+            self._textured_passes[key] = Pass(
+                self._gpu, "render/textured", defines=defines, slots=slots, label="surfaces"
+            )
+        program, gain = self._textured_passes[key], developed["u_gain"]
+        self._gpu.ctx.depth_func = "<="
+        for number, mesh, pictures in self._textured.batches:
+            material = self.lightmap.scene.materials[number]
+            own = {"u_albedo": material.albedo, "u_emission": tuple(gain * c for c in material.emission)}
+            program.draw(
+                target,
+                textures=declared(program, textures | pictures),
+                uniforms=declared(program, {**uniforms, **developed, **own}),
+                mesh=mesh,
+                depth=True,
+                scissor=part,
+            )
+        self._gpu.ctx.depth_func = "<"
+
     def draw_blended(self, target: Framebuffer) -> None:
         """Those that are blended with what lies behind them, as ``draw`` drew the others, when all that is there."""
         if self._blend is not None:
             self._blend(target)
 
-    def _fitting(self, texels: DisplayTexels | None, display: DisplayOptions) -> tuple[DisplayTexels, bool]:
+    def _fitting(
+        self, texels: DisplayTexels | None, display: DisplayOptions, *, linear: bool = False
+    ) -> tuple[DisplayTexels, bool]:
         """These, or others of the size that is wanted; and whether they are new: a part of them would be black."""
         border = BORDER[display.interpolation]
         if texels is not None and texels.fits(border):
             return texels, False
         if texels is not None:
             texels.release()
-        return DisplayTexels(self._gpu, self.lightmap, self._ages, border), True
+        return DisplayTexels(self._gpu, self.lightmap, self._ages, border, linear=linear), True
 
     def draw_atlas(self, program: Pass, target: Framebuffer, *, turned: bool) -> None:
         """The virtual atlas with what was drawn last, all over ``target``; ``program`` is render/atlas. turned: u for v."""
@@ -172,6 +235,10 @@ class Surfaces:
         self._texels.release()
         if self._others is not None:
             self._others.release()
+        for light in self._light.values():
+            light.release()
+        if self._textured is not None:
+            self._textured.release()
         self.mesh.release()
 
 

@@ -55,6 +55,8 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "ALBEDO_TEXTURE": FLAG,
     "EMISSION_TEXTURE": FLAG,
     "OVERLAY": FLAG,
+    "LINEAR": FLAG,
+    "LIT": FLAG,
     "BICUBIC": FLAG,
     "FOLLOWS": FLAG,
     "BORDER": tuple(sorted(set(BORDER.values()))),

@@ -23,8 +23,9 @@ layout(location = 0) out vec4 out_colour;
 
 #include <layer>
 #include <curve>
+#include "render/shown.glsl"
 
-vec3 shown(vec3 colour) { return encode_srgb(develop(colour * u_gain)); }
+vec3 exposed(vec3 colour) { return shown(colour * u_gain); }
 
 vec3 own_or(vec3 otherwise, ivec2 texel_px) {
     return texelFetch(t_position_area, texel_px, 0).w > 0.0 ? layer_colour(texel_px) : otherwise;
@@ -49,7 +50,7 @@ vec3 border_texel(vec3 f, ivec2 slot, vec3 leaf, ivec2 inside, ivec2 other, vec3
         h[k] = vec3(0.0);
         for (int i = 0; i < 4; ++i) h[k] += 0.25 * own_or(f, slot * TILE + four + ivec2(i & 1, i >> 1));
     }
-    return shown(mix(c[0], c[1], pair - base)) + shown(mix(h[0], h[1], pair - base)) - shown(f);
+    return exposed(mix(c[0], c[1], pair - base)) + exposed(mix(h[0], h[1], pair - base)) - exposed(f);
 }
 #else
 // Between four texels of the other leaf: h beside a finer one. At a corner of a coarser one, from beyond its outermost texels, on the
@@ -59,7 +60,7 @@ vec3 border_texel(vec3 f, ivec2 slot, vec3 leaf, ivec2 inside, ivec2 other, vec3
     ivec2 first = other * TILE + ivec2(base);
     vec3 below = mix(own_or(f, first), own_or(f, first + ivec2(1, 0)), share.x);
     vec3 above = mix(own_or(f, first + ivec2(0, 1)), own_or(f, first + ivec2(1, 1)), share.x);
-    return shown(mix(below, above, share.y));
+    return exposed(mix(below, above, share.y));
 }
 #endif
 

@@ -10,10 +10,11 @@ layout(location = 0) out vec4 out_colour;
 #include <layer>
 // develop(rgb): linear Rec.709 of the screen, 0 to 1
 #include <curve>
+#include "render/shown.glsl"
 
 void main() {
     uint source = texelFetch(t_source, ivec2(gl_FragCoord.xy), 0).x;
     ivec2 texel_px = ivec2(source & 0xFFFFu, source >> 16);
     vec3 colour = source == NO_SOURCE ? vec3(0.0) : layer_colour(texel_px);
-    out_colour = vec4(encode_srgb(develop(colour * u_gain)), float(source != NO_SOURCE));
+    out_colour = vec4(shown(colour * u_gain), float(source != NO_SOURCE));
 }

@@ -13,6 +13,7 @@ layout(location = 0) out vec4 out_colour;
 
 #include <layer>
 #include <curve>
+#include "render/shown.glsl"
 
 // Bilinear among the texels that cover something; w: their weight.
 vec4 layer_at(vec2 uv) {
@@ -36,5 +37,5 @@ void main() {
     vec3 own = layer_colour(ivec2(source & 0xFFFFu, source >> 16));
     vec4 other = layer_at(v_other);
     vec3 colour = mix(own, other.rgb, other.w > 0.0 ? v_weight : 0.0);
-    out_colour = vec4(encode_srgb(develop(colour * u_gain)), 1.0);
+    out_colour = vec4(shown(colour * u_gain), 1.0);
 }

@@ -17,6 +17,8 @@ out vec4 v_uv;  // atlas texels: front, back; negative without texels
 flat out vec3 v_unlit_front;
 flat out vec3 v_unlit_back;
 
+invariant gl_Position;  // render/textured draws over it
+
 void main() {
     v_uv = vec4(in_uv_front, in_uv_back);
 #if OPACITY
