@@ -132,8 +132,10 @@ class View:
         """What to say where all light has been distributed and none of it is where the camera sees anything. Looked up once for a
         solution; it becomes the session's message, too."""
         session = self.session
+        if not session.opened or not session.run.converged:
+            return None
         state = session.lightmap, session.solver.issued
-        if not session.opened or not session.run.converged or state == self._looked_at:
+        if state == self._looked_at:
             return None
         self._looked_at = state
         balance = session.run.energy

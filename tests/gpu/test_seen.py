@@ -36,6 +36,7 @@ def room_with(*parts: tuple[Mesh, int]) -> Scene:
 def opened(gpu: Gpu, scene: Scene) -> View:
     session = Session(gpu, atlas=AtlasOptions(texels=3000))
     view = View(session)
+    assert view.look_for_light() is None, "nothing is open: the window asks in every frame"
     session.open_now(scene)
     return view
 
