@@ -92,22 +92,24 @@ class Surfaces:
         program, mesh = self._pass_of(overlay, bicubic), self.mesh.seen(clip_from_local)
         for textures, part in shown:
             program.draw(target, textures=textures, uniforms=uniforms, mesh=mesh, depth=True, scissor=part)
+        sheer = self.mesh.sheer
+        if sheer is not None:
+            program, cut_by = self._pass_of(overlay, bicubic, sheer=True), sheer.textures
+            if sheer.cut_out is not None:
+                for textures, part in shown:
+                    bound = textures | cut_by
+                    program.draw(
+                        target, textures=bound, uniforms=uniforms, mesh=sheer.cut_out, depth=True, scissor=part
+                    )
         if self._textured is not None and layer_name in SHARP:
-            uniforms |= {"u_clip_from_local": uniform_matrix(clip_from_local)}
             for (_, part), instead in zip(
                 shown, [True] * (right is not None) + [False] * (left is not None), strict=True
             ):
                 self._draw_textured(
                     target, layer_name, display, uniforms, part, instead, wanted, overlay=overlay, whole=whole
                 )
-        if (sheer := self.mesh.sheer) is None:
+        if sheer is None:
             return
-        program, cut_by = self._pass_of(overlay, bicubic, sheer=True), sheer.textures
-        if sheer.cut_out is not None:
-            for textures, part in shown:
-                program.draw(
-                    target, textures=textures | cut_by, uniforms=uniforms, mesh=sheer.cut_out, depth=True, scissor=part
-                )
 
         def blend(target: Framebuffer) -> None:
             mesh = sheer.from_far_to_near(clip_from_local)
@@ -158,7 +160,7 @@ class Surfaces:
                 self._gpu, "render/textured", defines=defines, slots=slots, label="surfaces"
             )
         program, gain = self._textured_passes[key], developed["u_gain"]
-        self._gpu.ctx.depth_func = "<="
+        self._gpu.ctx.depth_func = "=="  # where something is cut out, not over what is seen through it
         for number, mesh, pictures in self._textured.batches:
             material = self.lightmap.scene.materials[number]
             own = {"u_albedo": material.albedo, "u_emission": tuple(gain * c for c in material.emission)}

@@ -1,7 +1,8 @@
-"""The opaque triangles whose materials have textures, a mesh for each material, and those textures with mip-maps.
+"""The triangles whose materials have textures or whose corners have colours, a mesh for each material, and those textures with
+mip-maps.
 
 They are drawn over the same triangles as display texels show them, at equal depth: a pixel then has the albedo and the emission
-of the texture where it is, and of the texels only the light. What is not opaque stays as sharp as its texels.
+of the texture where it is, and of the texels only the light. What is blended stays as sharp as its texels.
 """
 
 from __future__ import annotations
@@ -83,10 +84,11 @@ class TexturedMesh:
 
 
 def textured_materials(scene: Scene) -> list[int]:
-    """Numbers of those that are used, opaque, and have a picture to show."""
+    """Numbers of those that are used, not blended, and have a picture or colours to show."""
     return [int(m) for m in np.unique(scene.material_ids) if _is_textured(scene, scene.materials[m])]
 
 
 def _is_textured(scene: Scene, material: Material) -> bool:
     pictures = (material.albedo_texture, material.emission_texture)
-    return material.opaque and any(p is not None and texture_coordinates(scene, p) is not None for p in pictures)
+    shows = any(p is not None and texture_coordinates(scene, p) is not None for p in pictures)
+    return (material.opaque or material.opacity_cutoff is not None) and (shows or scene.colours is not None)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from boxes import even, put
@@ -48,17 +50,22 @@ def picture(gpu: Gpu, lightmap: Lightmap, **display: object) -> NDArray[np.float
     return read
 
 
-def square(gpu: Gpu, **material: object) -> Lightmap:
-    scene = with_uv(quads_scene([UNIT_SQUARE], [Material("m", **material)], [0]))
+def square(gpu: Gpu, *, colours: NDArray[np.float32] | None = None, **material: object) -> Lightmap:
+    scene = replace(with_uv(quads_scene([UNIT_SQUARE], [Material("m", **material)], [0])), colours=colours)
     return Lightmap.of(gpu, scene, parametrize(scene, texels=60))
 
 
+def middles() -> NDArray[np.float64]:
+    """(SIZE², 2) places u, v of the picture's pixels: v = 0 is at the square's lower edge."""
+    along = (np.arange(SIZE) + 0.5) / SIZE
+    return np.stack(np.meshgrid(along, along[::-1]), -1).reshape(-1, 2)
+
+
 def looked_up(texture: Texture) -> NDArray[np.float64]:
-    """At the middles of the picture's pixels: v = 0 is at the square's lower edge."""
-    middles = (np.arange(SIZE) + 0.5) / SIZE
-    at = np.stack(np.meshgrid(middles, middles[::-1]), -1).reshape(-1, 2)
+    """At the middles of the picture's pixels."""
+    at = middles()
     at = at @ texture.uv_transform[:, :2].T + texture.uv_transform[:, 2]
-    return look_up(texture, texture.pixels, at).reshape(SIZE, SIZE, 3)
+    return look_up(texture, texture.pixels, at).reshape(SIZE, SIZE, -1)
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -82,6 +89,42 @@ def test_light_falls_on_the_pixels_of_albedo_and_emission(gpu: Gpu, interpolatio
     seen = picture(gpu, lightmap, interpolation=interpolation, exposure=ev)
     light = looked_up(WAYS["nearest"]) * H / np.pi + looked_up(glow) * L
     assert np.abs(seen - encode_srgb(np.minimum(2**ev * light, 1.0))).max() < STEP
+    lightmap.release()
+
+
+@pytest.mark.parametrize("way", [None, "nearest"])
+def test_colours_of_corners_are_as_sharp_as_their_triangles(gpu: Gpu, way: str | None) -> None:
+    """Linear in each triangle, with and without a texture that they multiply."""
+    corners = np.array([(1.0, 0.2, 0.2), (0.2, 1.0, 0.2), (0.2, 0.2, 1.0), (0.8, 0.8, 0.8)], np.float32)
+    texture = None if way is None else WAYS[way]
+    lightmap = square(gpu, albedo=(0.9,) * 3, albedo_texture=texture, colours=corners[[(0, 1, 2), (0, 2, 3)]])
+    u, v = middles().T[..., None]
+    a, b, c, d = corners
+    colour = np.where(u > v, a + (u - v) * (b - a) + v * (c - a), a + u * (c - a) + (v - u) * (d - a))
+    right = encode_srgb(0.9 * colour.reshape(SIZE, SIZE, 3) * (1.0 if texture is None else looked_up(texture)))
+    wrong = np.abs(picture(gpu, lightmap, layer="albedo") - right) > STEP
+    assert not wrong[(u != v).reshape(SIZE, SIZE)].any()
+    lightmap.release()
+
+
+def test_what_is_cut_out_is_sharp_and_shows_what_lies_behind(gpu: Gpu) -> None:
+    """As sharp as its texture, and nothing of it where it is not."""
+    holes = np.zeros((CELLS, CELLS, 1), np.float32)
+    holes[::3, ::2] = 1.0
+    board = replace(WAYS["nearest"], pixels=CHECKER[::-1].copy())
+    cut = Material("cut", (1.0,) * 3, albedo_texture=board, opacity_texture=Texture("holes", holes, bilinear=False))
+    materials = [
+        Material("wall", (1.0,) * 3, albedo_texture=WAYS["nearest"], double_sided=True),
+        replace(cut, opacity_cutoff=0.5, double_sided=True),
+    ]
+    near = 1e-3  # so that both squares fill the picture
+    behind_the_eye = UNIT_SQUARE[::-1] + np.array([0, 0, 4])  # a side that nothing lies before has no texels
+    quads = [UNIT_SQUARE, UNIT_SQUARE + np.array([0, 0, near]), behind_the_eye]
+    scene = with_uv(quads_scene(quads, [*materials, Material("other")], range(3)))
+    lightmap = Lightmap.of(gpu, scene, parametrize(scene, texels=300))
+    there = looked_up(Texture("holes", holes, bilinear=False))[..., :1] > 0.5
+    right = encode_srgb(np.where(there, looked_up(board), looked_up(WAYS["nearest"])))
+    assert np.abs(picture(gpu, lightmap, layer="albedo") - right).max() < STEP
     lightmap.release()
 
 
