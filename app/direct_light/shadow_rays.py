@@ -330,15 +330,16 @@ class DirectLight:
         for lamps in sets:
             self.add(lamps)
 
-    def catch_up(self, first: int) -> Iterator[None]:
-        """The shadow rays to sets that came later, as many as the others have had on average, or ``first``, in parts."""
-        wanted = int(self.count) or first
+    def catch_up(self, wanted: int) -> Iterator[None]:
+        """The shadow rays to sets that came later, until they have had so many on average, in parts."""
+        texels = self._lightmap.pool.slot_texels
         for lit in self.sets:
             if not lit.passes.any():
                 self._look_unoccluded(lit, self._everywhere)
-                for _ in range(max(wanted // PASS, 1)):
-                    self._shoot_at(lit, np.flatnonzero(self._lightmap.pool.slot_texels), "add")
-                    yield
+            missing = wanted - PASS * float(lit.passes @ texels) / max(int(texels.sum()), 1)
+            for _ in range(max(int(missing // PASS), 0 if lit.passes.any() else 1)):
+                self._shoot_at(lit, np.flatnonzero(texels), "add")
+                yield
 
     def sum(self, scene: Scene, slots: NDArray[np.int64] | None = None) -> None:
         """Bring ``light`` up to date, with what the lamps emit now; in these slots alone where they are given."""

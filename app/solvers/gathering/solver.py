@@ -43,6 +43,7 @@ CHANGES_PER_RAY = 16  # leaves that split or merge at once: bounded work for a f
 FIRST_LOOK = 32  # rays, after which leaves are looked at: what few rays say is noise
 LOOK_AGAIN = 2  # times as many rays, when leaves did not change at the last look
 SHADOW_RAYS = 4  # from each texel to each set of lamps, for FIRST rays
+SOON = 16  # shadow rays to what is new, before an edit is first shown
 FIRST_STEPS = 2  # of the bounces, before an edit is first shown
 SHADOW_COST = 0.5  # of a shadow ray, beside a ray: it ends at the first hit
 MOST_SHADOW_RAYS = 4  # to each set, for a ray
@@ -180,12 +181,13 @@ class Gathering:
 
     def _follow_edit(self) -> Generator[None, None, int]:
         """The light of other materials, along the rays that are there: soon, along some of them, and once no more edits come
-        along all. No ray is traced, but to lamps that were off."""
+        along all. No ray is traced, but to lamps that were off, and to another sky."""
         while self._edited:
             self._edited = False
+            usual = int(self.direct.count) or SHADOW_RAYS * self.issued // FIRST
             self._follow_lamps()
             for direct in self._directs:
-                yield from direct.catch_up(SHADOW_RAYS * self.issued // FIRST)
+                yield from direct.catch_up(min(SOON, usual))
                 direct.sum(self.lightmap.scene)
             few = min(BATCH, self.issued)
             yield from self.bounces.solve(self.hits, self.at_points.light, few, FIRST_STEPS)
@@ -193,10 +195,21 @@ class Gathering:
             self._show(few)
             yield
             if not self._edited:
+                yield from self._catch_up(usual)
+            if not self._edited:
                 yield from self._solve(from_nothing=True, begun=FIRST_STEPS)
                 self._show(self.issued)
         self._judge()
         return 0
+
+    def _catch_up(self, wanted: int) -> Iterator[None]:
+        """So many shadow rays to lamps that have had few, or until another edit comes."""
+        for direct in self._directs:
+            for _ in direct.catch_up(wanted):
+                yield
+                if self._edited:
+                    break
+            direct.sum(self.lightmap.scene)
 
     def _judge(self) -> None:
         """Let the GPU say how noisy the light that is shown is."""

@@ -50,6 +50,7 @@ FADE, FADED = 0.75, 16  # share of what was shown that stays in each picture aft
 FLUSH_PARTS = 3  # of the pass over the matrix that all updates wait for: whole, it takes a third of a frame
 MOST_ALBEDO = 0.9999  # in a closed room of 1 light never ends, and its matrix has no inverse
 NOTED = 0.02  # of the light, that the matrix is off by, from which on it is said
+SOON = 16  # shadow rays to what is new, before an edit is shown; the rest comes with the next pieces of work
 BATCH = 64
 
 
@@ -165,7 +166,7 @@ class Local:
         goes_on, self._edited = self._editing, False
         self._editing = True
         self.direct.follow(self.lightmap.scene)
-        yield from self.direct.catch_up(self.options.shadow_rays)
+        yield from self.direct.catch_up(min(SOON, self.options.shadow_rays))
         tiles = self._tiles.in_turn() if goes_on else self._tiles.all
         self.direct.sum(self.lightmap.scene, tiles)
         self._lit, self._all_known = False, not goes_on
