@@ -165,10 +165,10 @@ def _whole_rows(entry_bytes: int, entries: int) -> int:
 def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
-    if value is None or value == []:
+    if value is None:
         return "none"
     if isinstance(value, list):
-        return ", ".join(_text(v) for v in value)
+        return ", ".join(_text(v) for v in value) or "none"
     return f"{value:,}" if isinstance(value, int) else str(value)
 
 

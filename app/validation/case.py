@@ -274,7 +274,7 @@ class HardCase:
                 position=surfaces.position[covered],
                 normal=surfaces.normal[covered],
                 area=surfaces.area[covered],
-                object=scene.object_ids[lightmap.charts.face_triangle[surfaces.face[covered]]],
+                object=lightmap.pool.scene.object_ids[lightmap.charts.face_triangle[surfaces.face[covered]]],
                 H=lightmap.irradiance()[covered][:, 0].astype(np.float64),
                 energy=energy,
                 work=done,

@@ -40,7 +40,8 @@ def scene_of(name: str, pieces: Iterable[Piece]) -> Scene:
     objects = list(dict.fromkeys(piece[0] for piece in pieces))
     materials = list(dict.fromkeys(piece[2] for piece in pieces))
     parts = [Part(m.positions, m.triangles, objects.index(o), materials.index(paint)) for o, m, paint in pieces]
-    return validate(name, name, parts, objects, materials)
+    # its albedos too, which files may not have above MOST_ALBEDO
+    return validate(name, name, parts, objects, materials).with_materials(tuple(materials))
 
 
 def walls(

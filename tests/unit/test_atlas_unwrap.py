@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import platformdirs
 import pytest
 from atlas_scenes import TURN, box_room, face_areas, moved, own_cache, scene_of, split_grid
 
@@ -90,11 +89,11 @@ def test_a_second_run_reads_the_cache(monkeypatch: pytest.MonkeyPatch) -> None:
         _unwrap(scene_of([shapes.icosphere(0.5123, 2).moved(0, 1, 0), DRUM]))
 
 
-def test_a_damaged_cache_file_is_made_again() -> None:
+def test_a_damaged_cache_file_is_made_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(tmp_path))
     scene = scene_of([shapes.icosphere(0.5456, 2)])
     first = _unwrap(scene)
-    folder = Path(platformdirs.user_cache_dir("glowtree")) / "unwrap"
-    newest = max(folder.glob("*.npz"), key=lambda p: p.stat().st_mtime_ns)
+    (newest,) = (tmp_path / "unwrap").glob("*.npz")
     newest.write_bytes(newest.read_bytes()[:100])
     assert (_unwrap(scene).uv == first.uv).all()
     assert newest.stat().st_size > 100
