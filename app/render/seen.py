@@ -102,7 +102,7 @@ def _rectangles(corners: F64, half: F64, size: Ints) -> tuple[Ints, Ints]:
 
 def _met(ray: F64, corners: F64) -> tuple[F64, F64]:
     """How far along rays (n, 3) from the origin their triangles (n, 3, 3) are, infinite where they are missed, and the weights of
-    the corners (n, 3) [Möller97]."""
+    the corners (n, 3) [Moller97]."""
     a, b, c = np.moveaxis(corners, 1, 0)
     parts = np.stack([np.einsum("nk,nk->n", ray, np.cross(*edge)) for edge in ((b, c), (c, a), (a, b))], 1)
     total = parts.sum(1)

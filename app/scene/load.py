@@ -20,6 +20,7 @@ from app.scene.sky import Sky
 from app.scene.validate import one_line
 
 LOADERS = {**MESH_LOADERS, ".toml": load_authored}
+OWN_SKY = "the scene has a sky of its own: --sky and --sun are for scenes that have none"
 NO_LIGHT = "nothing in the scene emits light: --light adds a ceiling light, --sky a sky"
 
 
@@ -41,8 +42,12 @@ def load_scene(
         raise SceneError(error.source, one_line(error.reason)) from error
     if not scene.cameras:
         scene = dataclasses.replace(scene, cameras=(default_camera(scene),))
-    if scene.sky is None and sky is not None:
-        scene = scene.with_sky(sky)
+    if sky is not None:
+        scene = (
+            scene.with_sky(sky)
+            if scene.sky is None
+            else dataclasses.replace(scene, warnings=(*scene.warnings, OWN_SKY))
+        )
     if not scene.emits:
         if default_light:
             return with_ceiling_light(scene)

@@ -66,6 +66,11 @@ class Material:
         return self.opacity >= 1.0 and self.opacity_texture is None
 
     @property
+    def blended(self) -> bool:
+        """Whether light passes by a share, and not where it is cut out."""
+        return not self.opaque and self.opacity_cutoff is None
+
+    @property
     def textures(self) -> list[Texture]:
         return [t for t in (self.albedo_texture, self.emission_texture, self.opacity_texture) if t is not None]
 

@@ -200,3 +200,11 @@ def test_flags_that_are_none(flags: tuple[str, str], capsys: pytest.CaptureFixtu
     with pytest.raises(SystemExit) as ended:
         build_parser().parse_args(["shot", "x", "-o", "y", *flags])
     assert ended.value.code == 2 and capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_scene_keeps_its_own_sky_and_says_so(tmp_path: Path) -> None:
+    path = written(tmp_path, "a.toml", FLOOR + '[sky]\nkind = "uniform"\n')
+    scene = load_scene(path, sky=Sky("clear", sun=Sun(0, 30)))
+    assert scene.sky is not None and scene.sky.kind == "uniform"
+    assert any("a sky of its own" in warning for warning in scene.warnings)
+    assert not load_scene(path).warnings

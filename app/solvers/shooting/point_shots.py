@@ -54,7 +54,7 @@ class PointShots:
         self._gpu, self._lightmap, self._occluders = gpu, lightmap, occluders
         self._receivers, self._shooters, self._ledger = receivers, shooters, ledger
         self._lights = gpu.texture((4, BATCH), 4, "f4")
-        blended = any(not m.opaque and m.opacity_cutoff is None for m in lightmap.scene.materials)
+        blended = any(m.blended for m in lightmap.scene.materials)
         self._apart = APART * lightmap.space.scale if blended else 0.0
         self._see: See | None = None
         self._given: Sources = {}

@@ -52,7 +52,7 @@ class SkyShots:
         self._depth = gpu.depth_texture(self._items.size)
         self._target = gpu.target(self._items, depth=self._depth)
         self._shots = gpu.texture((ROWS, BATCH), 4, "f4")
-        blended = any(not m.opaque and m.opacity_cutoff is None for m in lightmap.scene.materials)
+        blended = any(m.blended for m in lightmap.scene.materials)
         self._apart = APART if blended else 0.0
         self._given = self._wanted = self._sky = directions_of(None)
         self._at = self.made = 0
