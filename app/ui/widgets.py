@@ -199,12 +199,13 @@ def section(text: str) -> None:
 
 
 def fold(text: str, *, opened: bool = True) -> bool:
-    """A headline that folds away what is below it; whether that is shown. opened: at first."""
+    """A headline that folds away what is below it; whether that is shown. opened: at first. A button beside it may have the same
+    words."""
     imgui.set_next_item_open(opened, imgui.Cond_.once)
     clear = imgui.ImVec4(0, 0, 0, 0)
     imgui.push_style_color(imgui.Col_.header, clear)
     imgui.push_style_var(imgui.StyleVar_.frame_padding, imgui.ImVec2(0, imgui.get_style().frame_padding.y))
-    shown = imgui.collapsing_header(text)
+    shown = imgui.collapsing_header(f"{text}###section {text}")
     imgui.pop_style_var()
     imgui.pop_style_color()
     return shown

@@ -101,6 +101,7 @@ class FakeSession:
         self.scene = SimpleNamespace(
             materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras, sky=None, lights=()
         )
+        self.scene.bounds = np.zeros(3), np.ones(3)
         self.unedited = self.scene
         self.charts = SimpleNamespace(density=40.0, tile=16, warnings=(), size=(160, 96))
         self.lightmap = SimpleNamespace(space=FakeSpace())
@@ -184,6 +185,9 @@ class FakeSession:
         rates = {"remaining": 0.0318, "seconds": 0.3, "per_second": 212.0, "converged": False}
         rates |= {"edit_work": None, "fresh_work": None}
         return SimpleNamespace(**energies, **counts, **rates)
+
+    def share_done(self, stop: object) -> float:
+        return 0.25
 
     def poll(self) -> None:
         pass

@@ -36,7 +36,9 @@ def draw(view: View, state: State) -> None:
     imgui.end_child()
     index = min(state.light, len(lights) - 1)
     low, high = view.session.scene.bounds
+    imgui.push_id("light")
     edited = _editor(lights[index], float(math.dist(low, high)))
+    imgui.pop_id()
     if edited != lights[index]:
         state.act(lambda: view.session.set_lights((*lights[:index], edited, *lights[index + 1 :])))
 

@@ -118,7 +118,9 @@ def _row(state: State, index: int, material: Any) -> None:
 
 def _editor(view: View, state: State, material: Any) -> None:
     index = state.material
+    imgui.push_id("material")
     edited = dataclasses.replace(material, albedo=_albedo(material), emission=_emission(state, material))
+    imgui.pop_id()
     if (edited.albedo, edited.emission) != (material.albedo, material.emission):
         state.act(lambda: view.session.set_material(index, edited))
     notes = [f"{word} texture" for word in ("albedo", "emission") if getattr(material, f"{word}_texture") is not None]

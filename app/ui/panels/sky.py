@@ -26,9 +26,11 @@ def draw(view: View, state: State) -> None:
     if came is None or not widgets.fold("Sky"):
         return
     sky = view.session.edited_scene.sky
+    imgui.push_id("sky")
     edited = _kind(sky, came)
     if edited is not None:
         edited = _sun(_colour(edited))
+    imgui.pop_id()
     if edited is not sky:
         state.act(lambda: view.session.set_sky(edited))
 
