@@ -111,6 +111,7 @@ def apply(scale: float = 1.0) -> None:
     style.grab_min_size = 7.0
     style.docking_separator_size = 2.0
     style.window_menu_button_position = imgui.Dir.none
+    style.color_button_position = imgui.Dir.left
     style.scale_all_sizes(scale)
     style.font_scale_dpi = scale
     _style_plots()

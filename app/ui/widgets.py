@@ -19,7 +19,6 @@ LABEL_SHARE = 0.44  # of the panel's width
 WIDE_SPAN = 1e6  # a slider over more than this cannot be set: drag instead
 SLIDER = int(imgui.SliderFlags_.always_clamp | imgui.SliderFlags_.no_round_to_format)
 LOGARITHMIC = int(imgui.SliderFlags_.logarithmic)
-PICKER = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label)
 DRAG_SPEED = 0.01  # of the value per pixel
 TOOLTIP_EM = 22.0
 TOOLTIP = int(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)

@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 
 from app.render.false_colour import WHITE_EFFICACY
 from app.scene.lights import Light
-from app.ui import theme, widgets
+from app.ui import colour, theme, widgets
 from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
@@ -82,10 +82,9 @@ def _editor(light: Light, size: float) -> Light:
 
 def _intensity(light: Light) -> RGB:
     """Colour × strength, in W/sr or W/m²."""
-    strength = max(light.intensity)
-    colour = [c / strength for c in light.intensity] if strength > 0 else [1.0, 1.0, 1.0]
+    tint, strength = colour.tint_and_strength(light.intensity)
     widgets.labelled("Strength")
-    recoloured, value = imgui.color_edit3("##colour", colour, widgets.PICKER)
+    new_tint = colour.edit_tint("##colour", tint)
     imgui.same_line()
     imgui.set_next_item_width(-1)
     unit, flags = "W/m²" if light.from_afar else "W/sr", widgets.SLIDER | widgets.LOGARITHMIC
@@ -99,11 +98,9 @@ def _intensity(light: Light) -> RGB:
             f"Radiant intensity; in all {power} W. About {widgets.number(lumens, 3)} cd, "
             f"{widgets.number(light.solid_angle * lumens, 3)} lm"
         )
-    if not (recoloured or scaled) or now != now:
+    if (new_tint == tint and not scaled) or now != now:
         return light.intensity
-    top = max(value) or 1.0
-    red, green, blue = (now * max(float(c), 0.0) / top for c in value)
-    return (red, green, blue)
+    return colour.rgb(now * c for c in new_tint)
 
 
 def _vector(label: str, value: RGB, step: float, text: str) -> RGB:

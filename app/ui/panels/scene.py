@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from imgui_bundle import imgui
 
 from app.lightmap.options import QUADTREE
-from app.render.tone_mapping import encode_srgb
 from app.scene.model import MOST_ALBEDO
-from app.ui import theme, widgets
+from app.ui import colour, theme, widgets
 from app.ui.panels import lights, sky
 from app.ui.state import RGB, State
 
@@ -21,7 +18,7 @@ if TYPE_CHECKING:
 
 TALL_EM = 53.0  # a window in which the whole panel has room
 ROWS_SHOWN = 5  # of the material list before it scrolls
-SWATCH = int(imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop | imgui.ColorEditFlags_.no_border)
+WHITE = (1.0, 1.0, 1.0)
 STRONGEST = 1e5  # W/(sr m²), end of the slider: the sun's disc is brighter, lamps are not
 
 
@@ -105,7 +102,7 @@ def _list(view: View, state: State) -> None:
 def _row(state: State, index: int, material: Any) -> None:
     imgui.push_id(index)
     side = imgui.get_text_line_height()
-    imgui.color_button("##albedo", imgui.ImVec4(*display_colour(material.albedo), 1), SWATCH, imgui.ImVec2(side, side))
+    colour.swatch("##albedo", material.albedo, side)
     imgui.same_line()
     if imgui.selectable(material.name or f"material {index}", state.material == index)[0]:
         state.material = index
@@ -142,21 +139,19 @@ def _flicker(view: View, state: State) -> None:
 def _albedo(material: Any) -> RGB:
     widgets.labelled("Albedo ρ")
     imgui.set_next_item_width(-1)
-    changed, value = imgui.color_edit3("##albedo", list(material.albedo), imgui.ColorEditFlags_.float)
-    widgets.tooltip(f"Diffuse reflectance, linear Rec.709, 0 to {MOST_ALBEDO:g}")
-    return rgb(min(max(float(v), 0.0), MOST_ALBEDO) for v in value) if changed else material.albedo
+    edited = colour.edit_colour("##albedo", material.albedo, code=True, most=MOST_ALBEDO)
+    widgets.tooltip(
+        f"The share of light that it reflects: ρ {widgets.triple(material.albedo, 3)} of red, green, blue. The code is of what "
+        "the screen shows (sRGB), as everywhere"
+    )
+    return edited
 
 
 def _emission(state: State, material: Any) -> RGB:
     """Colour × strength. A lamp that is dimmed to nothing keeps its colour in the state."""
-    strength = max(material.emission)
-    index = state.material
-    colour: RGB = state.emission_colours.get(index, (1.0, 1.0, 1.0))
-    if strength > 0:
-        colour = rgb(v / strength for v in material.emission)
-        state.emission_colours[index] = colour
+    tint, strength = colour.tint_and_strength(material.emission, state.emission_colours.get(state.material, WHITE))
     widgets.labelled("Emission L")
-    recoloured, value = imgui.color_edit3("##emission", list(colour), widgets.PICKER)
+    new_tint = state.emission_colours[state.material] = colour.edit_tint("##emission", tint)
     imgui.same_line()
     imgui.set_next_item_width(-1)
     flags = widgets.SLIDER | widgets.LOGARITHMIC
@@ -164,19 +159,6 @@ def _emission(state: State, material: Any) -> RGB:
     widgets.tooltip("Radiance: colour times strength. Exitance is π times this. Right-click: off")
     if imgui.is_item_hovered() and imgui.is_mouse_clicked(1):
         scaled, new_strength = True, 0.0
-    if not (recoloured or scaled) or new_strength != new_strength:
+    if (new_tint == tint and not scaled) or new_strength != new_strength:
         return material.emission
-    top = max(value) or 1.0
-    if recoloured:
-        state.emission_colours[index] = colour = rgb(max(float(v), 0.0) / top for v in value)
-    return rgb(v * new_strength for v in colour)
-
-
-def rgb(values: Iterable[float]) -> RGB:
-    red, green, blue = values
-    return red, green, blue
-
-
-def display_colour(linear: RGB) -> RGB:
-    """Linear Rec.709 as a screen shows it."""
-    return rgb(encode_srgb(np.array(linear)).tolist())
+    return colour.rgb(v * new_strength for v in new_tint)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from imgui_bundle import imgui
 
 from app.scene.sky import DEFAULT_SUN, LEAST_TURBIDITY, MOST_TURBIDITY, Sky, Sun
-from app.ui import widgets
-from app.ui.state import RGB, State
+from app.ui import colour, widgets
+from app.ui.state import State
 
 if TYPE_CHECKING:
     from app.session.view import View
@@ -58,15 +58,13 @@ def _kind(sky: Sky | None, came: Sky) -> Sky | None:
 
 def _colour(sky: Sky) -> Sky:
     widgets.labelled("Strength")
-    colour = _changed(imgui.color_edit3, "##sky colour", list(sky.colour), widgets.PICKER)
+    tint = colour.edit_colour("##sky colour", sky.colour)
     imgui.same_line()
     imgui.set_next_item_width(-1)
     flags = widgets.SLIDER | widgets.LOGARITHMIC
     strength = _changed(imgui.slider_float, "##sky strength", sky.strength, 0.0, STRONGEST, "%.3g", flags)
     widgets.tooltip("Multiplies all light of the sky, and of its sun")
-    if colour is not None:
-        red, green, blue = (max(float(v), 0.0) for v in colour)
-        tint: RGB = (red, green, blue)
+    if tint != sky.colour:
         sky = dataclasses.replace(sky, colour=tint)
     return sky if strength is None else dataclasses.replace(sky, strength=strength)
 
