@@ -10,6 +10,7 @@ from imgui_bundle import imgui, implot
 
 from app.ui import keys, layout, navigation, overlays, theme
 from app.ui.file_dialog import FileDialog
+from app.ui.quit_dialog import quit_dialog
 from app.ui.state import Legend, Request, State
 
 if TYPE_CHECKING:
@@ -161,6 +162,7 @@ class Ui:
         overlays.loading_overlay(view.session.on_its_way)
         overlays.toasts(view, state, seconds)
         overlays.help_overlay(state)
+        quit_dialog(view, state)
 
     def _open_files(self, view: View) -> None:
         if self.state.ask_for_file:

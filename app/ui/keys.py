@@ -78,16 +78,20 @@ def _open(view: View, state: State) -> None:
     state.ask_for_file = True
 
 
+def _quit(view: View, state: State) -> None:
+    state.ask_to_quit = True
+
+
 def _escape(view: View, state: State) -> None:
-    """Close what is open above the view, or stop what is on its way; with nothing left, quit."""
+    """Close what is open above the view, else stop what is on its way, else drop what is picked. It never quits."""
     if state.show_help:
         state.show_help = False
-        return
-    if view.session.on_its_way is not None:
+    elif view.session.on_its_way is not None:
         view.session.on_its_way.cancel()
-        if view.session.opened:
-            return
-    state.requests.append(Request.QUIT)
+    elif state.flight is not None:
+        state.flight = None
+    else:
+        state.picked = None
 
 
 SHORTCUTS = (
@@ -103,15 +107,16 @@ SHORTCUTS = (
     Shortcut("V", "split view: solution and reference", Key.v, _split, needs_scene=True),
     Shortcut("X", "error heat map on and off", Key.x, _error, needs_scene=True),
     Shortcut("Ctrl+O", "open a scene", Key.o, _open, control=True),
-    Shortcut("Esc", "close what is open, stop loading, else quit", Key.escape, _escape),
+    Shortcut("Ctrl+Q", "quit; asks where a long solve would be lost", Key.q, _quit, control=True, while_typing=True),
+    Shortcut("Esc", "close what is open, stop loading, drop what is picked", Key.escape, _escape),
 )
 
 POINTER = (
-    ("Click", "inspect the texel"),
+    ("Click", "inspect the texel; beside all surfaces: drop it"),
     ("Left drag", "orbit, or move the line of a split view"),
     ("Right or middle drag", "pan"),
     ("Wheel", "nearer and farther"),
-    ("W A S D Q E", "fly; Shift is faster, Ctrl slower"),
+    ("W A S D Q E", "fly; Shift is faster, Alt slower"),
     ("Drop a file", "open it; an .exr as a reference"),
 )
 

@@ -23,7 +23,7 @@ TURN_PER_VIEW = math.pi  # orbit angle for a drag over the view's height [rad]
 DOLLY_PER_NOTCH = 0.88  # factor on the distance for one notch of the wheel
 FLY_SPEED = 0.4  # scene radii per second, but
 FASTEST = 5.0  # m/s at most: one walks through a large world
-FAST, SLOW = 4.0, 0.25  # with Shift, with Ctrl
+FAST, SLOW = 4.0, 0.25  # with Shift, with Alt
 FOCUS_SHARE = 0.15  # of the scene's radius fills the view after a focus on a point
 FOCUS_SECONDS = 0.35
 REFRESH_SECONDS = 0.25  # between two looks at the picked texel while light is being shot
@@ -68,12 +68,14 @@ def _drag(view: View, state: State, x: float, y: float, height: float) -> None:
 
 
 def _fly(view: View, state: State, io: Any, seconds: float) -> bool:
-    """Whether a key of flight is held."""
+    """Whether a key of flight is held; with Ctrl it is a command."""
+    if io.key_ctrl or io.key_super:
+        return False
     step = [float(imgui.is_key_down(plus)) - float(imgui.is_key_down(minus)) for plus, minus in FLY]
     if any(step):
         state.flight = None
         pace = min(FLY_SPEED * view.session.lightmap.space.scale, FASTEST)
-        pace *= FAST if io.key_shift else SLOW if io.key_ctrl else 1.0
+        pace *= FAST if io.key_shift else SLOW if io.key_alt else 1.0
         view.camera.fly(*(s * pace * seconds for s in step))
     return any(step)
 

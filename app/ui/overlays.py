@@ -49,8 +49,8 @@ def menu_bar(view: View, state: State) -> None:
         if imgui.menu_item(f"{ICONS.ICON_FA_CAMERA}  Screenshot", "F12", False)[0]:
             state.requests.append(Request.SCREENSHOT)
         imgui.separator()
-        if imgui.menu_item("Quit", "Esc", False)[0]:
-            state.requests.append(Request.QUIT)
+        if imgui.menu_item("Quit", "Ctrl+Q", False)[0]:
+            state.ask_to_quit = True
         imgui.end_menu()
     if imgui.begin_menu("View"):
         _view_menu(view, state)

@@ -94,6 +94,7 @@ class State:
     show_help: bool = False
     ask_for_file: bool = False
     ask_for_reference: bool = False
+    ask_to_quit: bool = False
     hidden_panels: set[str] = field(default_factory=set)
     docked: set[str] = field(default_factory=set)
     rebuild_layout: bool = False

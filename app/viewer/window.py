@@ -144,7 +144,7 @@ def _open(size: tuple[int, int], vsync: bool) -> Any:
     except Exception as error:  # pyglet, X11, GLX and moderngl each raise their own
         hint = "without a screen, use 'glowtree shot' or 'glowtree bake'"
         raise UserError(f"no window with OpenGL {GL_VERSION[0]}.{GL_VERSION[1]}: {_reason(error)}; {hint}") from None
-    window.exit_key = None  # Esc first closes what lies over the view
+    window.exit_key = None  # Esc closes what lies over the view
     window.fullscreen_key = None
     activate_context(window=window)
     return window
@@ -178,6 +178,7 @@ class ViewerWindow(WindowConfig):
         platform.platform_set_clipboard_text_fn = lambda _context, text: self._pyglet.set_clipboard_text(text)
         ui.io.backend_flags |= imgui.BackendFlags_.has_mouse_cursors
         self._pyglet.push_handlers(
+            on_close=self._asked_to_close,
             on_activate=lambda: ui.io.add_focus_event(True),
             on_deactivate=self._on_deactivate,
             on_mouse_leave=lambda x, y: ui.io.add_mouse_pos_event(NOWHERE, NOWHERE),
@@ -313,6 +314,11 @@ class ViewerWindow(WindowConfig):
     def _button(self, x: int, y: int, button: int, down: bool) -> None:
         self._ui.io.add_mouse_pos_event(x, y)
         self._ui.io.add_mouse_button_event(BUTTONS[button], down)
+
+    def _asked_to_close(self) -> bool:
+        """The window's own button: the interface may have a question first. True: pyglet does nothing of its own."""
+        self._ui.state.ask_to_quit = True
+        return True
 
     def _on_deactivate(self) -> None:
         self._held.clear()

@@ -1,9 +1,10 @@
 """Opens the real window over a real session that reports to test_window.py, which drives it with mouse and keys.
 
-    python drive_window.py FOLDER
+    python drive_window.py FOLDER [SECONDS]
 
 Writes FOLDER/state.json every few frames: where buttons and sliders are, and where the session stands. A file name in
-FOLDER/drop is dropped on the window, as the window system would.
+FOLDER/drop is dropped on the window, and a FOLDER/close presses its close button, as the window system would. SECONDS: of
+solving, after which quitting asks.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from imgui_bundle import imgui
 from app.gpu import Gpu
 from app.session.session import Session
 from app.session.view import View
-from app.ui import widgets
+from app.ui import quit_dialog, widgets
 from app.viewer.window import run_window
 
 EVERY = 3  # frames between two reports
@@ -64,6 +65,7 @@ class ReportingSession(Session):
 
     def poll(self, *, interactive: bool = False) -> None:
         super().poll(interactive=interactive)
+        pyglet.app.platform_event_loop.dispatch_posted_events()  # of the test; at rest the window does it
         self.frame += 1
         if self.frame % EVERY == 0:
             state = {
@@ -75,6 +77,7 @@ class ReportingSession(Session):
                 "exposure": self.view.display.exposure,
                 "message": self.message,
                 "picked": self.view.picked,
+                "has_picked": self.view.marked is not None,
                 "places": self.view.places,
             }
             report = self.folder / "state.new"
@@ -82,20 +85,23 @@ class ReportingSession(Session):
             report.replace(self.folder / "state.json")
 
 
-def drop_files(folder: Path) -> None:
-    """Pass on what the test drops: also while the window waits for an event."""
-    drop = folder / "drop"
+def pass_on_events(folder: Path) -> None:
+    """What the test drops, and its wish to close: also while the window waits for an event."""
     while True:
-        if drop.exists():
-            dropped = drop.read_text()
-            drop.unlink()
-            window = moderngl_window.window()._window
-            pyglet.app.platform_event_loop.post_event(window, "on_file_drop", 640, 360, [dropped])
+        for kind in ("drop", "close"):
+            asked = folder / kind
+            if asked.exists():
+                text = asked.read_text()
+                asked.unlink()
+                event = ("on_file_drop", 640, 360, [text]) if kind == "drop" else ("on_close",)
+                pyglet.app.platform_event_loop.post_event(moderngl_window.window()._window, *event)
         time.sleep(0.1)
 
 
 def main() -> None:
     folder = Path(sys.argv[1])
+    if len(sys.argv) > 2:
+        quit_dialog.WORTH_SECONDS = float(sys.argv[2])
 
     def make_view(gpu: Gpu) -> View:
         session = ReportingSession(gpu, folder)
@@ -104,7 +110,7 @@ def main() -> None:
         session.open("cornell-box")
         return session.view
 
-    threading.Thread(target=drop_files, args=(folder,), daemon=True).start()
+    threading.Thread(target=pass_on_events, args=(folder,), daemon=True).start()
     run_window(make_view, size=(1280, 720), vsync=False)
     print("closed")
 

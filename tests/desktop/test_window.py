@@ -54,9 +54,9 @@ def environment(display: str | None) -> dict[str, str]:
 class Driven:
     """A window in a process of its own, and a hand on its mouse and keyboard."""
 
-    def __init__(self, display: str, folder: Path) -> None:
+    def __init__(self, display: str, folder: Path, *arguments: str) -> None:
         self.folder, self._environment = folder, environment(display)
-        command = [sys.executable, str(HERE / "drive_window.py"), str(folder)]
+        command = [sys.executable, str(HERE / "drive_window.py"), str(folder), *arguments]
         self.process = subprocess.Popen(
             command, cwd=folder, env=self._environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )
@@ -91,7 +91,7 @@ class Driven:
 
 @pytest.fixture
 def window(display: str, tmp_path: Path) -> Iterator[Driven]:
-    driven = Driven(display, tmp_path)
+    driven = Driven(display, tmp_path, "1e6")  # no solve takes so long that quitting asks
     yield driven
     if driven.process.poll() is None:
         driven.process.kill()
@@ -143,10 +143,33 @@ def test_a_user_at_the_window(window: Driven, tmp_path: Path) -> None:
     window.do("key", "space")
     window.until(lambda s: s["running"] and s["shots"] > 0)
 
-    subprocess.run(["xdotool", "key", "Escape"], env=environment(window._environment["DISPLAY"]), check=True)
+    window.do("mousemove", 640, 330, "click", 1)
+    window.until(lambda s: s["has_picked"])
+    window.do("key", "Escape")
+    window.until(lambda s: not s["has_picked"])
+    window.do("key", "Escape")  # nothing is left to close, and the window stays open
+
+    subprocess.run(["xdotool", "key", "ctrl+q"], env=environment(window._environment["DISPLAY"]), check=True)
     output, _ = window.process.communicate(timeout=PATIENCE)
     assert window.process.returncode == 0, output
     assert output.strip() == "closed"
+
+
+def test_the_windows_own_button_asks_where_a_long_solve_would_be_lost(display: str, tmp_path: Path) -> None:
+    window = Driven(display, tmp_path, "0")
+    try:
+        window.until(lambda s: s["shots"] > 5)
+        for answer in ("Cancel", "Quit"):
+            (tmp_path / "close").touch()
+            window.frames(12)
+            x, y = (round(v) for v in window.until(lambda s: "Quit" in s["places"])["places"][answer])
+            subprocess.run(["xdotool", "mousemove", str(x), str(y), "click", "1"], env=window._environment, check=True)
+            if answer == "Cancel":
+                window.frames(12)  # it goes on
+        output, _ = window.process.communicate(timeout=PATIENCE)
+        assert (window.process.returncode, output.strip()) == (0, "closed")
+    finally:
+        window.process.kill()
 
 
 REST_SHARE = 0.35  # of a core: two looks around per second cost a few ms; 30 frames/s would cost more than one core

@@ -91,6 +91,7 @@ class FakeSession:
     def __init__(self, *, opened: bool = True, gpu: Gpu | None = None) -> None:
         self.gpu, self.opened, self.running, self.name, self.message = gpu, opened, True, "fake box", None
         self.loading: SimpleNamespace | None = None
+        self.seconds = 0.3  # of solving
         self.calls: list[tuple[object, ...]] = []
         self.session = self.run = self
         self.compared = FakeCompared(self.calls)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from desks import SIZE, VIEW, Desk, desk, session, where
+from desks import PICKED, SIZE, VIEW, Desk, desk, session, where
 from fake_session import FakeSession
 from imgui_bundle import imgui
 
@@ -25,7 +25,8 @@ from app.solvers import SOLVERS, ShootingOptions
 from app.ui import overlays, widgets
 from app.ui.app import Ui
 from app.ui.file_dialog import readable
-from app.ui.keys import SHORTCUTS
+from app.ui.keys import ANY_POPUP, SHORTCUTS
+from app.ui.quit_dialog import WORTH_SECONDS, duration
 from app.ui.state import Legend, Pace, Request
 from app.viewer.ui_frame import save_screenshot
 
@@ -46,14 +47,16 @@ EFFECTS: dict[str, Callable[[Desk], bool]] = {
     "C": lambda d: d.session.display.show == "reference",
     "V": lambda d: d.session.display.show == "split",
     "X": lambda d: d.session.display.layer == "error",
-    "Ctrl+O": lambda d: imgui.is_popup_open("", imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level),
-    "Esc": lambda d: Request.QUIT in d.requests,
+    "Ctrl+O": lambda d: imgui.is_popup_open("", ANY_POPUP),
+    "Ctrl+Q": lambda d: Request.QUIT in d.requests,
+    "Esc": lambda d: d.ui.state.picked is None,
 }
 
 
 @pytest.mark.parametrize("shortcut", SHORTCUTS, ids=lambda s: s.label)
 def test_every_key_does_what_the_help_says(desk: Desk, shortcut: Any) -> None:
     desk.session.compare()
+    desk.ui.state.picked = PICKED
     assert not EFFECTS[shortcut.label](desk)
     desk.key(shortcut.key, control=shortcut.control)
     assert EFFECTS[shortcut.label](desk)
@@ -68,24 +71,61 @@ def test_keys_are_harmless_without_a_scene(gpu: Gpu, shortcut: Any) -> None:
     desk.release()
 
 
-def test_escape_closes_before_it_quits(desk: Desk) -> None:
+def test_escape_closes_cancels_deselects_and_never_quits(desk: Desk) -> None:
+    desk.session.picked = PICKED
+    desk.click(*VIEW)
+    assert desk.ui.state.picked is PICKED
     desk.key(imgui.Key.f1)
-    desk.key(imgui.Key.escape)
-    assert not desk.ui.state.show_help and Request.QUIT not in desk.requests
     cancelled: list[bool] = []
     desk.session.loading = SimpleNamespace(stage="unfolding", fraction=0.4, cancel=lambda: cancelled.append(True))
     desk.key(imgui.Key.escape)
-    assert cancelled == [True] and Request.QUIT not in desk.requests
-    desk.session.opened = False
+    assert not desk.ui.state.show_help and not cancelled, "one thing at a time"
     desk.key(imgui.Key.escape)
-    assert cancelled == [True, True] and desk.requests == [Request.QUIT]
-    desk.session.opened, desk.session.loading = True, None
-    desk.requests.clear()
+    assert cancelled == [True] and desk.ui.state.picked is PICKED
+    desk.session.loading = None
     desk.key(imgui.Key.o, control=True)
     desk.key(imgui.Key.escape)
-    assert Request.QUIT not in desk.requests
+    assert not imgui.is_popup_open("", ANY_POPUP) and desk.ui.state.picked is PICKED
     desk.key(imgui.Key.escape)
-    assert desk.requests == [Request.QUIT]
+    assert desk.ui.state.picked is None
+    desk.session.opened = False
+    desk.key(imgui.Key.escape)
+    assert desk.requests == [], "with nothing left it does nothing"
+
+
+def test_a_click_on_nothing_drops_what_was_picked(desk: Desk) -> None:
+    desk.session.picked = PICKED
+    desk.click(*VIEW)
+    desk.session.picked = None
+    desk.click(*VIEW)
+    assert desk.ui.state.picked is None
+
+
+@pytest.mark.parametrize("answer", ["Quit", "Cancel"])
+def test_quitting_asks_where_a_long_solve_would_be_lost(
+    desk: Desk, where: dict[str, tuple[float, float]], answer: str
+) -> None:
+    desk.session.seconds = 2 * WORTH_SECONDS
+    desk.key(imgui.Key.q, control=True)
+    desk.frames(2)
+    assert desk.requests == [] and imgui.is_popup_open("", ANY_POPUP)
+    desk.key(imgui.Key.space)
+    assert desk.session.running, "keys wait for the answer"
+    desk.click(*where[answer])
+    assert desk.requests == [Request.QUIT] * (answer == "Quit") and not imgui.is_popup_open("", ANY_POPUP)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(42, "42 s"), (200, "3 min 20 s"), (7500.4, "2 h 5 min"), (59.7, "1 min 0 s")]
+)
+def test_durations_in_words(seconds: float, words: str) -> None:
+    assert duration(seconds) == words
+
+
+def test_with_ctrl_the_keys_of_flight_are_commands(desk: Desk) -> None:
+    eye = desk.session.camera.eye.copy()
+    desk.key(imgui.Key.q, control=True)
+    assert (desk.session.camera.eye == eye).all()
 
 
 def test_keys_typed_into_a_field_are_text(desk: Desk, where: dict[str, tuple[float, float]]) -> None:

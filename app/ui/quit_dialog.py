@@ -1,0 +1,58 @@
+"""Quitting: at once where nothing is lost by it, else after a question."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+
+from app.ui import widgets
+from app.ui.state import Request, State
+
+if TYPE_CHECKING:
+    from app.session.view import View
+
+TITLE = "Quit?"
+WORTH_SECONDS = 20.0  # of solving, from which on light is worth a question
+BUTTON_EM = 7.0
+TEXT_EM = 26.0
+
+
+def quit_dialog(view: View, state: State) -> None:
+    """Answer the wish to quit, once per frame: the host is asked to, or the user whether that is meant."""
+    if state.ask_to_quit:
+        state.ask_to_quit = False
+        if not worth_keeping(view):
+            state.requests.append(Request.QUIT)
+            return
+        imgui.open_popup(TITLE)
+    imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
+    flags = imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_saved_settings
+    if not imgui.begin_popup_modal(TITLE, None, flags)[0]:
+        return
+    em = imgui.get_font_size()
+    imgui.dummy(imgui.ImVec2(TEXT_EM * em, 0))
+    widgets.wrapped(f"{view.session.name}: {duration(view.session.run.seconds)} of solving will be lost.")
+    imgui.spacing()
+    size = imgui.ImVec2(BUTTON_EM * em, 0)
+    if imgui.button("Quit", size):
+        state.requests.append(Request.QUIT)
+        imgui.close_current_popup()
+    imgui.same_line()
+    if imgui.button("Cancel", size) or imgui.is_key_pressed(imgui.Key.escape, False):
+        imgui.close_current_popup()
+    imgui.end_popup()
+
+
+def worth_keeping(view: View) -> bool:
+    """Whether there is a solve that took so long that nobody wants to lose it by a slip."""
+    return view.session.opened and view.session.run.seconds >= WORTH_SECONDS
+
+
+def duration(seconds: float) -> str:
+    """In words: ``42 s``, ``3 min 20 s``, ``2 h 5 min``."""
+    whole = round(seconds)
+    minutes, hours = whole // 60, whole // 3600
+    if hours:
+        return f"{hours} h {minutes % 60} min"
+    return f"{minutes} min {whole % 60} s" if minutes else f"{whole} s"
