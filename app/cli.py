@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from app import __version__
 from app.atlas.options import AtlasOptions
+from app.bake.options import BakeOptions
 from app.commands.flags import (
     Parser,
     json_flag,
@@ -164,6 +165,7 @@ def _bake_flags(bake: Parser, family: Family) -> None:
     output_flag(bake, "DIR", "the folder to write")
     help = "lay the lightmap out anew, also where the file has a layout for it (TEXCOORD_1 within 0 to 1, without overlaps)"
     bake.add_argument("--unwrap", action="store_true", help=help)
+    add_flags(bake, BakeOptions)
     json_flag(bake)
     solver_flags(bake, family, default=SOLVER_OF["bake"])
     stop_flags(bake, family)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from app.atlas.charts import Charts
 from app.bake.exr import write_irradiance
 from app.bake.gltf_writer import glb_bytes
+from app.bake.options import BakeOptions
 from app.errors import UserError
 from app.lightmap.seams import finished
 from app.scene.model import F32, Scene
@@ -58,6 +59,7 @@ def write_bake(
     irradiance: F32,
     covered: NDArray[np.bool_],
     report: Mapping[str, Any],
+    options: BakeOptions | None = None,
 ) -> BakeFiles:
     """Write the lightmap, the scene that uses it and the report into ``directory``, which is made if need be.
 
@@ -68,12 +70,13 @@ def write_bake(
     assert irradiance.shape == (charts.size[1] * finer, charts.size[0] * finer, 3), f"{irradiance.shape}, {charts.size}"
     assert covered.shape == irradiance.shape[:2]
     assert np.isfinite(irradiance[covered]).all(), "irradiance that is not finite"
+    options = options or BakeOptions()
     prepare_directory(directory)
     files = BakeFiles(directory / IRRADIANCE_NAME, directory / SCENE_NAME, directory / REPORT_NAME)
     temporary = {path: path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") for path in vars(files).values()}
     try:
         write_irradiance(temporary[files.irradiance], finished(irradiance, covered, charts))
-        temporary[files.scene].write_bytes(glb_bytes(scene, charts, IRRADIANCE_NAME))
+        temporary[files.scene].write_bytes(glb_bytes(scene, charts, IRRADIANCE_NAME, moz_lightmap=options.moz_lightmap))
         temporary[files.report].write_text(json_text(report), encoding="utf-8")
         for path, written in temporary.items():
             os.replace(written, path)

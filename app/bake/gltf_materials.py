@@ -19,10 +19,11 @@ NEAREST, LINEAR, LINEAR_MIPMAP_LINEAR = 9728, 9729, 9987
 
 
 class MaterialWriter:
-    """Adds materials to a GLB on demand; ``lightmap`` is the glTF texture that holds the irradiance."""
+    """Adds materials to a GLB on demand. lightmap: the file that holds the irradiance; texture: the glTF texture that names it,
+    if there is one."""
 
-    def __init__(self, glb: GlbBuilder, materials: tuple[Material, ...], lightmap: int) -> None:
-        self._glb, self._materials, self._lightmap = glb, materials, lightmap
+    def __init__(self, glb: GlbBuilder, materials: tuple[Material, ...], lightmap: str, texture: int | None) -> None:
+        self._glb, self._materials, self._lightmap, self._lightmap_texture = glb, materials, lightmap, texture
         self._written: dict[tuple[int, bool, bool], int] = {}
         self._images: dict[int, int] = {}
         self._with_alpha = [_with_alpha(material) for material in materials]
@@ -71,7 +72,10 @@ class MaterialWriter:
             if m.emission_texture is not None:
                 item["emissiveTexture"] = self._texture_info(m.emission_texture, slots)
         if lit:
-            extensions["MOZ_lightmap"] = {"index": self._lightmap, "texCoord": 1, "intensity": 1.0}
+            item["extras"] = {"lightmap": self._lightmap}
+            extensions["KHR_materials_specular"] = {"specularFactor": 0.0}
+            if self._lightmap_texture is not None:
+                extensions["MOZ_lightmap"] = {"index": self._lightmap_texture, "texCoord": 1, "intensity": 1.0}
         if extensions:
             item["extensions"] = extensions
         for name in extensions:

@@ -1,10 +1,13 @@
-"""The scene with its lightmap as GLB: original materials, TEXCOORD_1 in the atlas, MOZ_lightmap naming the irradiance.
+"""The scene with its lightmap as GLB: original materials, TEXCOORD_1 in the atlas, and the lightmap's file by name.
 
-MOZ_lightmap (Mozilla Hubs) is what readers of the web know: {"index": texture, "texCoord": 1, "intensity": 1}, with
-irradiance that the renderer multiplies by albedo/π, as three.js' ``lightMap``. Its picture is the EXR file itself, by
-name: readers that do not know the extension never load it, and the Khronos validator, which knows only PNG and JPEG,
-passes the file with one warning. ``extras.lightmap`` of the glTF scene repeats file, quantity and unit. (three.js'
-EXRLoader puts the last scanline first: set ``flipY = true`` on what it returns.)
+``extras.lightmap`` of the glTF scene names file, quantity and unit, that of each lit material the file alone: the light is an EXR
+file, which glTF does not allow as an image, and readers that parse all images would refuse the scene. MOZ_lightmap (Mozilla
+Hubs), {"index": texture, "texCoord": 1, "intensity": 1}, which names that file as a texture all the same, is written where it is
+asked for. Both mean irradiance that the renderer multiplies by albedo/π, as three.js' ``lightMap``. (three.js' EXRLoader puts the
+last scanline first: set ``flipY = true`` on what it returns.)
+
+Lit materials have no specular lobe (KHR_materials_specular): light was reflected diffusely, and renderers that share it out
+between both lobes would darken it by what the specular one takes.
 
 Every triangle has its own lightmap area:
 
@@ -47,13 +50,11 @@ class _Sides:
     uv: F64
 
 
-def glb_bytes(scene: Scene, charts: Charts, lightmap_uri: str) -> bytes:
-    """The whole GLB file. ``lightmap_uri`` is the EXR's file name beside it."""
+def glb_bytes(scene: Scene, charts: Charts, lightmap: str, *, moz_lightmap: bool = False) -> bytes:
+    """The whole GLB file. lightmap: the EXR's file name beside it. moz_lightmap: name it as a texture, too."""
     glb = GlbBuilder(f"glowtree {__version__}")
-    image = glb.add("images", {"uri": lightmap_uri, "name": "irradiance"})
-    sampler = glb.add("samplers", {"magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071})
-    lightmap = glb.add("textures", {"source": image, "sampler": sampler, "name": "irradiance"})
-    materials = MaterialWriter(glb, scene.materials, lightmap)
+    texture = _lightmap_texture(glb, lightmap) if moz_lightmap else None
+    materials = MaterialWriter(glb, scene.materials, lightmap, texture)
 
     lower, upper = scene.bounds
     centre, radius = (lower + upper) / 2, float(np.linalg.norm(upper - lower)) / 2
@@ -61,10 +62,16 @@ def glb_bytes(scene: Scene, charts: Charts, lightmap_uri: str) -> bytes:
     nodes = _add_objects(glb, scene, _sides(scene, charts), materials, offset)
     nodes += [_add_camera(glb, camera, NEAR_PLANE * radius) for camera in scene.cameras]
     nodes += [_add_light(glb, light) for light in scene.lights if light.emits]
-    about = {"file": lightmap_uri, "quantity": "irradiance", "unit": "W/m2", "texCoord": 1, "firstRow": "v = 0"}
+    about = {"file": lightmap, "quantity": "irradiance", "unit": "W/m2", "texCoord": 1, "firstRow": "v = 0"}
     glb.add("scenes", {"name": scene.name, "nodes": nodes, "extras": {"lightmap": about}})
     glb.document["scene"] = 0
     return glb.to_bytes()
+
+
+def _lightmap_texture(glb: GlbBuilder, uri: str) -> int:
+    image = glb.add("images", {"uri": uri, "name": "irradiance"})
+    sampler = glb.add("samplers", {"magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071})
+    return glb.add("textures", {"source": image, "sampler": sampler, "name": "irradiance"})
 
 
 def _sides(scene: Scene, charts: Charts) -> _Sides:

@@ -13,14 +13,16 @@ from typing import Any
 import numpy as np
 
 from app.bake import prepare_directory, write_bake
+from app.bake.options import BakeOptions
 from app.bake.own_layout import Laid, laid_out, why_not_kept
-from app.commands.report import report, summary
+from app.commands.report import picture, report, summary
 from app.commands.steps import estimate, open_scene, session_options, solve
 from app.errors import UserError
 from app.gpu import gpu_context
 from app.lightmap.collapse import collapse
 from app.lightmap.gutter import fill_gutter
 from app.lightmap.seams import jumps
+from app.options import from_flags
 from app.session.session import Session
 from app.solvers import SOLVERS
 from app.util.console import Console
@@ -34,7 +36,7 @@ def bake(flags: argparse.Namespace) -> int:
         raise UserError(
             f"--solver {flags.solver}: it lights what is around an observer, and a bake is seen from everywhere"
         )
-    console = Console(quiet=flags.json)
+    console, files_asked = Console(quiet=flags.json), from_flags(BakeOptions, flags)
     with _folder(flags.output), gpu_context() as gpu:
         session = Session(gpu, **session_options(flags))
         open_scene(session, flags, console)
@@ -47,7 +49,7 @@ def bake(flags: argparse.Namespace) -> int:
         session.load_seconds["read back"] = time.perf_counter() - clock
         finite = np.asarray(np.isfinite(irradiance).all(-1))
         lost = int((covered & ~finite).sum())
-        result = report(session) | {"texels_not_finite": lost}
+        result = report(session) | picture(session) | {"texels_not_finite": lost}
         irradiance = np.where(finite[..., None], np.maximum(irradiance, 0), np.float32(0))  # no light is still owed
         laid = Laid(session.charts, irradiance, covered & finite)
         result |= _seams(laid)
@@ -62,7 +64,7 @@ def bake(flags: argparse.Namespace) -> int:
             if against is not None or laid.squares > 1:
                 console.warn(note)
                 result["warnings"].append(note)
-        files = write_bake(flags.output, session.scene, laid.charts, laid.irradiance, laid.covered, result)
+        files = write_bake(flags.output, session.scene, laid.charts, laid.irradiance, laid.covered, result, files_asked)
         line = summary(session, result) + _at_seams(result)
         session.release()
     if failure is not None:

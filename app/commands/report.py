@@ -6,11 +6,14 @@ from typing import Any
 
 from app import __version__
 from app.options import specs
+from app.render.exposure import exposure_of
+from app.render.options import DisplayOptions
+from app.render.seen import seen_texels
 from app.session.session import Session
 
 UNBALANCED = 0.02  # of the emitted power: more is worth a word
 
-__all__ = ["notes", "report", "summary"]
+__all__ = ["notes", "picture", "report", "summary"]
 
 
 def report(session: Session) -> dict[str, Any]:
@@ -41,6 +44,19 @@ def report(session: Session) -> dict[str, Any]:
         **_error(session),
         **({} if session.expected is None else {"expected_error": session.expected._asdict()}),
         "warnings": [*session.scene.warnings, *session.charts.warnings, *notes(session)],
+    }
+
+
+def picture(session: Session) -> dict[str, Any]:
+    """How the viewer would show the light at first: the camera, its exposure [EV] and the tone curve. Waits for the GPU."""
+    camera, balance = session.scene.cameras[0], session.run.energy
+    seen = seen_texels(session.lightmap.pool, camera.world_from_camera, camera.yfov)
+    exposure = exposure_of(session.lightmap, seen, balance.unshot / max(balance.area, 1e-300))
+    pose = camera.world_from_camera.tolist()
+    return {
+        "camera": {"name": camera.name, "yfov": camera.yfov, "world_from_camera": pose},
+        "exposure": exposure,
+        "tone_map": DisplayOptions().tone_map,
     }
 
 

@@ -110,7 +110,7 @@ def test_failing_half_way_keeps_the_files_of_the_last_bake(tmp_path, inputs, mon
     files = write_bake(tmp_path, *inputs, {"shots": 1})
     before = {path: path.read_bytes() for path in vars(files).values()}
 
-    def full(*args):
+    def full(*args, **more):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(app.bake, step, full)

@@ -1,0 +1,65 @@
+"""Pages in headless Chromium, drawn by its software renderer, and what they look like."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import http.server
+import shutil
+import subprocess
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+SIZE = (320, 240)  # px, of a picture
+ROOM = 200  # px more that the window is large, with what surrounds the page
+FLAGS = (
+    *("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars"),
+    *("--force-device-scale-factor=1", "--force-color-profile=srgb", "--virtual-time-budget=30000"),
+)
+
+
+@contextlib.contextmanager
+def _served(folder: Path) -> Iterator[str]:
+    """The address of a folder on a web server of this machine."""
+
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *args: object) -> None:
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=str(folder)))
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}"
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+def picture_of_page(page: Path, size: tuple[int, int] = SIZE, *, from_disk: bool = False) -> np.ndarray:
+    """(height, width, 3) of what a page shows once it is at rest, from a web server that has its folder, or opened as a file. The
+    test is skipped without Chromium."""
+    if CHROMIUM is None:
+        pytest.skip("Chromium is not installed")
+    folder, (width, height) = page.parent, size
+    style = f"width:{width}px;height:{height}px;border:0;position:absolute;left:0;top:0"
+    (folder / "frame.html").write_text(f'<!doctype html><iframe src="{page.name}" style="{style}"></iframe>')
+    shot = folder / "page.png"
+    options = [f"--window-size={width + ROOM},{height + ROOM}", f"--user-data-dir={folder / 'profile'}"]
+    with contextlib.nullcontext(folder.as_uri()) if from_disk else _served(folder) as address:
+        line = [CHROMIUM, *FLAGS, *options, f"--screenshot={shot}", f"{address}/frame.html"]
+        run = subprocess.run(line, capture_output=True, text=True, timeout=200)
+    assert shot.is_file(), run.stderr[-2000:]
+    return np.asarray(Image.open(shot).convert("RGB"))[:height, :width]
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Mean difference of two pictures, of white."""
+    return float(np.abs(one.astype(float) - other.astype(float)).mean() / 255)
