@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 
 from app.ui import theme, widgets
-from app.ui.panels import compare, convergence, display, inspect, scene, solver
+from app.ui.panels import compare, convergence, display, inspect, lights, materials, scene, solver
 from app.ui.state import State
 
 if TYPE_CHECKING:
@@ -17,9 +17,8 @@ if TYPE_CHECKING:
 
 SIDE_EM = 20.5  # width of the side docks, in font heights: the widest fact fits
 BOTTOM_SHARE = 0.27  # height of the lower dock, of the window
-SCENE_EM, DISPLAY_EM = 28.7, 18.5  # heights that the upper panels need; what is below them gets the rest
-FOLDED_EM = 20.8  # in a low window the Scene panel opens with its last section folded
-HIGHEST_UPPER = 0.54  # of a low window for them
+DISPLAY_EM = 18.5  # height that the upper panel needs; what is below it gets the rest
+HIGHEST_UPPER = 0.54  # of a low window for it
 WIDEST_SIDES = 0.3  # of a narrow window for each side dock
 
 
@@ -33,8 +32,10 @@ class Panel:
 
 
 PANELS = (
-    Panel("Scene", "left top", scene.draw),
     Panel("Solver", "left", solver.draw),
+    Panel("Lights", "left", lights.draw),
+    Panel("Materials", "left", materials.draw),
+    Panel("Scene", "left", scene.draw),
     Panel("Display", "right top", display.draw),
     Panel("Inspect", "right", inspect.draw),
     Panel("Compare", "right", compare.draw),
@@ -43,8 +44,9 @@ PANELS = (
 
 
 def docks(state: State) -> None:
-    """The dock space over what menu and status bar leave; the first time, and on request, the docks are built."""
-    space = imgui.get_id("docks")
+    """The dock space over what menu and status bar leave; the first time, on request, and where a layout that was kept knows
+    other panels, the docks are built."""
+    space = imgui.get_id(f"docks of {', '.join(panel.title for panel in PANELS)}")
     if state.rebuild_layout or imgui.internal.dock_builder_get_node(space) is None:
         _build(space)
         state.rebuild_layout = False
@@ -64,7 +66,7 @@ def panels(view: View, state: State) -> None:
         if panel.title in state.hidden_panels:
             continue
         with theme.see_through(panel.title in state.docked):
-            visible, open_ = imgui.begin(panel.title, True, imgui.WindowFlags_.no_collapse)
+            visible, _ = imgui.begin(panel.title, None, imgui.WindowFlags_.no_collapse)
         (state.docked.add if imgui.is_window_docked() else state.docked.discard)(panel.title)
         if visible:
             if view.session.opened:
@@ -72,8 +74,6 @@ def panels(view: View, state: State) -> None:
             else:
                 widgets.dim("no scene")
         imgui.end()
-        if not open_:
-            state.hidden_panels.add(panel.title)
 
 
 def _build(space: int) -> None:
@@ -88,13 +88,9 @@ def _build(space: int) -> None:
     _, left, rest = build.dock_builder_split_node_py(space, imgui.Dir.left, side)
     _, right, rest = build.dock_builder_split_node_py(rest, imgui.Dir.right, side / (1 - side))
     _, bottom, _ = build.dock_builder_split_node_py(rest, imgui.Dir.down, BOTTOM_SHARE)
-    upper_left, upper_right = (
-        min(height * imgui.get_font_size() / area.y, HIGHEST_UPPER)
-        for height in (SCENE_EM if scene.has_room() else FOLDED_EM, DISPLAY_EM)
-    )
-    _, left_top, left = build.dock_builder_split_node_py(left, imgui.Dir.up, upper_left)
-    _, right_top, right = build.dock_builder_split_node_py(right, imgui.Dir.up, upper_right)
-    nodes = {"left": left, "left top": left_top, "right": right, "right top": right_top, "bottom": bottom}
+    upper = min(DISPLAY_EM * imgui.get_font_size() / area.y, HIGHEST_UPPER)
+    _, right_top, right = build.dock_builder_split_node_py(right, imgui.Dir.up, upper)
+    nodes = {"left": left, "right": right, "right top": right_top, "bottom": bottom}
     for panel in PANELS:
         build.dock_builder_dock_window(panel.title, nodes[panel.dock])
         build.dock_builder_get_node(nodes[panel.dock]).set_local_flags(build.DockNodeFlagsPrivate_.no_close_button)

@@ -28,6 +28,8 @@ def edit_options(
     options: OptionsT,
     *,
     skip: Iterable[str] = (),
+    only: Iterable[str] | None = None,
+    off: Mapping[str, str] | None = None,
     starts: Mapping[str, Any] | None = None,
     units: Mapping[str, str] | None = None,
     choices: Mapping[str, tuple[str, ...]] | None = None,
@@ -35,18 +37,20 @@ def edit_options(
     """One widget per declared option; returns ``options`` itself, or a checked copy where something was changed.
 
     A right-click or double-click puts the default back. Labels of options that are not at their default are bright.
+    ``only`` some of them, in that order, or all but ``skip``. ``off`` says of options that have no effect now why: they are grey.
     ``starts`` are the values that optional ones have while they are not given one, and begin with when they are; ``units`` and
     ``choices`` what is shown instead of those that are declared.
     """
     imgui.push_id(type(options).__name__)
     changes: dict[str, Any] = {}
     kind: Any = type(options)
-    for spec in _specs(kind):
+    declared = {spec.name: spec for spec in _specs(kind)}
+    for spec in (declared[name] for name in only or declared):
         if spec.name not in skip:
             value = getattr(options, spec.name)
             unit = (units or {}).get(spec.name, spec.unit)
             shown_as = dataclasses.replace(spec, unit=unit, choices=(choices or {}).get(spec.name, spec.choices))
-            edited = edit_option(shown_as, value, (starts or {}).get(spec.name))
+            edited = edit_option(shown_as, value, (starts or {}).get(spec.name), off=(off or {}).get(spec.name))
             if edited != value:
                 changes[spec.name] = edited
     imgui.pop_id()
@@ -58,21 +62,24 @@ def _specs(options: type[Options]) -> list[Spec]:
     return specs(options)
 
 
-def edit_option(spec: Spec, value: Any, start: Any = None) -> Any:
-    """The widget of one option; the legal value that it holds afterwards."""
+def edit_option(spec: Spec, value: Any, start: Any = None, *, off: str | None = None) -> Any:
+    """The widget of one option; the legal value that it holds afterwards. off: why it has no effect now, if it has none."""
     label = title(spec.name)
-    labelled(label, changed=value != spec.default)
+    labelled(label, changed=value != spec.default and off is None)
     imgui.push_id(spec.name)
+    imgui.begin_disabled(off is not None)
     if spec.optional:
         value = _optional(spec, value, start)
     edited = value if value is None else _editor(spec, value)
-    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+    imgui.end_disabled()
+    if off is None and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
         double = imgui.is_mouse_double_clicked(0) and spec.type in (int, float) and not spec.choices
         if imgui.is_mouse_clicked(1) or double:
             edited = spec.default
             imgui.internal.clear_active_id()
     unit = f" [{spec.unit}]" if spec.unit else ""
-    tooltip(f"{spec.help}{unit}: {spec.allowed}\nRight-click: default ({shown(spec.default)})")
+    reason = "" if off is None else f"\nNo effect now: {off}"
+    tooltip(f"{spec.help}{unit}: {spec.allowed}\nRight-click: default ({shown(spec.default)}){reason}")
     imgui.pop_id()
     return edited
 
@@ -176,6 +183,14 @@ def dim(text: str) -> None:
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.DIM))
     imgui.text_unformatted(text)
     imgui.pop_style_color()
+
+
+def right(text: str, colour: theme.RGBA = theme.TEXT) -> None:
+    """Text that ends at the right edge of its column."""
+    imgui.set_cursor_pos_x(
+        imgui.get_cursor_pos_x() + max(0.0, imgui.get_content_region_avail().x - imgui.calc_text_size(text).x)
+    )
+    imgui.text_colored(imgui.ImVec4(*colour), text)
 
 
 def steady_width() -> float:

@@ -49,6 +49,12 @@ class Desk:
         for _ in range(count):
             self.requests += self.frame.draw(self.session, self.target, size=self.size, seconds=seconds)
 
+    def front(self, panel: str) -> None:
+        """Bring the tab of a panel to the front."""
+        self.ui.use()
+        imgui.set_window_focus(panel)
+        self.frames(3)
+
     def point(self, x: float, y: float) -> None:
         self.ui.io.add_mouse_pos_event(x, y)
         self.frames()

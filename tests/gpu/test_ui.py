@@ -246,6 +246,7 @@ def test_widgets_change_nothing_by_themselves(desk: Desk, options: Options) -> N
 
 
 def test_editing_a_material_tells_the_session(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    desk.front("Materials")
     desk.ui.state.material = 3  # the lamp
     monkeypatch.setattr(imgui, "slider_float", lambda label, value, *_: (label == "##strength", 2 * value))
     desk.frames()
@@ -257,6 +258,7 @@ def test_editing_a_material_tells_the_session(desk: Desk, monkeypatch: pytest.Mo
 
 def test_the_sun_is_moved_and_the_sky_is_another(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     desk = Desk(gpu, FakeSession(), (1920, 1400))
+    desk.front("Lights")
     before = desk.session.scene.sky = Sky("clear", (1.0, 0.5, 0.2), 2.0, sun=Sun(100, 20))
     moved = {"##Sun azimuth": 230.0, "##sky strength": 3.0}
     with monkeypatch.context() as hand:
@@ -275,6 +277,7 @@ def test_the_sun_is_moved_and_the_sky_is_another(gpu: Gpu, monkeypatch: pytest.M
 
 
 def test_a_lamp_that_was_switched_off_keeps_its_colour(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    desk.front("Materials")
     desk.ui.state.material = 3
     for strength in (0.0, 5.0):
         monkeypatch.setattr(imgui, "slider_float", lambda label, *_, s=strength: (label == "##strength", s))
@@ -287,8 +290,7 @@ def test_editing_a_light_tells_the_session(desk: Desk, monkeypatch: pytest.Monke
     told: list[tuple[Light, ...]] = []
     desk.session.scene.lights = lights
     desk.session.set_lights = told.append  # type: ignore[attr-defined]
-    desk.session.scene.bounds = (np.zeros(3), np.ones(3))
-    desk.frames()
+    desk.front("Lights")
     assert not told
     monkeypatch.setattr(imgui, "slider_float", lambda label, value, *_: (label == "##strength", 2 * value))
     desk.frames(1)
@@ -298,7 +300,7 @@ def test_editing_a_light_tells_the_session(desk: Desk, monkeypatch: pytest.Monke
 def test_a_light_is_dragged_by_its_handle(desk: Desk) -> None:
     """In the plane that faces the eye, and the view stays."""
     light = Light("a", position=tuple((desk.session.camera.eye + desk.session.camera.forward).tolist()))
-    desk.session.scene.lights, desk.session.scene.bounds = (light,), (np.zeros(3), np.ones(3))
+    desk.session.scene.lights = (light,)
 
     def follow(lights: tuple[Light, ...]) -> None:
         desk.session.scene.lights = lights
@@ -316,6 +318,7 @@ def test_a_light_is_dragged_by_its_handle(desk: Desk) -> None:
 @pytest.mark.parametrize("solver", list(SOLVERS))
 def test_lamps_flicker_where_the_solver_can_follow(desk: Desk, monkeypatch: pytest.MonkeyPatch, solver: str) -> None:
     desk.session.family = replace(desk.session.family, relights=SOLVERS[solver].relights)
+    desk.front("Lights")
     monkeypatch.setattr(imgui, "checkbox", lambda label, on: (label == "##flicker", True))
     desk.frames(1)
     assert (("set_flicker", True) in desk.session.calls) == (solver in ("gathering", "local"))

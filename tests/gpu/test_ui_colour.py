@@ -50,7 +50,7 @@ def test_a_code_that_is_typed_is_the_albedo(
         return result
 
     monkeypatch.setattr(imgui, "color_edit3", noting)
-    desk.frames(2)
+    desk.front("Materials")
     desk.click(*places[-1])
     desk.key(imgui.Key.a, control=True)
     desk.ui.io.add_input_characters_utf8(f"#{code}")
@@ -75,7 +75,7 @@ def test_list_picker_and_picture_show_the_same(desk: Desk, monkeypatch: pytest.M
     monkeypatch.setattr(imgui, "color_edit3", edit)
     monkeypatch.setattr(imgui, "color_button", button)
     desk.ui.state.material = 1
-    desk.frames()
+    desk.front("Materials")
     red = [0.815, 0.272, 0.247]  # sRGB of (0.63, 0.06, 0.05)
     assert told["picker"][-1] == pytest.approx(red, abs=2e-3)
     assert told["swatch"][1] == pytest.approx(told["picker"][-1], abs=1e-6)
@@ -105,6 +105,7 @@ def test_a_lamp_has_the_colour_that_was_picked_and_its_strength(desk: Desk, monk
     picked = list(shown("808000"))  # half as bright as the screen can: a lamp's colour is as bright as it can be
 
     monkeypatch.setattr(imgui, "color_edit3", lambda label, value, _: (True, picked if label != "##albedo" else value))
-    desk.frames(1)
+    desk.front("Materials")
     np.testing.assert_allclose(desk.session.scene.materials[3].emission, (17.0, 17.0, 0.0), rtol=1e-6)
+    desk.front("Lights")
     np.testing.assert_allclose(told[-1][0].intensity, (4.0, 4.0, 0.0), rtol=1e-6)

@@ -6,17 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from desks import SIZE, Desk, desk, session
+from desks import SIZE, Desk, desk, session, where
 from fake_session import FakeSession
 from imgui_bundle import imgui
 
+from app.atlas.options import AtlasOptions
 from app.errors import UserError
 from app.gpu import Gpu
+from app.lightmap.options import LightmapOptions
 from app.ui import layout
 from app.ui.app import Ui
 from app.viewer.ui_frame import ui_image
 
-__all__ = ["desk", "session"]
+__all__ = ["desk", "session", "where"]
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (1920, 1080), (2560, 1440)], ids=str)
@@ -24,8 +26,11 @@ def test_panels_stand_side_by_side(gpu: Gpu, size: tuple[int, int]) -> None:
     desk = Desk(gpu, FakeSession(), size)
     taken = np.zeros((size[1], size[0]), int)
     windows = {panel.title: imgui.internal.find_window_by_name(panel.title) for panel in layout.PANELS}
-    docks = {window.dock_id: window for title, window in windows.items() if title != "Compare"}
-    assert windows["Compare"].dock_id == windows["Inspect"].dock_id, "a tab behind the other"
+    tabs = {"Compare": "Inspect", "Lights": "Solver", "Materials": "Solver", "Scene": "Solver"}
+    docks = {window.dock_id: window for title, window in windows.items() if title not in tabs}
+    for title, other in tabs.items():
+        assert windows[title].dock_id == windows[other].dock_id, "a tab behind the other"
+        assert windows[title].hidden and not windows[other].hidden
     for window in docks.values():
         assert window.dock_id and window.size.x >= 280 and window.size.y >= 150, window.name
         left, top = int(window.pos.x), int(window.pos.y)
@@ -35,6 +40,41 @@ def test_panels_stand_side_by_side(gpu: Gpu, size: tuple[int, int]) -> None:
     assert taken.max() == 1  # nothing overlaps
     assert (taken == 1).mean() > 0.9  # the rest is bars and separators
     assert width * height > 0.3 * size[0] * size[1]
+    desk.release()
+
+
+FIRST = ("texels", "density", "tile", "adaptive", "depth", "gradient", "Pause", "step", "Restart", "anew")
+
+
+@pytest.mark.parametrize(("size", "scale"), [((1280, 720), 1.0), ((900, 600), 1.0), ((2560, 1440), 2.0)], ids=str)
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_what_a_newcomer_needs_is_in_sight(
+    gpu: Gpu, where: dict[str, tuple[float, float]], size: tuple[int, int], scale: float, adaptive: bool
+) -> None:
+    """Solver, quadtree and density, without scrolling; and the names of all tabs."""
+    session = FakeSession()
+    session.light, session.atlas = LightmapOptions(adaptive=adaptive), AtlasOptions(texels=8000, density=40.0)
+    desk = Desk(gpu, session, size, ui=Ui(scale=scale, native_dialog=False))
+    desk.frames(3)
+    panel = imgui.internal.find_window_by_name("Solver")
+    assert panel.scroll.y == 0
+    for name in FIRST:
+        x, y = where[name]
+        assert panel.pos.x < x < panel.pos.x + panel.size.x, name
+        assert panel.pos.y < y < panel.pos.y + panel.size.y - 8 * scale, name
+    tabs = imgui.internal.dock_builder_get_node(panel.dock_id).tab_bar
+    assert tabs.width_all_tabs <= tabs.bar_rect.max.x - tabs.bar_rect.min.x
+    desk.release()
+
+
+def test_a_layout_of_other_panels_is_built_anew(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "layout.ini"
+    with monkeypatch.context() as before:
+        before.setattr(layout, "PANELS", tuple(panel for panel in layout.PANELS if panel.title != "Lights"))
+        Desk(gpu, FakeSession(), ui=Ui(layout_file=file)).release()
+    desk = Desk(gpu, FakeSession(), ui=Ui(layout_file=file))
+    lights, solver = (imgui.internal.find_window_by_name(title) for title in ("Lights", "Solver"))
+    assert lights.dock_id == solver.dock_id != 0
     desk.release()
 
 

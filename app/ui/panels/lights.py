@@ -1,4 +1,4 @@
-"""Lights, a section of the Scene panel: lamps without area, their strength, colour, cone, place and softness. Light follows."""
+"""Lights: lamps without area, their strength, colour, cone, place and softness, and the sky. Light follows."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from imgui_bundle import imgui
 from app.render.false_colour import WHITE_EFFICACY
 from app.scene.lights import Light
 from app.ui import colour, theme, widgets
+from app.ui.panels import sky
 from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
@@ -23,9 +24,17 @@ WIDEST = 10.0  # degrees across a directional light
 
 
 def draw(view: View, state: State) -> None:
-    """The section, for a scene that has such lights."""
+    """The whole panel."""
+    if view.session.family.relights:
+        _flicker(view, state)
+    _lamps(view, state)
+    sky.draw(view, state)
+
+
+def _lamps(view: View, state: State) -> None:
+    """The section of lamps without area, for a scene that has any."""
     lights = view.session.edited_scene.lights
-    if not lights or not widgets.fold("Lights"):
+    if not lights or not widgets.fold("Without area"):
         return
     state.draw_lights = imgui.checkbox("In the view", state.draw_lights)[1]
     widgets.tooltip("Handles of all lights, to be dragged")
@@ -41,6 +50,15 @@ def draw(view: View, state: State) -> None:
     imgui.pop_id()
     if edited != lights[index]:
         state.act(lambda: view.session.set_lights((*lights[:index], edited, *lights[index + 1 :])))
+
+
+def _flicker(view: View, state: State) -> None:
+    """Whether all lamps change from frame to frame."""
+    widgets.labelled("Lamps flicker")
+    changed, on = imgui.checkbox("##flicker", view.session.flickers)
+    widgets.tooltip("Each lamp gives a quarter more or less, a few times a second; off, all are as they were edited")
+    if changed:
+        state.act(lambda: view.session.set_flicker(on))
 
 
 def _row(state: State, index: int, light: Light) -> None:

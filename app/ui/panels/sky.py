@@ -1,4 +1,4 @@
-"""Sky, a section of the Scene panel: its kind, strength and colour, and where the sun stands. Light follows live."""
+"""Sky, a section of the Lights panel: its kind, strength and colour, and where the sun stands. Light follows live."""
 
 from __future__ import annotations
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.lightmap.options import QUADTREE
 from app.session.run import Stop
 from app.solvers import SOLVERS
 from app.ui import theme, widgets
+from app.ui.panels import detail
 from app.ui.state import State
 
 if TYPE_CHECKING:
@@ -28,22 +28,15 @@ def draw(view: View, state: State) -> None:
     _buttons(view, state, done=stats.converged)
     _progress(view, state)
     _figures(state)
-    light = session.light
-    if light.adaptive:
-        widgets.section("Quadtree")
-        _leaves(state)
-        light = widgets.edit_options(light, skip=("adaptive", "storage"))
-    widgets.section("Pace")
-    state.pace = widgets.edit_options(state.pace)
+    detail.draw(view, state)
     widgets.section("Energy [W]")
     _energy(state, unshot=session.family.distributes)
+    widgets.section("Pace")
+    state.pace = widgets.edit_options(state.pace)
     widgets.section(session.family.title)
     options = widgets.edit_options(session.options, starts=stats.resolved)
-    light = widgets.edit_options(light, skip=("adaptive", *QUADTREE))
     if options is not session.options:
         state.act(lambda: session.set_options(options))
-    if light is not session.light:
-        state.act(lambda: session.set_light(light))
 
 
 def _choice(view: View, state: State) -> None:
@@ -56,19 +49,6 @@ def _choice(view: View, state: State) -> None:
     widgets.tooltip(SOLVERS[names[now]].help)
     if changed and chosen != now:
         state.act(lambda: view.session.set_solver(names[chosen]))
-
-
-def _leaves(state: State) -> None:
-    """How many leaves there are, and what they spare."""
-    stats = state.stats
-    assert stats is not None
-    share = stats.texels / max(stats.uniform_texels, 1)
-    imgui.text_unformatted(f"{stats.tiles:,} leaves, {stats.texels:,} texels")
-    imgui.same_line()
-    right(widgets.percent(share), theme.DIM)
-    widgets.tooltip(f"Of the {stats.uniform_texels:,} texels that the finest level everywhere would take")
-    if stats.refining:
-        widgets.dim("leaves are changing")
 
 
 def _buttons(view: View, state: State, *, done: bool) -> None:
@@ -111,7 +91,7 @@ def _progress(view: View, state: State) -> None:
     imgui.text_unformatted(f"converged, {left}" if stats.converged else left)
     rate = f", {widgets.number(stats.per_second, 3)}/s" if state.measured and not stats.converged else ""
     imgui.same_line()
-    right(f"{stats.done:,} {stats.unit}{rate}", theme.DIM)
+    widgets.right(f"{stats.done:,} {stats.unit}{rate}", theme.DIM)
     if stats.note is not None and not stats.refining:
         widgets.wrapped(stats.note, theme.AMBER)
     if stats.edit_work is not None:
@@ -149,21 +129,13 @@ def _energy(state: State, *, unshot: bool) -> None:
             imgui.table_next_column()
             imgui.text_colored(imgui.ImVec4(*colour), label)
             imgui.table_next_column()
-            right(widgets.number(power))
+            widgets.right(widgets.number(power))
             imgui.table_next_column()
-            right(widgets.percent(power / stats.emitted if stats.emitted > 0 else 0.0))
+            widgets.right(widgets.percent(power / stats.emitted if stats.emitted > 0 else 0.0))
         imgui.end_table()
     widgets.dim(f"energy imbalance {widgets.percent(abs(stats.imbalance))}")
     parts = "absorbed + escaped + residual" if unshot else "absorbed + escaped"
     widgets.tooltip(f"Emitted must equal {parts}; the difference, of the power emitted")
-
-
-def right(text: str, colour: theme.RGBA = theme.TEXT) -> None:
-    """Text that ends at the right edge of its column."""
-    imgui.set_cursor_pos_x(
-        imgui.get_cursor_pos_x() + max(0.0, imgui.get_content_region_avail().x - imgui.calc_text_size(text).x)
-    )
-    imgui.text_colored(imgui.ImVec4(*colour), text)
 
 
 def _bar(shares: list[tuple[float, theme.RGBA]], total: float) -> None:

@@ -1,0 +1,81 @@
+"""Detail, a section of the Solver panel: how finely surfaces are cut into texels, and where quadtrees refine them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+
+from app.ui import theme, widgets
+from app.ui.state import State
+
+if TYPE_CHECKING:
+    from app.session.view import View
+
+CUT = ("texels", "density", "tile")  # in the order that a newcomer needs them
+FIRST = ("depth", "gradient")  # of a quadtree's options: always in sight
+MORE = ("criterion", "shadow", "budget", "storage")
+UNIFORM = "texels are uniform; Adaptive turns quadtrees on"
+
+
+def draw(view: View, state: State) -> None:
+    """The whole section."""
+    widgets.section("Detail")
+    _cut(view, state)
+    session = view.session
+    light = session.light
+    if light.adaptive:
+        _leaves(state)
+    off = _off(view)
+    light = widgets.edit_options(light, only=FIRST, off=off)
+    if imgui.tree_node("More###more detail"):
+        light = widgets.edit_options(light, only=MORE, off=off)
+        imgui.tree_pop()
+    if light is not session.light:
+        state.act(lambda: session.set_light(light))
+
+
+def _cut(view: View, state: State) -> None:
+    """How surfaces are cut; takes hold with the button, since light begins again then. The draft stays until that."""
+    session, stats = view.session, state.stats
+    assert stats is not None
+    atlas = session.atlas if state.atlas is None else state.atlas
+    light = session.light if state.adaptive is None else session.light.replace(adaptive=state.adaptive)
+    starts = {"density": float(session.charts.density), "texels": stats.texels}
+    off = {} if atlas.density is None else {"texels": "Density says how many there are"}
+    state.atlas = atlas = widgets.edit_options(atlas, only=CUT, starts=starts, off=off)
+    light = widgets.edit_options(light, only=("adaptive",))
+    state.adaptive = light.adaptive
+    same, busy = (atlas, light) == (session.atlas, session.light), session.loading is not None
+    imgui.begin_disabled(same or busy)
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*(theme.TEXT if same else theme.AMBER)))
+    if imgui.button("Cut anew", imgui.ImVec2(-1, 0)):
+        state.act(lambda: session.cut_anew(atlas, adaptive=light.adaptive))
+    imgui.pop_style_color()
+    imgui.end_disabled()
+    reason = "\nNo effect now: surfaces are cut like that" if same else "\nNot now: a scene is loading" if busy else ""
+    widgets.tooltip(
+        f"Cut all surfaces into texels as it says above, in the background; then light begins again{reason}"
+    )
+
+
+def _leaves(state: State) -> None:
+    """How many leaves there are, and what they spare."""
+    stats = state.stats
+    assert stats is not None
+    share = stats.texels / max(stats.uniform_texels, 1)
+    imgui.text_unformatted(f"{stats.tiles:,} leaves, {stats.texels:,} texels")
+    imgui.same_line()
+    widgets.right(widgets.percent(share), theme.DIM)
+    widgets.tooltip(f"Of the {stats.uniform_texels:,} texels that the finest level everywhere would take")
+    if stats.refining:
+        widgets.dim("leaves are changing")
+
+
+def _off(view: View) -> dict[str, str]:
+    """Options of quadtrees that have no effect now, and why."""
+    light = view.session.light
+    if not light.adaptive:
+        return dict.fromkeys((*FIRST, "criterion", "shadow", "budget"), UNIFORM)
+    other = {"gradient": "shadow", "shadow": "gradient"}[light.criterion]
+    return {other: f"leaves split by {light.criterion}, see Criterion"}
