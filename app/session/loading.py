@@ -95,7 +95,7 @@ def load(
 
 
 class Loading(BackgroundTask[Loaded]):
-    """A scene on its way, see ``load``. solver: by name, what it is made ready for."""
+    """A scene on its way, see ``load``. solver: by name, what it is made ready for. atlas, light: how it is cut and held."""
 
     def __init__(
         self,
@@ -109,7 +109,7 @@ class Loading(BackgroundTask[Loaded]):
         sky: Sky | None = None,
         expose: bool = False,
     ) -> None:
-        self.source, self.solver = source, solver
+        self.source, self.solver, self.atlas, self.light = source, solver, atlas, options
         more = {"default_light": default_light, "expose": expose, "rays": SOLVERS[solver].rays}
         super().__init__(
             "this scene", lambda tell: load(source, atlas, options, file=file, sky=sky, **more, progress=tell)

@@ -7,7 +7,7 @@ knows no window, no picture and no imgui; whoever draws reads ``lightmap``.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +108,12 @@ class Session:
             raise UserError(f"{self.loading.name} is loading: cut {self.name or 'it'} anew before or after that")
         light = self.light if adaptive is None else self.light.replace(adaptive=adaptive)
         self._opening.begin(Loading(self.unedited, atlas, light, self.chosen_solver))
+
+    @property
+    def asked_cut(self) -> tuple[AtlasOptions, bool]:
+        """How the open scene is cut, and whether into quadtrees; as it was asked for last, where that is on its way."""
+        cut = self.loading if self.loading is not None and self.loading.source is self.unedited else self
+        return cut.atlas, cut.light.adaptive
 
     def poll(self, *, interactive: bool = False) -> None:
         """Once per frame: take in what the GPU reports, and swap in a scene that has finished loading, a part of it per frame.
@@ -287,6 +293,17 @@ class Session:
     def options(self) -> Any:
         """Of the solver that is at work."""
         return self._choice.options[self.solver_name]
+
+    @property
+    def solver_options(self) -> Mapping[str, Options]:
+        """Of each solver, by name."""
+        return self._choice.options
+
+    def set_solver_options(self, options: Mapping[str, Options]) -> None:
+        """Of all solvers, each to be had when it is chosen. Raises UserError as ``set_options``."""
+        self._choice.options |= {name: other for name, other in options.items() if name != self.solver_name}
+        if options[self.solver_name] != self.options:
+            self.set_options(options[self.solver_name])
 
     def set_options(self, options: Options) -> None:
         """Other options of the solver, from its next piece of work on. Raises UserError, and keeps those that it has."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui, implot
 
-from app.ui import keys, layout, navigation, overlays, theme
+from app.ui import edits, keys, layout, navigation, overlays, theme
 from app.ui.file_dialog import FileDialog
 from app.ui.quit_dialog import quit_dialog
 from app.ui.state import Legend, Request, State
@@ -95,6 +95,9 @@ class Ui:
         self._build(view, io.delta_time)
         imgui.render()
         state.run_actions()
+        state.held = self.held
+        if view.session.opened:
+            edits.watch(view, state, seconds)
         return imgui.get_draw_data()
 
     @property

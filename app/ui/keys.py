@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
+from app.ui.edits import let_go, redo, undo
 from app.ui.navigation import focus
 from app.ui.panels.compare import show, shown
 from app.ui.panels.solver import toggle
@@ -22,13 +23,14 @@ ANY_POPUP = int(imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_lev
 
 @dataclass(frozen=True)
 class Shortcut:
-    """A key (with Ctrl or ⌘ where ``control``) and what it does."""
+    """A key (with Ctrl or ⌘ where ``control``, and Shift where ``shift``) and what it does."""
 
     label: str
     help: str
     key: imgui.Key
     action: Callable[[View, State], None]
     control: bool = False
+    shift: bool = False
     while_typing: bool = False
     needs_scene: bool = False
 
@@ -83,8 +85,11 @@ def _quit(view: View, state: State) -> None:
 
 
 def _escape(view: View, state: State) -> None:
-    """Close what is open above the view, else stop what is on its way, else drop what is picked. It never quits."""
-    if state.show_help:
+    """Take back what a hand holds, else close what is open above the view, else stop what is on its way, else drop what is
+    picked. It never quits."""
+    if state.held and state.edits.held:
+        let_go(view, state)
+    elif state.show_help:
         state.show_help = False
     elif view.session.on_its_way is not None:
         view.session.on_its_way.cancel()
@@ -107,8 +112,10 @@ SHORTCUTS = (
     Shortcut("V", "split view: solution and reference", Key.v, _split, needs_scene=True),
     Shortcut("X", "error heat map on and off", Key.x, _error, needs_scene=True),
     Shortcut("Ctrl+O", "open a scene", Key.o, _open, control=True),
+    Shortcut("Ctrl+Z", "undo the last edit, or move of the camera", Key.z, undo, control=True, needs_scene=True),
+    Shortcut("Ctrl+Shift+Z", "redo what was undone", Key.z, redo, control=True, shift=True, needs_scene=True),
     Shortcut("Ctrl+Q", "quit; asks where a long solve would be lost", Key.q, _quit, control=True, while_typing=True),
-    Shortcut("Esc", "close what is open, stop loading, drop what is picked", Key.escape, _escape),
+    Shortcut("Esc", "let go, close what is open, stop loading, drop what is picked", Key.escape, _escape),
 )
 
 POINTER = (
@@ -132,5 +139,6 @@ def dispatch(view: View, state: State) -> None:
     for shortcut in SHORTCUTS:
         held = io.key_ctrl or io.key_super
         ready = (view.session.opened or not shortcut.needs_scene) and (not io.want_text_input or shortcut.while_typing)
-        if ready and held == shortcut.control and imgui.is_key_pressed(shortcut.key, False):
+        ready = ready and held == shortcut.control and (not held or io.key_shift == shortcut.shift)
+        if ready and imgui.is_key_pressed(shortcut.key, False):
             shortcut.action(view, state)

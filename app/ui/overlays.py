@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
 
-from app.ui import theme, widgets
+from app.ui import edits, theme, widgets
 from app.ui.keys import POINTER, SHORTCUTS
 from app.ui.layout import PANELS
 from app.ui.navigation import look_through
@@ -35,7 +35,7 @@ LEGEND_MARGIN_EM = 1.0
 
 
 def menu_bar(view: View, state: State) -> None:
-    """File, View, Help."""
+    """File, Edit, View, Help."""
     if not imgui.begin_main_menu_bar():
         return
     if imgui.begin_menu("File"):
@@ -51,6 +51,9 @@ def menu_bar(view: View, state: State) -> None:
         imgui.separator()
         if imgui.menu_item("Quit", "Ctrl+Q", False)[0]:
             state.ask_to_quit = True
+        imgui.end_menu()
+    if imgui.begin_menu("Edit"):
+        edits.menu(view, state)
         imgui.end_menu()
     if imgui.begin_menu("View"):
         _view_menu(view, state)

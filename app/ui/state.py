@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from app.compare.options import ReferenceOptions
 from app.errors import UserError
 from app.options import Options, option
+from app.session.edits import EditHistory
 
 if TYPE_CHECKING:
     from app.atlas.options import AtlasOptions
@@ -80,7 +81,8 @@ class State:
     asked once per frame (None without a scene). atlas, adaptive: edited, not yet applied. view_px: the 3-D view (left, top,
     width, height) [display units]. inspected: what the solver showed last, and of which light. draw_rays: those of the
     picked texel, in the room. draw_lights: lamps without area, in the view. reference: of a solve in the
-    background; layer: to go back to from the error.
+    background; layer: to go back to from the error. edits: of the open scene; held: whether a hand was at a control in the last
+    frame.
     """
 
     measured: bool = True
@@ -95,6 +97,8 @@ class State:
     ask_for_file: bool = False
     ask_for_reference: bool = False
     ask_to_quit: bool = False
+    edits: EditHistory = field(default_factory=EditHistory)
+    held: bool = False
     hidden_panels: set[str] = field(default_factory=set)
     docked: set[str] = field(default_factory=set)
     rebuild_layout: bool = False
@@ -155,4 +159,5 @@ class State:
         if scene is not self._known[0]:
             self.flight, self.material, self.light = None, 0, 0
             self.emission_colours.clear()
+            self.edits = EditHistory()
         self._known = scene, lightmap

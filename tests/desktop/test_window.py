@@ -155,6 +155,21 @@ def test_a_user_at_the_window(window: Driven, tmp_path: Path) -> None:
     assert output.strip() == "closed"
 
 
+def test_an_edit_is_undone_and_done_again(window: Driven) -> None:
+    state = window.until(lambda s: s["shots"] > 5 and "exposure" in s["places"])
+    before = state["exposure"]
+    x, y = (round(v) for v in state["places"]["exposure"])
+    window.do("mousemove", x, y, "mousedown", 1)
+    for step in (10, 20, 30):
+        window.do("mousemove", x + step, y)
+    window.do("mouseup", 1)
+    after = window.until(lambda s: s["exposure"] > before + 0.1)["exposure"]
+    window.do("key", "ctrl+z")
+    window.until(lambda s: s["exposure"] == before)
+    window.do("key", "ctrl+shift+z")
+    window.until(lambda s: s["exposure"] == after)
+
+
 def test_the_windows_own_button_asks_where_a_long_solve_would_be_lost(display: str, tmp_path: Path) -> None:
     window = Driven(display, tmp_path, "0")
     try:

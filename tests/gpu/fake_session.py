@@ -15,6 +15,7 @@ from app.lightmap.options import LightmapOptions
 from app.render.camera import CameraView
 from app.render.false_colour import Scale, false_colour_scale
 from app.render.options import LAYERS, DisplayOptions
+from app.scene.lights import Light
 from app.scene.model import Material
 from app.scene.sky import Sky
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Inspection, ShootingOptions
@@ -235,9 +236,20 @@ class FakeSession:
     def open(self, source: str | Path) -> None:
         self.calls.append(("open", str(source)))
 
+    @property
+    def solver_options(self) -> dict[str, ShootingOptions]:
+        return {self.solver_name: self.options}
+
+    def set_solver_options(self, options: dict[str, ShootingOptions]) -> None:
+        self.set_options(options[self.solver_name])
+
     def set_options(self, options: ShootingOptions) -> None:
-        self.shooting = options
+        self.options = options
         self.calls.append(("set_options",))
+
+    @property
+    def asked_cut(self) -> tuple[AtlasOptions, bool]:
+        return self.atlas, self.light.adaptive
 
     def set_light(self, light: LightmapOptions) -> None:
         self.light = light
@@ -249,10 +261,16 @@ class FakeSession:
     def cut_anew(self, atlas: AtlasOptions, *, adaptive: bool) -> None:
         self.calls.append(("cut_anew",))
 
+    def set_materials(self, materials: tuple[Material, ...]) -> None:
+        self.scene.materials = materials
+
+    def set_lights(self, lights: tuple[Light, ...]) -> None:
+        self.scene.lights = lights
+
     def set_material(self, index: int, material: Material) -> None:
         materials = list(self.scene.materials)
         materials[index] = material
-        self.scene.materials = tuple(materials)
+        self.set_materials(tuple(materials))
         self.calls.append(("set_material", index, dataclasses.replace(material)))
 
     def set_sky(self, sky: Sky | None) -> None:

@@ -48,6 +48,8 @@ EFFECTS: dict[str, Callable[[Desk], bool]] = {
     "V": lambda d: d.session.display.show == "split",
     "X": lambda d: d.session.display.layer == "error",
     "Ctrl+O": lambda d: imgui.is_popup_open("", ANY_POPUP),
+    "Ctrl+Z": lambda d: d.session.display.exposure == 0,
+    "Ctrl+Shift+Z": lambda d: d.session.display.exposure == 2,
     "Ctrl+Q": lambda d: Request.QUIT in d.requests,
     "Esc": lambda d: d.ui.state.picked is None,
 }
@@ -57,6 +59,11 @@ EFFECTS: dict[str, Callable[[Desk], bool]] = {
 def test_every_key_does_what_the_help_says(desk: Desk, shortcut: Any) -> None:
     desk.session.compare()
     desk.ui.state.picked = PICKED
+    desk.session.display = desk.session.display.replace(exposure=2.0)
+    desk.frames()
+    if shortcut.shift:
+        desk.key(imgui.Key.z, control=True)
+        desk.ui.io.add_key_event(imgui.Key.mod_shift, True)
     assert not EFFECTS[shortcut.label](desk)
     desk.key(shortcut.key, control=shortcut.control)
     assert EFFECTS[shortcut.label](desk)
