@@ -15,6 +15,7 @@ from app.scene.lights import Light
 from app.scene.model import Material
 from app.scene.sky import Sky
 from app.solvers import EnergyBalance, Family, Inspection, Progress
+from app.util.state import State
 
 SWEEPS = 3  # until it has converged by its defaults
 
@@ -55,6 +56,12 @@ class Constant:
         self.issued += 1
         yield
         return 1
+
+    def state(self) -> State:
+        return State({"issued": self.issued})
+
+    def restore(self, state: State) -> None:
+        self.issued = state.values["issued"]
 
     def poll(self, *, wait: bool = False) -> Progress:
         remaining = 0.5**self.issued

@@ -40,6 +40,11 @@ class LightLit:
     passes_table: Texture
 
     @property
+    def kept(self) -> dict[str, Texture]:
+        """What shadow rays have found, by name."""
+        return {"seen": self.seen, "all": self.all}
+
+    @property
     def from_afar(self) -> bool:
         return self.lights[0].from_afar
 

@@ -16,16 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.direct_light.allocate import allocate
-from app.direct_light.lamps import LampSet, chances, lamp_sets
+from app.direct_light.lamps import LampSet, chances, lamp_set, lamp_sets
 from app.direct_light.punctual import LightLit, PunctualLight, light_sets
 from app.direct_light.sky_light import SkyLight, SkyLit
-from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture, glsl_constant
+from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture, glsl_constant, keep, take_over
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import QUAD_FORMAT, quads, upload
 from app.lightmap.tile_pool import Moves
 from app.scene.lights import Light
 from app.scene.model import F32, F64, Scene
 from app.scene.sky import Sky
+from app.util.state import State, StateError
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
@@ -49,6 +50,11 @@ class Lit:
     stream: int
     passes: NDArray[np.int64]
     passes_table: Texture
+
+    @property
+    def kept(self) -> dict[str, Texture]:
+        """What shadow rays have found, by name."""
+        return {"seen": self.seen} | ({} if self.unoccluded is None else {"unoccluded": self.unoccluded})
 
     def release(self, gpu: Gpu) -> None:
         optional = [] if self.unoccluded is None else [self.unoccluded]
@@ -107,10 +113,9 @@ class DirectLight:
         target = gpu.target(seen)
         target.clear()
         unoccluded = gpu.texture(size, 1, "f4") if lamps.closed_form else None
-        self._streams += 1
+        stream = self._next_stream()
         table, near = folded(gpu, lamps.rows.reshape(-1, 4)), folded(gpu, known.near.reshape(-1, 2))
         far = folded(gpu, known.far.reshape(-1, 1))
-        stream = STREAM + self._streams
         passes, passes_table = np.zeros(self._lightmap.pool.tiles, np.int64), self._passes_table()
         self.sets.append(Lit(lamps, table, near, far, seen, target, unoccluded, stream, passes, passes_table))
 
@@ -293,10 +298,19 @@ class DirectLight:
                 self.drop(lit)
         for sun in sorted(parts):
             assert sky is not None
-            if self._sky is None:
-                self._sky = SkyLight(self._gpu, self._lightmap, dict(self._rays.defines), PASS)
-            self._streams += 1
-            self.sets.append(self._sky.lit(sky, STREAM + self._streams, self._passes_table(), sun=sun))
+            self.sets.append(self._sky_light.lit(sky, self._next_stream(), self._passes_table(), sun=sun))
+
+    @property
+    def _sky_light(self) -> SkyLight:
+        """Made when it is needed."""
+        if self._sky is None:
+            self._sky = SkyLight(self._gpu, self._lightmap, dict(self._rays.defines), PASS)
+        return self._sky
+
+    def _next_stream(self) -> int:
+        """Of random numbers, for another set."""
+        self._streams += 1
+        return STREAM + self._streams
 
     def _follow_lights(self, lights: tuple[Light, ...]) -> None:
         """Other lamps without area. Of one that differs by its strength or colour all is known."""
@@ -309,10 +323,14 @@ class DirectLight:
                 lit.lights = same
                 wanted.remove(same)
         for some in wanted:
-            if self._punctual is None:
-                self._punctual = PunctualLight(self._gpu, self._lightmap, dict(self._rays.defines), PASS)
-            self._streams += 1
-            self.sets.append(self._punctual.lit(some, STREAM + self._streams, self._passes_table()))
+            self.sets.append(self._punctual_light.lit(some, self._next_stream(), self._passes_table()))
+
+    @property
+    def _punctual_light(self) -> PunctualLight:
+        """Made when it is needed."""
+        if self._punctual is None:
+            self._punctual = PunctualLight(self._gpu, self._lightmap, dict(self._rays.defines), PASS)
+        return self._punctual
 
     def follow(self, scene: Scene) -> None:
         """Materials, the sky, or lamps without area are others. Of a set that is one material all is known, whatever it emits,
@@ -419,6 +437,44 @@ class DirectLight:
         area = np.where(pool.surfaces.face >= 0, pool.surfaces.area, 0.0)
         return np.asarray(np.einsum("tijc,tij->c", H[..., :3].astype(np.float64), area) * self._lightmap.unit)
 
+    # -- kept for later ------------------------------------------------------------------------------------------------
+
+    def state(self) -> State:
+        """What shadow rays to all that shines now have found."""
+        scene = self._lightmap.scene
+        shining = [lit for lit in self.sets if _emits(lit, scene)]
+        state = State({"sets": [[*_name_of(lit, scene), lit.stream] for lit in shining]})
+        state.values |= {"streams": self._streams, "traced": self.traced}
+        for nth, lit in enumerate(shining):
+            part = State(arrays={"passes": lit.passes})
+            keep(part, **lit.kept)
+            state.put(str(nth), part)
+        return state
+
+    def restore(self, state: State, scene: Scene) -> None:
+        """Know what is in a ``state`` of the same scene, and nothing else; ``sum`` then. Raises StateError."""
+        self.forget()
+        for nth, (kind, which, stream) in enumerate(state.values["sets"]):
+            self._add_named(kind, which, int(stream), scene)
+            lit, part = self.sets[-1], state.part(str(nth))
+            lit.passes = part.array("passes", np.int64, self._lightmap.pool.tiles).copy()
+            self._write_passes(lit)
+            take_over(part, **lit.kept)
+        self._streams, self.traced = int(state.values["streams"]), int(state.values["traced"])
+
+    def _add_named(self, kind: str, which: list[int], stream: int, scene: Scene) -> None:
+        """A set by its name, see _name_of. Raises StateError where the scene has none."""
+        if kind == "lamps":
+            self.add(lamp_set(self._lightmap.pool, scene, tuple(which)))
+            self.sets[-1].stream = stream
+        elif kind == "lights":
+            lights = tuple(scene.lights[nth] for nth in which)
+            self.sets.append(self._punctual_light.lit(lights, stream, self._passes_table()))
+        elif scene.sky is not None and (kind == "sky" or scene.sky.sun is not None):
+            self.sets.append(self._sky_light.lit(scene.sky, stream, self._passes_table(), sun=kind == "sun"))
+        else:
+            raise StateError(f"there is no {kind}")
+
     def forget(self) -> None:
         """No set is known."""
         for lit in list(self.sets):
@@ -429,6 +485,15 @@ class DirectLight:
     def release(self) -> None:
         self.forget()
         self._gpu.release_all(self._target, self.light)
+
+
+def _name_of(lit: AnyLit, scene: Scene) -> tuple[str, list[int]]:
+    """What a set is in the scene: a kind, and numbers of materials or lights."""
+    if isinstance(lit, LightLit):
+        return "lights", [scene.lights.index(light) for light in lit.lights]
+    if isinstance(lit, SkyLit):
+        return "sun" if lit.is_sun else "sky", []
+    return "lamps", list(lit.lamps.materials)
 
 
 def _emits(lit: AnyLit, scene: Scene) -> bool:

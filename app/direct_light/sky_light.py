@@ -41,6 +41,11 @@ class SkyLit:
     passes_table: Texture
 
     @property
+    def kept(self) -> dict[str, Texture]:
+        """What shadow rays have found, by name."""
+        return {"seen": self.seen, "all": self.all}
+
+    @property
     def is_sun(self) -> bool:
         return self.map is None
 

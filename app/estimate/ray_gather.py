@@ -127,7 +127,7 @@ class RayGather:
             viewport=(0, 0, rays, len(position)),
         )
         self._add.draw(self._targets["sums"], textures={"t_samples": self._textures["samples"]})
-        return ReadBack(self._gpu, self._targets["sums"])
+        return ReadBack.of(self._gpu, self._targets["sums"])
 
     def irradiance(self, looked: ReadBack, count: int, rays: int = RAYS) -> F64:
         """(count, 4) [W/m²]: RGB, and of what comes from lamps without a bounce the mean of its colours. Waits if it has not
@@ -145,7 +145,7 @@ class RayGather:
             uniforms=self._uniforms(),
             viewport=(0, 0, LINKS, len(position)),
         )
-        return ReadBack(self._gpu, self._targets["hits"]), ReadBack(self._gpu, self._targets["albedo"])
+        return ReadBack.of(self._gpu, self._targets["hits"]), ReadBack.of(self._gpu, self._targets["albedo"])
 
     def ends(self, looked: tuple[ReadBack, ReadBack], count: int) -> Ends:
         """Of so many rows. Waits if they have not arrived."""
@@ -174,7 +174,7 @@ class RayGather:
             uniforms={"u_first": first, "u_helpers": helpers},
             viewport=(0, 0, LINKS, len(candidates)),
         )
-        return ReadBack(self._gpu, self._targets["seen"])
+        return ReadBack.of(self._gpu, self._targets["seen"])
 
     def seen(self, looked: ReadBack, count: int) -> NDArray[np.int64]:
         """(count, LINKS) helpers, -1 for none. Waits if they have not arrived."""

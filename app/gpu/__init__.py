@@ -3,6 +3,7 @@
 from moderngl import Buffer, Framebuffer, Texture
 
 from app.gpu.context import Gpu, Limits, gpu_context, headless_gpu
+from app.gpu.kept import keep, take_over, texture_array
 from app.gpu.passes import Mesh, Pass
 from app.gpu.readback import ReadBack
 from app.gpu.shader import Glsl, ShaderError, ShaderLibrary, glsl_constant
@@ -24,4 +25,7 @@ __all__ = [
     "glsl_constant",
     "gpu_context",
     "headless_gpu",
+    "keep",
+    "take_over",
+    "texture_array",
 ]

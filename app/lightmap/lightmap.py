@@ -8,14 +8,16 @@ from collections.abc import Mapping
 import numpy as np
 
 from app.atlas.charts import Charts
-from app.gpu import Gpu, Texture, glsl_constant
+from app.gpu import Gpu, Texture, glsl_constant, keep, take_over
 from app.lightmap.options import STORAGE, LightmapOptions
 from app.lightmap.refinement import Refinement
 from app.lightmap.textures import LightTextures
 from app.lightmap.tile_pool import TilePool
 from app.scene.model import F32, F64, Material, Scene
+from app.util.state import State, StateError
 
 SHARES = np.float32(glsl_constant("common/ambient.glsl", "SHARES"))  # of what is still to come, that a texel may have
+KEPT = ("t_irradiance", "t_residual", "t_ambient")  # of the textures, what is light
 DEFAULT = LightmapOptions()
 _DTYPES = {"f4": np.float32, "f2": np.float16, "f1": np.uint8}
 
@@ -86,6 +88,25 @@ class Lightmap(LightTextures):
         if self.refinement is not None:
             self.refinement.release()
         super().release()
+
+    # -- kept for later ------------------------------------------------------------------------------------------------
+
+    def state(self) -> State:
+        """Light and leaves as they are. Waits for the GPU."""
+        state = State({"storage": self.storage, "unit": self.unit, "version": self.version})
+        keep(state, **{name: self._textures[name] for name in KEPT})
+        if self.refinement is not None:
+            state.put("leaves", self.refinement.state())
+        return state
+
+    def restore(self, state: State) -> None:
+        """Hold the light and the leaves of a ``state`` of the same scene. Raises StateError; the light is undefined then."""
+        if state.values["storage"] != self.storage:
+            raise StateError(f"light is held as {state.values['storage']}")
+        if self.refinement is not None:
+            self.refinement.restore(state.part("leaves"))
+        take_over(state, **{name: self._textures[name] for name in KEPT})
+        self.unit, self.version = float(state.values["unit"]), int(state.values["version"])
 
     # -- read-back -----------------------------------------------------------------------------------------------------
 

@@ -37,7 +37,7 @@ class Probe:
                 "u_pages": (float(lightmap.columns), lightmap.pool.pages_per_texel),
             },
         )
-        return ReadBack(self._gpu, self._target)
+        return ReadBack.of(self._gpu, self._target)
 
     def irradiance(self, looked: ReadBack) -> F64:
         """(n, 3) [W/m²]. Waits if it has not arrived."""

@@ -18,6 +18,7 @@ from app.atlas.texels import Leaves, uniform_leaves
 from app.lightmap.tile_pool import Moves, TilePool
 from app.lightmap.tiles import Tiles
 from app.scene.model import Scene
+from app.util.state import State, StateError
 
 Tile = tuple[int, int, int]  # level, x, y
 SIDES = ((-1, 0), (1, 0), (0, -1), (0, 1))
@@ -88,6 +89,38 @@ class Quadtree:
             pending.extend(self._coarser_neighbours(slot))
         by_level = sorted(wanted, key=lambda s: self.tile(s)[0])
         return by_level
+
+    def state(self) -> State:
+        """The leaves of all slots, and the order in which slots are taken and given."""
+        leaves = self.pool.leaves
+        taken = np.array(list(self.slots.values()), np.int64)
+        return State(
+            arrays={
+                "leaves": np.stack([leaves.level, leaves.x, leaves.y], 1).astype(np.int32)[taken],
+                "taken": taken,
+                "free": np.array(self._free, np.int64),
+            }
+        )
+
+    def restore(self, state: State) -> None:
+        """Hold the leaves of a ``state``, of as many slots, instead of those that are there. Raises StateError."""
+        free, taken = state.array("free", np.int64, -1), state.array("taken", np.int64, -1)
+        leaves = state.array("leaves", np.int32, len(taken), 3)
+        if not np.array_equal(np.sort(np.concatenate([free, taken])), np.arange(self.pool.tiles)):
+            raise StateError("leaves and slots do not go together")
+        level, (columns, rows) = leaves[:, 0], (side // self.pool.tile for side in self.pool.charts.size)
+        if not ((level >= 0) & (level <= MAX_DEPTH)).all() or (leaves[:, 1:] < 0).any():
+            raise StateError("leaves of no such level")
+        if (leaves[:, 1] >> level >= columns).any() or (leaves[:, 2] >> level >= rows).any():
+            raise StateError("leaves outside of the atlas")
+        tiles = Tiles.cut(self.pool.scene, self.pool.charts, Leaves(*(np.ascontiguousarray(c) for c in leaves.T)))
+        self.pool.free(np.flatnonzero(self.pool.used))
+        self.pool.put(taken, tiles)
+        self.slots.clear()
+        self._below.clear()
+        for slot in taken.tolist():
+            self._enter(self.tile(slot), slot)
+        self._free = free.tolist()
 
     def uneven(self) -> list[int]:
         """Leaves that are too coarse for a neighbour."""

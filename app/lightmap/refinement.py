@@ -23,6 +23,7 @@ from app.lightmap.quadtree import FIRST_ROOM, Change, Quadtree, Tile
 from app.lightmap.textures import LightTextures
 from app.lightmap.tile_pool import Moves
 from app.lightmap.transfer import LightTransfer
+from app.util.state import State, StateError
 
 # A second difference of smooth light grows fourfold when texels double: leaves merge below a quarter of the threshold, and half
 # of that again, so that what was merged is not split at once.
@@ -103,6 +104,40 @@ class Refinement:
         self.drop_judgement()
         self._gpu.release_all(self._roughness_target, self._roughness)
 
+    # -- kept for later ------------------------------------------------------------------------------------------------
+
+    def state(self) -> State:
+        """The leaves, and what is known of them, with the judgement that is on its way."""
+        state = State({"slots": self._light.pool.tiles, "stable": self.stable, "looked_at": self.looked_at})
+        state.values["note"] = self.note
+        state.put("tree", self.tree.state())
+        split = [(*tile, clock) for tile, clock in self._split_at.items()]
+        state.arrays["split"] = np.array(split, np.int64).reshape(-1, 4)
+        if self._judged is not None:
+            state.values["judged"] = self._judged[0]
+            state.arrays["judgement"] = np.frombuffer(self._judged[1].look(), np.float32)
+        return state
+
+    def restore(self, state: State) -> None:
+        """Hold the leaves of a ``state``; what follows them holds nothing that it knows by slot. Raises StateError."""
+        tree, slots = state.part("tree"), int(state.values["slots"])
+        if slots != sum(len(tree.array(name, np.int64, -1)) for name in ("taken", "free")):
+            raise StateError(f"leaves of another number of slots than {slots}")
+        if slots < len(self.tree):
+            raise StateError(f"{slots} slots for the {len(self.tree)} leaves that there are")
+        self.drop_judgement()
+        if slots != self._light.pool.tiles:
+            self._resize(slots)
+        self.tree.restore(tree)
+        self._light.write_tiles(np.arange(slots))
+        self.stable, self.looked_at = bool(state.values["stable"]), int(state.values["looked_at"])
+        self.note = state.values["note"]
+        split = state.array("split", np.int64, -1, 4).tolist()
+        self._split_at = {(level, x, y): clock for level, x, y, clock in split}
+        if "judged" in state.values:
+            judgement = state.array("judgement", np.float32, 4 * self._roughness.width * self._roughness.height)
+            self._judged = int(state.values["judged"]), ReadBack.arrived(self._gpu, judgement.tobytes())
+
     # -- looking at the leaves -----------------------------------------------------------------------------------------
 
     def look(self, most: int, bands: int, clock: int) -> Iterator[None]:
@@ -112,7 +147,7 @@ class Refinement:
             for band in range(bands):
                 self.judge(band, bands)
                 yield
-            self._judged = self._light.version, ReadBack(self._gpu, self._roughness_target)
+            self._judged = self._light.version, ReadBack.of(self._gpu, self._roughness_target)
             return
         (version, readback), self._judged = self._judged, None
         data = np.frombuffer(readback.take(), np.float32).reshape(-1, 4)

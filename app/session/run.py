@@ -18,11 +18,13 @@ from app.scene.lights import Light
 from app.scene.model import Material
 from app.scene.sky import Sky
 from app.session.energy import Effort, EnergyWatch
-from app.session.history import History
+from app.session.history import COLUMNS, History
 from app.session.pacing import Pacer
 from app.solvers import EnergyBalance, Family, Progress, Solver
 from app.solvers.run import solve_until
 from app.util.parts import run_to_end
+from app.util.rows import CAPACITY
+from app.util.state import State, StateError
 
 TELL_SECONDS = 0.2  # between two calls of progress
 ASK_AGAIN = 1.5  # times as long as until the error was last estimated, when it is again
@@ -92,6 +94,22 @@ class Run:
         self.history = History()
         self.progress = self.solver.poll()
         self.history.add(0, 0.0, self.progress.remaining, 0.0)
+
+    # -- kept for later ------------------------------------------------------------------------------------------------
+
+    def state(self) -> State:
+        """How long it has taken, and how it went."""
+        return State({"seconds": self.seconds}, {"history": self.history.rows})
+
+    def restore(self, state: State) -> None:
+        """Count on from a ``state``, with the light that was restored. Raises StateError."""
+        rows = state.array("history", np.float64, -1, len(COLUMNS))
+        if len(rows) > CAPACITY:
+            raise StateError(f"a history of {len(rows)} rows")
+        self.history.rows = rows
+        self.seconds = float(state.values["seconds"])
+        self.effort.options_changed()
+        self.settled = False
 
     # -- edits ---------------------------------------------------------------------------------------------------------
 

@@ -33,6 +33,7 @@ from app.session.solver_choice import SolverChoice
 from app.session.stats import Stats, stats_of
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family, Solver
 from app.util.background import BackgroundTask
+from app.util.state import State
 
 
 class Session:
@@ -271,6 +272,11 @@ class Session:
         """Forget all light and begin again."""
         self.run.restart()
         self._light_begins()
+
+    def light_restored(self, state: State) -> None:
+        """Lightmap and solver hold light that was kept, see light_state.py; and the run was there. Raises StateError."""
+        self._begin()
+        self.run.restore(state)
 
     # -- edits ---------------------------------------------------------------------------------------------------------
 

@@ -10,11 +10,14 @@ from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
+import numpy as np
+
 from app.gpu import Texture
 from app.options import Options
 from app.scene.lights import Light
 from app.scene.model import F32, F64, Material
 from app.scene.sky import Sky
+from app.util.state import State
 
 Rect = tuple[float, float, float, float]  # (u, v, u, v) in the virtual atlas [texels of level 0]
 HEMISPHERE = "Hemisphere"  # caption of the picture that a view makes of the rays of an Inspection
@@ -46,6 +49,17 @@ class Progress:
     converged: bool = False
     refining: bool = False
     note: str | None = None
+
+    @property
+    def measured(self) -> list[Any]:
+        """What does not follow from other things, as plain values."""
+        return [self.done, self.remaining, self.escaped.tolist()]
+
+    @staticmethod
+    def of(measured: list[Any]) -> Progress:
+        """With what was measured before."""
+        done, remaining, escaped = measured
+        return Progress(int(done), float(remaining), np.array(escaped, np.float64).reshape(3))
 
 
 @dataclass(frozen=True)
@@ -171,6 +185,14 @@ class Solver(Protocol[OptionsT]):
 
     def warm_up(self) -> Iterator[None]:
         """Do once, in parts, all that a solve will do, so that no frame waits for a driver that compiles. Spoils the light."""
+
+    def state(self) -> State:
+        """All that the work to come follows from, but for the lightmap, the scene and the options: from it another solver of the
+        same kind goes on to the same light. Ends the work under way, and changes nothing else."""
+
+    def restore(self, state: State) -> None:
+        """Go on as from a ``state``: on the same scene with the same options, just after ``reset``, and with the state of the
+        lightmap restored. Raises StateError; reset it then."""
 
     def release(self) -> None:
         """Give back what is on the GPU, but for the lightmap."""

@@ -24,6 +24,16 @@ class Rows:
         self._rows[self._count] = row
         self._count += 1
 
+    @property
+    def rows(self) -> NDArray[np.float64]:
+        """(n, columns) f64."""
+        return self._rows[: self._count].copy()
+
+    @rows.setter
+    def rows(self, rows: NDArray[np.float64]) -> None:
+        self._count = len(rows)
+        self._rows[: self._count] = rows
+
     def column(self, name: str) -> NDArray[np.float64]:
         """Contiguous (n,) f64."""
         return np.ascontiguousarray(self._rows[: self._count, self._columns.index(name)])

@@ -18,10 +18,11 @@ from collections.abc import Generator, Iterator
 
 import numpy as np
 
-from app.gpu import Gpu, Pass, Texture
+from app.gpu import Gpu, Pass, Texture, keep, take_over
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
 from app.solvers.gathering.hits import Hits
+from app.util.state import State
 
 # Texels with few rays do not see each other alike: eigenvalues leave the real axis by about λ/√N, and the iteration diverges
 # where that is more than the y of y + √(y² + λ²) = 1 + √(1 - λ²): 16 rays allow this.
@@ -139,6 +140,18 @@ class Bounces:
             textures=self._points.textures(*reads) | {"t_solution": self.solution},
             viewport=(0, 0, *self._points.size),
         )
+
+    def state(self) -> State:
+        """The solution, the one before, and what was gathered."""
+        state = State({"omega": self._omega, "steps": self.steps})
+        keep(state, solution=self._solutions[0], before=self._solutions[1], gathered=self.gathered)
+        return state
+
+    def restore(self, state: State) -> None:
+        """Have what is in a ``state``. Raises StateError."""
+        take_over(state, solution=self._solutions[0], before=self._solutions[1], gathered=self.gathered)
+        self._omega, self.steps = float(state.values["omega"]), int(state.values["steps"])
+        self.send()
 
     def release(self) -> None:
         self._gpu.release_all(*self._targets, *self._solutions, self._gathered_target, self.gathered)

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from app.direct_light.shadow_rays import DirectLight
-from app.gpu import Framebuffer, Gpu, Pass, ReadBack, Texture, glsl_constant
+from app.gpu import Framebuffer, Gpu, Pass, ReadBack, Texture, glsl_constant, keep, take_over
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64, Scene
+from app.util.state import State
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
@@ -146,7 +147,17 @@ class Compose:
         textures = self._lightmap.textures("t_position_area", "t_irradiance")
         textures |= {"t_variance": self.variance, "t_direct": direct}
         self._judge.draw(self._noise_target, textures=textures)
-        return ReadBack(self._gpu, self._noise_target)
+        return ReadBack.of(self._gpu, self._noise_target)
+
+    def state(self) -> State:
+        """How noisy the light is that was drawn last."""
+        state = State()
+        keep(state, variance=self.variance)
+        return state
+
+    def restore(self, state: State) -> None:
+        """Know what is in a ``state``. Raises StateError."""
+        take_over(state, variance=self.variance)
 
     def resized(self) -> None:
         """The tile pool has got another number of slots."""

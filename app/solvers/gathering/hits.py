@@ -11,8 +11,11 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from app.gpu import Framebuffer, Gpu, Pass, Texture
+import numpy as np
+
+from app.gpu import Framebuffer, Gpu, Pass, Texture, texture_array
 from app.lightmap.lightmap import Lightmap
+from app.util.state import State
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
@@ -81,10 +84,8 @@ class Hits:
         for _ in range(count):
             bank, page = divmod(self.count, self.bank)
             if bank == len(self._banks):
-                size = width * self.edge, height * self.edge
-                hits = self._gpu.texture(size, 1, "u4")
-                self._banks.append(Bank(hits, self._gpu.target(hits)))
-            x, y = page % self.edge * width, page // self.edge * height
+                self._new_bank()
+            x, y, *_ = self._page(page)
             rows = [self._points.rows * nth // bands * tiles for nth in range(bands + 1)]
             for low, high in itertools.pairwise(rows):
                 if high > low:
@@ -97,6 +98,16 @@ class Hits:
                     yield
             self.count += 1
             self.traced += self._points.texel_count
+
+    def _new_bank(self) -> None:
+        width, height = self._points.size
+        hits = self._gpu.texture((width * self.edge, height * self.edge), 1, "u4")
+        self._banks.append(Bank(hits, self._gpu.target(hits)))
+
+    def _page(self, page: int) -> tuple[int, int, int, int]:
+        """Where a page of a bank is: lower corner and size."""
+        width, height = self._points.size
+        return page % self.edge * width, page // self.edge * height, width, height
 
     @property
     def _textures(self) -> dict[str, Texture]:
@@ -158,6 +169,27 @@ class Hits:
             )
             self._counted += some
         return self._lost, self._counted
+
+    def state(self) -> State:
+        """What every ray that is kept has hit, page by page."""
+        width, height = self._points.size
+        pages = np.empty((self.count, height, width), np.uint32)
+        for nth, bank in enumerate(self._banks):
+            image = texture_array(bank.hits)[..., 0]
+            for page, target in enumerate(pages[nth * self.bank : (nth + 1) * self.bank]):
+                x, y, *_ = self._page(page)
+                target[:] = image[y : y + height, x : x + width]
+        return State({"traced": self.traced}, {"pages": pages})
+
+    def restore(self, state: State) -> None:
+        """Keep what is in a ``state``, and nothing else. Raises StateError."""
+        self.forget()
+        pages = state.array("pages", np.uint32, -1, *self._points.size[::-1])
+        for first in range(0, len(pages), self.bank):
+            self._new_bank()
+            for nth, page in enumerate(pages[first : first + self.bank]):
+                self._banks[-1].hits.write(page.tobytes(), viewport=self._page(nth))
+        self.count, self.traced = len(pages), int(state.values["traced"])
 
     def forget(self) -> None:
         """No ray has been traced."""

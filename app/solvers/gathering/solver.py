@@ -32,6 +32,7 @@ from app.solvers.gathering.hits import GROUP, Hits
 from app.solvers.gathering.inspectable import Inspectable
 from app.solvers.gathering.options import GatheringOptions
 from app.util.parts import UnderWay, run_to_end
+from app.util.state import State, StateError
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
@@ -367,6 +368,71 @@ class Gathering:
         self.origins.resized(moves)
         self.direct.resized(moves)
         self._compose.resized()
+
+    # -- kept for later ------------------------------------------------------------------------------------------------
+
+    def state(self) -> State:
+        """All rays that are kept, and what they brought."""
+        self._under_way.finish()
+        state = State({"progress": self._progress.measured, "issued": self.issued, "look_at": self._look_at})
+        state.values |= {"edited": self._edited, "shown": self._shown, "point_level": self._point_level}
+        state.values |= {"judged": [[done, version] for done, version, _ in self._judged]}
+        state.arrays["fresh"] = np.array(sorted(self._fresh), np.int64)
+        for nth, (*_, judged) in enumerate(self._judged):
+            state.arrays[f"judged {nth}"] = np.frombuffer(judged.look(), np.float32)
+        if self._noise is not None:
+            state.values["noise"] = [self._noise.level, self._noise.direct, self._noise_of]
+            state.arrays["gain"] = self._noise.gain
+        for nth, direct in enumerate(self._directs):
+            state.put(f"direct {nth}", direct.state())
+        for name, part in self._kept_parts.items():
+            state.put(name, part.state())
+        return state
+
+    def restore(self, state: State) -> None:
+        """The light that is shown is the lightmap's."""
+        if state.values["point_level"] != self._point_level:
+            raise StateError("light bounced between points of another size")
+        used = np.flatnonzero(self.lightmap.pool.used)
+        if self.lightmap.refinement is not None:
+            self.origins.write(used)
+        fresh = state.array("fresh", np.int64, -1)
+        if not np.isin(fresh, used).all():
+            raise StateError("fresh slots hold nothing")
+        scene = self.lightmap.scene
+        for nth, direct in enumerate(self._directs):
+            direct.restore(state.part(f"direct {nth}"), scene)
+            direct.sum(scene)
+        for name, part in self._kept_parts.items():
+            part.restore(state.part(name))
+        self._fresh, self._edited = set(fresh.tolist()), bool(state.values["edited"])
+        self.issued, self._shown = int(state.values["issued"]), int(state.values["shown"])
+        self._look_at, self._progress = int(state.values["look_at"]), Progress.of(state.values["progress"])
+        if self._shown:
+            self._compose.smooth(self.bounces.gathered, self._shown, smooth=self.options.smooth)
+            self._compose.direct = self._direct_light
+        self._restore_noise(state)
+
+    def _restore_noise(self, state: State) -> None:
+        """What is known of it, of the leaves of some version, and what is on its way."""
+        slots, version = self.lightmap.columns * self.lightmap.rows, self.lightmap.version
+        for nth, (done, of) in enumerate(state.values["judged"]):
+            judged = state.array(f"judged {nth}", np.float32, 4 * slots if of == version else -1)
+            self._judged.append((int(done), int(of), ReadBack.arrived(self.gpu, judged.tobytes())))
+        if "noise" in state.values:
+            level, direct, of = state.values["noise"]
+            gain = state.array("gain", np.float64, slots if of == version else -1)
+            self._noise, self._noise_of = Noise(float(level), float(direct), gain), int(of)
+
+    @property
+    def _kept_parts(self) -> dict[str, Hits | Bounces | Compose]:
+        """Those that have a state of their own."""
+        return {"hits": self.hits, "bounces": self.bounces, "compose": self._compose}
+
+    @property
+    def _point_level(self) -> int:
+        """The level of the points' texels, which goes with the leaves that there were when this was made."""
+        return -1 if self.points is self.lightmap else int(self.points.pool.leaves.level.max())
 
     # -- what there is to see ------------------------------------------------------------------------------------------
 

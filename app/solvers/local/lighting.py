@@ -126,7 +126,7 @@ class Lighting:
         )
         if self._reading is not None:
             self.from_outside = float(np.frombuffer(self._reading.take(), np.float32)[3])
-        self._reading = ReadBack(self._gpu, self._targets[self.outside])
+        self._reading = ReadBack.of(self._gpu, self._targets[self.outside])
 
     def compose(self, direct: Texture, tiles: NDArray[np.int64], *, stays: float = 0.0) -> None:
         """Write H of the lightmap in the slots of these tiles, direct and indirect light; a share of what was there stays."""

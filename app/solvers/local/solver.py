@@ -38,6 +38,7 @@ from app.solvers.local.rows import BYTES, ROWS_OF_A_NODE, Rows, rows_in
 from app.solvers.local.selection import Swap
 from app.solvers.local.tiles import Tiles
 from app.util.parts import UnderWay, run_to_end
+from app.util.state import State
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
@@ -345,6 +346,16 @@ class Local:
     def _look(self) -> None:
         """Which nodes are wanted in the set from here."""
         self.exchange.look(self._tiles.observer, self.options.outside)
+
+    # -- kept for later ------------------------------------------------------------------------------------------------
+
+    def state(self) -> State:
+        """Nothing: what is around the observer is lit anew in seconds, wherever it is by then."""
+        return State()
+
+    def restore(self, state: State) -> None:
+        """It begins anew."""
+        self.lightmap.clear()
 
     # -- what there is to see ------------------------------------------------------------------------------------------
 

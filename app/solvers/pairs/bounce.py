@@ -17,6 +17,7 @@ from app.solvers.pairs.options import PairsOptions
 from app.solvers.pairs.pace import Pace
 from app.solvers.pairs.senders import Senders
 from app.solvers.pairs.sent import Sent
+from app.util.state import State, StateError
 
 LEAST_SENDERS = 256  # in a block, where a band can be narrower instead
 
@@ -24,7 +25,8 @@ LEAST_SENDERS = 256  # in a block, where a band can be narrower instead
 class Bounce:
     """Bounces of one lightmap by one choice of options. Whoever makes it releases it.
 
-    pairs: that a bounce looks at, texels times choices. share: of the bounce under way that is done.
+    pairs: that a bounce looks at, texels times choices. share: of the bounce under way that is done. at: row, rows of the band
+    and choice at which it goes on; None where none is under way.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, scenes: Scenes, options: PairsOptions, pace: Pace) -> None:
@@ -34,35 +36,62 @@ class Bounce:
         self._gather, self.kept = gather_of(gpu, lightmap, self.senders, scenes, options)
         self.pairs = self.senders.table.count * self._gather.choices
         self.share = 0.0
+        self.at: tuple[int, int, int] | None = None
 
     def run(
         self, target: Framebuffer, received: Texture, mean: float, bounce: int, show: Callable[[Area], None]
     ) -> Iterator[None]:
         """The bounce of this number into a target, from what texels have received, in parts. mean: B̄ over all surfaces [stored
-        units]. show: called with each band of the target that is whole."""
-        self.share = 0.0
+        units]. show: called with each band of the target that is whole. One that is under way goes on where it is."""
         if self.kept is not None:
             filled = self.kept.full
             yield from self.kept.fill(self._pace)
             if not filled:
                 self._pace.forget()  # to look a bit up costs less than to find it
         yield from self._sent.draw(received, mean, self._options.merge)
-        target.clear()
         width, height = self._lightmap.size
-        row, done, choices = 0, 0, self._gather.choices
+        choices = self._gather.choices
+        if self.at is None:
+            target.clear()
+            self.at = 0, self._rows_from(0), 0
+        row, rows, first = self.at
         while row < height:
-            least = min(LEAST_SENDERS, choices)
-            rows = height if self._gather.whole else min(max(self._pace.pairs // (width * least), 1), height - row)
-            area, first = (0, row, width, rows), 0
+            area = 0, row, width, rows
             while first < choices:
                 count = min(max(self._pace.pairs // (width * rows), 1), self._gather.most, choices - first)
                 with self._pace.timed(width * rows * count):
                     self._gather.draw(target, self._sent.textures, area, first, count, bounce)
-                first, done = first + count, done + width * rows * count
-                self.share = done / (width * height * choices)
+                first += count
+                self.share = (row + rows * first / choices) / height
+                self.at = row, rows, first
                 yield
             show(area)
-            row += rows
+            row, first = row + rows, 0
+            rows = self._rows_from(row)
+        self.at, self.share = None, 0.0
+
+    def _rows_from(self, row: int) -> int:
+        """Of the band that begins there."""
+        width, height = self._lightmap.size
+        least = min(LEAST_SENDERS, self._gather.choices)
+        return height if self._gather.whole else min(max(self._pace.pairs // (width * least), 1), height - row)
+
+    def state(self) -> State:
+        """Where the bounce under way is, and what is known of pairs."""
+        state = State({"at": self.at})
+        if self.kept is not None:
+            state.put("kept", self.kept.state())
+        return state
+
+    def restore(self, state: State) -> None:
+        """Go on as from a ``state``; the target holds what it has so far. Raises StateError."""
+        if (at := state.values["at"]) is not None:
+            row, rows, first = map(int, at)
+            if not (0 <= row and 0 < rows and row + rows <= self._lightmap.size[1] and 0 <= first):
+                raise StateError(f"a bounce that is at row {row}")
+            self.at = row, rows, first
+        if self.kept is not None:
+            self.kept.restore(state.part("kept"))
 
     @property
     def foreseen(self) -> float | None:

@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from app.gpu import Gpu, Pass, Texture
+from app.gpu import Gpu, Pass, Texture, keep, take_over
 from app.lightmap.lightmap import Lightmap
 from app.solvers.pairs.occlusion import Occlusion
 from app.solvers.pairs.pace import Pace
 from app.solvers.pairs.senders import Senders
+from app.util.state import State
 
 WIDTH = 8192  # words in a row of the texture: 256² texels fill 8193 rows
 WORD = 32  # bits
@@ -81,6 +82,17 @@ class KeptPairs:
                 )
             self._next += done
             yield
+
+    def state(self) -> State:
+        """What was found so far."""
+        state = State({"next": self._next})
+        keep(state, bits=self._bits)
+        return state
+
+    def restore(self, state: State) -> None:
+        """Know what is in a ``state``. Raises StateError."""
+        take_over(state, bits=self._bits)
+        self._next = int(state.values["next"])
 
     @property
     def textures(self) -> dict[str, Texture]:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import UserError
-from app.gpu import Framebuffer, Gpu, Pass, Texture
+from app.gpu import Framebuffer, Gpu, Pass, Texture, keep, take_over
 from app.lightmap.lightmap import Lightmap
 from app.scene.lights import Light
 from app.scene.model import F64, Material
@@ -30,6 +30,7 @@ from app.solvers.pairs.occlusion import Scenes
 from app.solvers.pairs.options import PairsOptions, check
 from app.solvers.pairs.pace import PART, Pace
 from app.util.parts import is_running, run_to_end
+from app.util.state import State
 
 PIECE = 0.1  # seconds of a bounce that are one piece of work: a solve looks at its clock in between
 NO_SKY = "--solver pairs: texels gather from texels, and not from the sky; the other solvers do"
@@ -86,9 +87,7 @@ class Pairs:
         return 1
 
     def _one_bounce(self) -> Iterator[None]:
-        if self._bounce is None:
-            self._bounce = Bounce(self._gpu, self._lightmap, self._scenes, self.options, self._pace)
-        yield from self._bounce.run(
+        yield from self._begin_bounce().run(
             self._targets[1], self._light[0], self._books.mean_sent, self.issued, self._show_area
         )
         self._light.reverse()
@@ -97,6 +96,12 @@ class Pairs:
         self._books.enter(np.frombuffer(self._light[0].read(), np.float32).reshape(height, width, 4))
         self.issued += 1
         self._measure()
+
+    def _begin_bounce(self) -> Bounce:
+        """What bounces by the options as they are."""
+        if self._bounce is None:
+            self._bounce = Bounce(self._gpu, self._lightmap, self._scenes, self.options, self._pace)
+        return self._bounce
 
     def _show_area(self, area: Area) -> None:
         """What a band has received, in the lightmap."""
@@ -122,6 +127,8 @@ class Pairs:
         """Forget what there is of the bounce under way: it would mix two solutions."""
         self._finish()
         self._rest = None
+        if self._bounce is not None:
+            self._bounce.at = None
 
     # -- how far it is -------------------------------------------------------------------------------------------------
 
@@ -224,6 +231,30 @@ class Pairs:
             self._bounce = None
         self._pace.forget()
         self._note = None
+
+    # -- kept for later ------------------------------------------------------------------------------------------------
+
+    def state(self) -> State:
+        """Bounces that are whole, and what there is of the one under way."""
+        self._finish()
+        state = State({"progress": self._progress.measured, "issued": self.issued})
+        keep(state, received=self._light[0], under_way=self._light[1])
+        state.arrays |= {"before": self._books.before, "books": self._books.received}
+        if self._bounce is not None:
+            state.put("bounce", self._bounce.state())
+        return state
+
+    def restore(self, state: State) -> None:
+        """Where a bounce is under way it goes on with the next piece of work."""
+        take_over(state, received=self._light[0], under_way=self._light[1])
+        shape = self._books.received.shape
+        self._books.before, self._books.received = (state.array(n, np.float32, *shape) for n in ("before", "books"))
+        self.issued = int(state.values["issued"])
+        self._progress = Progress.of(state.values["progress"])
+        self._progress = self._judged(self._progress.remaining)
+        bounce = state.part("bounce")
+        if bounce.values:
+            self._begin_bounce().restore(bounce)
 
     # -- what there is to see ------------------------------------------------------------------------------------------
 

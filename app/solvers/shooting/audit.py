@@ -10,6 +10,7 @@ from collections.abc import Generator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.gpu import Gpu, Pass
 from app.lightmap.lightmap import Lightmap
@@ -68,6 +69,15 @@ class Auditor:
     def begin(self) -> None:
         """Audit batches again: they may be strong again."""
         self.wanted = self._enabled
+
+    @property
+    def sound(self) -> NDArray[np.int64]:
+        """(n, 3) column, row and edge of the patches that passed."""
+        return np.array(sorted(self._sound), np.int64).reshape(-1, 3)
+
+    @sound.setter
+    def sound(self, patches: NDArray[np.int64]) -> None:
+        self._sound = {(x, y, edge) for x, y, edge in patches.tolist()}
 
     def forget(self) -> None:
         """Patches may be others now."""

@@ -19,7 +19,7 @@ from collections.abc import Callable, Generator, Iterator
 
 import numpy as np
 
-from app.gpu import Gpu
+from app.gpu import Gpu, keep, take_over
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
 from app.lightmap.tile_pool import Moves
@@ -41,6 +41,7 @@ from app.solvers.shooting.replay import Replay
 from app.solvers.shooting.see import See, fitting_resolution
 from app.solvers.shooting.shooters import ShooterBatch
 from app.util.parts import run_to_end
+from app.util.state import State
 from app.visibility.occluders import occluders_of
 
 
@@ -209,6 +210,34 @@ class Batch:
         self.receivers.follow()
         if self.replay is not None:
             self.replay.resized(moves)
+
+    # -- kept for later ------------------------------------------------------------------------------------------------
+
+    def state(self) -> State:
+        """All that the next batch follows from, but the light."""
+        phases, auditor = self.phases, self.auditor
+        state = State({"phase": phases.index, "even": phases.even, "audits": auditor.wanted})
+        state.values["settled"] = self.groups.settled
+        state.arrays |= {"marks": self.marks.levels.copy(), "sound": auditor.sound}
+        keep(state, overshoot=self.ambient.overshoot)
+        state.put("ledger", self.ledger.state())
+        if self.replay is not None:
+            state.put("replay", self.replay.state())
+        return state
+
+    def restore(self, state: State) -> None:
+        """Go on as from a ``state``, on the leaves that there are now. Raises StateError."""
+        self.receivers.follow()
+        self.phases.begin(int(state.values["phase"]))
+        self.phases.even = bool(state.values["even"])
+        self.auditor.wanted, self.auditor.sound = bool(state.values["audits"]), state.array("sound", np.int64, -1, 3)
+        self.groups.settled = float(state.values["settled"])
+        self.marks.levels[:] = state.array("marks", np.float32, *self.marks.levels.shape)
+        self.marks.upload()
+        take_over(state, overshoot=self.ambient.overshoot)
+        self.ledger.restore(state.part("ledger"))
+        if self.replay is not None:
+            self.replay.restore(state.part("replay"))
 
     # -- one by one ----------------------------------------------------------------------------------------------------
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.gpu import Gpu, Pass, Texture
+from app.gpu import Gpu, Pass, Texture, keep, take_over
 from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
 from app.solvers.base import EnergyBalance
 from app.solvers.shooting.records import BATCH, LEDGER, RECORDS
 from app.solvers.shooting.see import Maps
 from app.solvers.shooting.shooters import ShooterBatch
+from app.util.state import State
 
 
 class Ledger:
@@ -112,6 +113,23 @@ class Ledger:
     def clear(self) -> None:
         """Nothing has been shot."""
         self.target.clear()
+
+    def state(self) -> State:
+        """All that was entered and weighed."""
+        known = {"emitted": self.emitted, "from_sky": self.from_sky, "from_points": self.from_points}
+        state = State({"albedo": list(self.albedo), "area": self.area})
+        state.arrays.update({name: np.array(power, np.float64) for name, power in known.items()})
+        keep(state, entries=self.texture)
+        return state
+
+    def restore(self, state: State) -> None:
+        """Have entered what was entered in a ``state``. Raises StateError."""
+        take_over(state, entries=self.texture)
+        self.emitted, self.from_sky, self.from_points = (
+            state.array(name, np.float64, 3) for name in ("emitted", "from_sky", "from_points")
+        )
+        red, green, blue = state.values["albedo"]
+        self.albedo, self.area = (red, green, blue), float(state.values["area"])
 
     def resize(self) -> None:
         """For a lightmap that has got another number of slots. The ledger stays."""

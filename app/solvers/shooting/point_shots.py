@@ -10,7 +10,8 @@ seen. All of them shoot before the first patch does; an edit shoots the differen
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from app.solvers.shooting.receivers import Receivers
 from app.solvers.shooting.records import BATCH, BLOCK_ROWS, SHOOTER
 from app.solvers.shooting.see import See
 from app.solvers.shooting.shooters import ShooterBatch
+from app.util.state import State, StateError
 from app.visibility.occluders import Occluders
 
 PLACES = 32  # in the sphere of a light with a radius
@@ -101,6 +103,24 @@ class PointShots:
     @property
     def flux(self) -> F64:
         return np.asarray(sum((s.solid_angle * intensity for s, intensity in self._shot().items()), np.zeros(3)))
+
+    def state(self) -> State:
+        """What was given, and what is to come."""
+        given = [[asdict(source), intensity.tolist()] for source, intensity in self._given.items()]
+        queue = [[asdict(source), intensity.tolist(), axis.tolist()] for source, intensity, axis in self._queue]
+        return State({"given": given, "queue": queue, "at": self._at})
+
+    def restore(self, state: State) -> None:
+        """Go on as from a ``state``. Raises StateError."""
+        known: dict[Light, Light] = {}  # the two halves of a light are of the same one
+        self._given = {_light(source, known): np.array(intensity) for source, intensity in state.values["given"]}
+        self._queue = [
+            (_light(source, known), np.array(intensity), np.array(axis))
+            for source, intensity, axis in state.values["queue"]
+        ]
+        self._at = int(state.values["at"])
+        if not 0 <= self._at <= len(self._queue):
+            raise StateError(f"{self._at} of {len(self._queue)} shots")
 
     def shoot(self, shots: int, bands: int) -> Generator[None, None, int]:
         """The next ones, up to so many, in parts. Returns how many; whole lights, so that what was given is known."""
@@ -182,6 +202,13 @@ def _queue_of(sources: Sources) -> list[tuple[Light, F64, F64]]:
         for source, intensity in sources.items()
         for axis in ((np.array(source.direction),) if source.kind == "spot" else (ASIDE, -ASIDE))
     ]
+
+
+def _light(values: dict[str, Any], known: dict[Light, Light]) -> Light:
+    """The light of these fields: the same one as before, where it is known."""
+    fields: dict[str, Any] = {name: tuple(of) if isinstance(of, list) else of for name, of in values.items()}
+    light = Light(**fields)
+    return known.setdefault(light, light)
 
 
 def _half(source: Light) -> float:

@@ -19,7 +19,7 @@ from collections.abc import Generator
 import numpy as np
 from numpy.typing import NDArray
 
-from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
+from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture, keep, take_over
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
 from app.lightmap.textures import QUAD_FORMAT, quads
@@ -29,9 +29,11 @@ from app.solvers.shooting.material_edits import MaterialEdits
 from app.solvers.shooting.point_shots import PointShots
 from app.solvers.shooting.receive import Receive
 from app.solvers.shooting.receivers import receiver_meshes
+from app.solvers.shooting.records import BLOCK_ROWS
 from app.solvers.shooting.see import See
 from app.solvers.shooting.shooters import ShooterBatch
 from app.solvers.shooting.shot_log import ShotLog
+from app.util.state import State, StateError
 
 # Once the strongest shot left holds less of the emitted power, light is so even that interpolation serves: the Cornell box errs
 # by 1.7 % where 100 of 2200 shots count as strong, as where all do, and by 2.5 % where the first 60 do.
@@ -85,6 +87,47 @@ class Replay:
         self.forget_strong()
         self.log.release()
         self._gpu.release_all(self._correction_target, self._correction)
+
+    # -- kept for later ------------------------------------------------------------------------------------------------
+
+    def state(self) -> State:
+        """All shots, which leaves are fresh, and the replay that is under way."""
+        names = ("_replayed_at", "_replayed", "_strong_shots", "_weak", "all_again")
+        state = State({name: getattr(self, name) for name in names})
+        state.arrays |= {"shots": self.log.rows(), "fresh": np.array(sorted(self.fresh), np.int64)}
+        if self._strong is not None:
+            keep(state, strong=self._strong[0])
+        if (pending := self.under_way) is not None:
+            state.values["pending"] = [pending.next, pending.end, pending.weak, pending.points_done]
+            state.arrays["pending"] = pending.slots
+            keep(state, correction=self._correction)
+        return state
+
+    def restore(self, state: State) -> None:
+        """Know what is in a ``state``, of the leaves that there are now. Raises StateError."""
+        self.stop()
+        self.forget_strong()
+        self.log.restore(state.array("shots", np.float32, -1, BLOCK_ROWS, 4))
+        self.fresh = set(self._slots(state, "fresh").tolist())
+        self._replayed_at, self._replayed = int(state.values["_replayed_at"]), int(state.values["_replayed"])
+        self._strong_shots, self._weak = int(state.values["_strong_shots"]), bool(state.values["_weak"])
+        self.all_again = bool(state.values["all_again"])
+        if "strong" in state.arrays:
+            self._strong = self._texels()
+            take_over(state, strong=self._strong[0])
+        if "pending" in state.values:
+            following, end, weak, points_done = state.values["pending"]
+            self.under_way = Pending(self._gpu, self._lightmap, self._slots(state, "pending"), min(end, self.log.count))
+            self.under_way.next, self.under_way.weak = int(following), bool(weak)
+            self.under_way.points_done = bool(points_done)
+            take_over(state, correction=self._correction)
+
+    def _slots(self, state: State, name: str) -> NDArray[np.int64]:
+        """Slots that hold leaves. Raises StateError."""
+        slots = state.array(name, np.int64, -1)
+        if not np.isin(slots, np.flatnonzero(self._lightmap.pool.used)).all():
+            raise StateError(f"{name} slots hold nothing")
+        return slots
 
     # -- strong and weak shots -----------------------------------------------------------------------------------------
 

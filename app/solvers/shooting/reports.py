@@ -12,6 +12,7 @@ from app.solvers.shooting.choose import Bins, Choice
 from app.solvers.shooting.ledger import Ledger
 from app.solvers.shooting.records import RECORDS, REPORT, SHOOTER
 from app.solvers.shooting.shooters import ShooterBatch
+from app.util.state import State
 
 LAG = 2  # read-backs in flight before the oldest is looked at
 
@@ -24,7 +25,7 @@ class Reports:
         self._texture = gpu.texture((REPORT.rows + SHOOTER.rows, 1), 4, "f4")
         self._target = gpu.target(self._texture)
         self._make = Pass(gpu, "solvers/shooting/report", slots=RECORDS)
-        self._sent: deque[tuple[Choice, ReadBack]] = deque()
+        self._sent: deque[tuple[Choice | None, ReadBack]] = deque()
 
     def send(self, choice: Choice, bins: Bins, ledger: Ledger, shooters: ShooterBatch) -> None:
         """Report a batch of this choice: the state before it, and its first shooter."""
@@ -37,10 +38,11 @@ class Reports:
                 "t_shooters": shooters.texture,
             },
         )
-        self._sent.append((choice, ReadBack(self._gpu, self._target)))
+        self._sent.append((choice, ReadBack.of(self._gpu, self._target)))
 
-    def arrived(self, *, wait: bool) -> Iterator[tuple[Choice, np.void, np.void]]:
-        """Those that have arrived, or with ``wait`` all: the choice, REPORT and SHOOTER of each."""
+    def arrived(self, *, wait: bool) -> Iterator[tuple[Choice | None, np.void, np.void]]:
+        """Those that have arrived, or with ``wait`` all: the choice, unless that is no more, REPORT and
+        SHOOTER of each."""
         while self._sent and (wait or len(self._sent) > LAG):
             choice, readback = self._sent.popleft()
             texels = np.frombuffer(readback.take(), np.float32).reshape(-1, 4)
@@ -54,6 +56,25 @@ class Reports:
         """Forget those on their way."""
         while self._sent:
             self._sent.popleft()[1].take()
+
+    def state(self, choices: list[Choice]) -> State:
+        """Those on their way, each of one of the choices, or of none of them."""
+        number = [choices.index(choice) if choice in choices else -1 for choice, _ in self._sent]
+        rows = [np.frombuffer(readback.look(), np.float32) for _, readback in self._sent]
+        return State(
+            arrays={
+                "choices": np.array(number, np.int64),
+                "texels": np.array(rows, np.float32).reshape(-1, 4 * self._texture.width),
+            }
+        )
+
+    def restore(self, state: State, choices: list[Choice]) -> None:
+        """Have those of a ``state`` on their way. Raises StateError."""
+        self.drop()
+        rows = state.array("texels", np.float32, -1, 4 * self._texture.width)
+        for number, row in zip(state.array("choices", np.int64, len(rows)).tolist(), rows, strict=True):
+            choice = choices[number] if number >= 0 else None
+            self._sent.append((choice, ReadBack.arrived(self._gpu, row.tobytes())))
 
     def release(self) -> None:
         self.drop()

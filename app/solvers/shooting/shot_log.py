@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from app.gpu import Framebuffer, Gpu, Pass, Texture
-from app.scene.model import F64
+import numpy as np
+
+from app.gpu import Framebuffer, Gpu, Pass, Texture, texture_array
+from app.scene.model import F32, F64
 from app.solvers.shooting.material_edits import MaterialEdits
 from app.solvers.shooting.records import BATCH, BLOCK_ROWS
 from app.solvers.shooting.shooters import ShooterBatch
@@ -24,10 +26,27 @@ class ShotLog:
         """Append the first shots of the batch."""
         for page, row, first, some in _pieces(self.count, shots):
             if page == len(self._pages):
-                rows = self._gpu.texture((BLOCK_ROWS, PAGE), 4, "f4")
-                self._pages.append((rows, self._gpu.target(rows)))
+                self._new_page()
             self._draw(self._pages[page][1], self._shooters.texture, first - row, (0, row, BLOCK_ROWS, some))
         self.count += shots
+
+    def _new_page(self) -> None:
+        rows = self._gpu.texture((BLOCK_ROWS, PAGE), 4, "f4")
+        self._pages.append((rows, self._gpu.target(rows)))
+
+    def rows(self) -> F32:
+        """(count, BLOCK_ROWS, 4) f32 of all shots. Waits for the GPU."""
+        pages = [texture_array(page) for page, _ in self._pages]
+        return np.concatenate([*pages, np.zeros((0, BLOCK_ROWS, 4), np.float32)])[: self.count]
+
+    def restore(self, rows: F32) -> None:
+        """Hold these shots, and no others."""
+        self.count = len(rows)
+        for page, first in enumerate(range(0, self.count, PAGE)):
+            if page == len(self._pages):
+                self._new_page()
+            some = rows[first : first + PAGE]
+            self._pages[page][0].write(some.tobytes(), viewport=(0, 0, BLOCK_ROWS, len(some)))
 
     def recall(self, first: int) -> int:
         """Make the batch of the shots from ``first`` on; how many."""

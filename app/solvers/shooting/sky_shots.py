@@ -25,6 +25,7 @@ from app.scene.sky import Sky
 from app.scene.sky_directions import Directions, axes_of, directions_of
 from app.solvers.shooting.choose import band_of
 from app.solvers.shooting.records import BATCH, OPEN
+from app.util.state import State, StateError
 from app.visibility.occluders import Occluders
 
 PIXELS = 1024  # along the edge of a map
@@ -89,6 +90,20 @@ class SkyShots:
         """Of the light, summed over directions, that is to come."""
         power = np.abs(self._wanted.irradiance).sum(1)
         return float(power[self._at :].sum() / max(power.sum(), 1e-300))
+
+    def state(self) -> State:
+        """What was given, and what is to come."""
+        arrays = {"given": np.stack(self._given), "wanted": np.stack(self._wanted)}
+        return State({"at": self._at, "made": self.made}, {name: np.array(a, np.float64) for name, a in arrays.items()})
+
+    def restore(self, state: State) -> None:
+        """Go on as from a ``state`` of the same sky and lights. Raises StateError."""
+        self._given, self._wanted = (
+            Directions(*state.array(name, np.float64, 2, -1, 3)) for name in ("given", "wanted")
+        )
+        self._at, self.made = int(state.values["at"]), int(state.values["made"])
+        if not 0 <= self._at <= len(self._wanted.towards):
+            raise StateError(f"{self._at} of {len(self._wanted.towards)} directions")
 
     def shoot(self, shots: int, bands: int) -> Generator[None, None, int]:
         """The next ones, up to so many, in parts. Returns how many."""

@@ -31,6 +31,7 @@ from app.solvers.shooting.records import BATCH, Shot, powers_of, shot_of, sizes_
 from app.solvers.shooting.reports import Reports
 from app.solvers.shooting.sky_shots import SkyShots
 from app.util.parts import UnderWay, run_to_end
+from app.util.state import State, StateError
 from app.visibility.item_image import ItemImage
 
 LOOK_AFTER = 32  # shots, or a quarter of all, between two looks at leaves that did not change at the last
@@ -242,10 +243,10 @@ class Shooting:
         converged = bool(self._all_shot) and not refining
         return replace(self._progress, converged=converged, refining=refining, note=note)
 
-    def _follow_report(self, choice: Choice, report: np.void, shooter: np.void) -> None:
+    def _follow_report(self, choice: Choice | None, report: np.void, shooter: np.void) -> None:
         """Take in the REPORT of a batch of this choice, and its first SHOOTER."""
         unshot, options = self._share(float(report["unshot"])), self.options
-        if choice is self.batch.phases.now:
+        if choice is not None and choice is self.batch.phases.now:
             if choice.settles:
                 finer = float(report["strongest"]) <= self.batch.groups.settled
             else:
@@ -396,6 +397,34 @@ class Shooting:
 
     def resized(self, moves: Moves) -> None:
         self.batch.resized(moves)
+
+    # -- kept for later ------------------------------------------------------------------------------------------------
+
+    def state(self) -> State:
+        """Besides the batch's own, the reports on their way: they decide later what shoots next."""
+        self._under_way.finish()
+        state = State({"progress": self._progress.measured, "issued": self.issued, "look_at": self._look_at})
+        state.values["before_sky"] = self._before_sky.tolist()
+        state.put("batch", self.batch.state())
+        state.put("reports", self._reports.state(self.batch.phases.choices))
+        for name, shots in (("points", self._points), ("sky", self._sky)):
+            if shots is not None:
+                state.put(name, shots.state())
+        return state
+
+    def restore(self, state: State) -> None:
+        """The last shot is not known until the next is."""
+        for name, shots in (("points", self._points), ("sky", self._sky)):
+            kept = state.part(name)
+            if shots is not None and kept.values:
+                shots.restore(kept)
+            elif shots is not None or kept.values:
+                raise StateError(f"it has other {name} to shoot")
+        self.batch.restore(state.part("batch"))
+        self._reports.restore(state.part("reports"), self.batch.phases.choices)
+        self._progress, self.issued = Progress.of(state.values["progress"]), int(state.values["issued"])
+        self._look_at = int(state.values["look_at"])
+        self._before_sky = np.array(state.values["before_sky"], np.float64).reshape(3)
 
     # -- what there is to see ------------------------------------------------------------------------------------------
 
