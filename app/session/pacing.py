@@ -1,5 +1,5 @@
-"""How much of a solve fits into a frame: several pieces of work in fast scenes, a part of one in slow ones, less while a hand is
-at the controls."""
+"""How much of a solve fits into a frame: one unit of work to watch, or fast as much as there is time for; a part of one in slow
+scenes; less while a hand is at the controls."""
 
 from __future__ import annotations
 
@@ -13,11 +13,17 @@ from app.util.parts import run_to_end
 
 LONG_FRAME = 0.07  # seconds from one advance to the next: a frame of 100 ms would be felt as a halt
 INTERACTIVE_FRAME = 1 / 30  # s, while a hand is at the controls: what it does is seen at once
-INTERACTIVE_BUDGET = 4.0  # ms of such a frame, that solving gets also where all else takes too long already
+WATCH_BUDGET = 20.0  # ms of a frame after which no further part of one unit of work starts
+LEAST_BUDGET = 4.0  # ms of a frame that solving gets also where all else takes too long already
+# ms: where drawing takes a quarter of a frame or less, a fast one is as long as that, within these bounds: 60 to 15 pictures a
+# second
+SHORTEST_FAST, LONGEST_FAST, DRAWING = 1e3 / 60, 1e3 / 15, 1 / 4
+EVEN_FAST = 100.0  # ms that a fast frame may take so that solving gets as long as drawing
+WHOLE = 1 / 2  # of the budget: batches that take no longer are made whole
+MOST = 1 << 30  # of work at once: a solver's own batch is less
 PART_STAYS = 0.9  # share of the longest part of late, and
 REST_STAYS = 0.8  # of what else a frame takes, that goes into the next guess
 MOST_BANDS = 16
-OVER = object()  # no part is left
 SLOW_FRAME, FAST_FRAME = 0.08, 0.05  # s for solving and drawing, beyond which they take turns, and below which not
 
 
@@ -38,7 +44,7 @@ class Turns:
 
 
 class Pacer:
-    """What lets a solver work once per frame, as much as the frame has time for."""
+    """What lets a solver work once per frame: one unit of work to watch, or fast, as much as the frame has time for."""
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
@@ -46,59 +52,53 @@ class Pacer:
 
     def begin(self) -> None:
         """Forget how fast the last solve was."""
-        self._last = self._start = 0.0
-        self._unit = self._so_far = 0.0  # ms that the last unit of work took, and the one under way so far
-        self._part = self._solved = self._rest = (
-            0.0  # ms: the longest part of late; of the last frame, solving; all else
-        )
-        self._batch = self._bands = 1
-        self._parts: Generator[None, None, int] | None = None  # of one unit of work, over several frames
+        self._last = self._start = self._end = 0.0
+        self._rest = 0.0  # ms: what a frame takes beside solving
+        self._part = 0.0  # ms: the longest part of late
+        self._unit = self._so_far = 0.0  # ms that the last piece of work took, and the one under way so far
+        self._bands = 1
+        self._parts: Generator[None, None, int] | None = None  # of one piece of work, over several frames
 
     def pause(self) -> None:
         """No lap runs until the next advance."""
-        self._last = self._start = 0.0
+        self._last = self._start = self._end = 0.0
 
-    def advance(self, solver: Solver[Any], budget_ms: float, amount: int, *, interactive: bool = False) -> int:
-        """Do up to ``amount`` of work within ``budget_ms``, or a part of one unit; how much is whole. interactive: a hand is at
-        the controls, which frames keep up with."""
+    def advance(self, solver: Solver[Any], *, fast: bool, interactive: bool = False) -> int:
+        """Do one unit of work, or a part of it; if ``fast``, as much as fits. How much is whole. interactive: a hand is at the
+        controls, which frames keep up with, fast or not."""
         start = time.perf_counter()
-        self._look_back(start)
-        pieces = self._pieces(start, INTERACTIVE_FRAME if interactive else LONG_FRAME) > 1
-        budget = min(budget_ms, self._left) if interactive else budget_ms
-        if (interactive and (pieces or self._unit > budget)) or (pieces and amount == 1):
-            made = self._advance_some(solver, start, budget)
+        bands = self._pieces(start, INTERACTIVE_FRAME if interactive else LONG_FRAME)
+        if interactive:
+            whole = bands == 1 and self._unit <= self._left
+            made = self._whole(solver, start) if whole else self._some(solver, start, self._left, 1)
+        elif not fast:
+            made = self._whole(solver, start) if bands == 1 else self._some(solver, start, WATCH_BUDGET, 1)
         else:
-            made = self._advance_whole(solver, start, budget_ms, amount)
-        self._solved = (time.perf_counter() - start) * 1e3
+            budget = self._fast_budget
+            whole = bands == 1 and 0 < self._unit <= WHOLE * budget
+            made = self._whole(solver, start, budget, MOST) if whole else self._some(solver, start, budget, MOST)
+        self._end = time.perf_counter()
         return made
 
-    def _look_back(self, now: float) -> None:
-        """Learn from the last frame what one takes beside solving."""
-        if self._start:
-            rest = (now - self._start) * 1e3 - self._solved
+    def drawn(self) -> None:
+        """The frame that solved is drawn: learn what one takes beside solving. Waits for the GPU, but not for the screen."""
+        if self._end:
+            self._gpu.ctx.finish()
+            rest = (time.perf_counter() - self._end) * 1e3
             self._rest = REST_STAYS * self._rest + (1 - REST_STAYS) * rest if self._rest else rest
+            self._end = 0.0
 
     @property
     def _left(self) -> float:
         """ms after which no further part starts, so that an interactive frame ends in time."""
-        return max(INTERACTIVE_FRAME * 1e3 - self._rest - self._part, INTERACTIVE_BUDGET)
+        return max(INTERACTIVE_FRAME * 1e3 - self._rest - self._part, LEAST_BUDGET)
 
-    def _advance_whole(self, solver: Solver[Any], start: float, budget_ms: float, amount: int) -> int:
-        """Whole units of work, what was begun as well."""
-        made, self._parts = 0, None
-        while made < amount:
-            more = run_to_end(solver.work(min(amount - made, self._batch)))
-            made += more
-            if not more and solver.poll().converged:
-                break  # nothing is left to do but what an edit asked for
-            if made < amount:
-                self._gpu.ctx.finish()
-                spent = (time.perf_counter() - start) * 1e3
-                self._batch = max(1, int((budget_ms - spent) / (spent / max(made, 1))))
-                if spent >= budget_ms:
-                    break
-        self._unit = (time.perf_counter() - start) * 1e3 / max(made, 1)
-        return made
+    @property
+    def _fast_budget(self) -> float:
+        """ms that a fast frame solves: three quarters of it where that leaves 15 pictures a second; as long as drawing takes
+        where that leaves 10."""
+        frame = min(max(self._rest / DRAWING, SHORTEST_FAST), LONGEST_FAST)
+        return max(frame - self._rest, min(self._rest, EVEN_FAST - self._rest), LEAST_BUDGET)
 
     def lap(self) -> float:
         """Seconds since the last lap, 0 after a pause."""
@@ -119,20 +119,42 @@ class Pacer:
         self._start = now
         return self._bands
 
-    def _advance_some(self, solver: Solver[Any], start: float, budget_ms: float) -> int:
-        """Parts of work, as many as the budget allows, with no more than one unit begun."""
-        begun, made, anew = start, 0, False
+    def _whole(self, solver: Solver[Any], start: float, budget_ms: float = 0.0, amount: int = 1) -> int:
+        """Whole pieces of work, what was begun as well: one unit, or of more at once as many as the budget allows."""
+        made, spent, self._parts = 0, 0.0, None
+        while True:
+            more = run_to_end(solver.work(amount))
+            if amount > 1:
+                self._gpu.ctx.finish()
+            before, spent = spent, (time.perf_counter() - start) * 1e3
+            self._unit, made = spent - before, made + more
+            if amount == 1 or spent + self._unit > budget_ms or solver.poll().converged:
+                return made
+
+    def _some(self, solver: Solver[Any], start: float, budget_ms: float, amount: int) -> int:
+        """Parts of work, as many as the budget allows: of pieces of so much at once, and where that is one unit, of no more than
+        one that is begun here."""
+        begun, made, anew, ended = start, 0, False, False
         while (begun - start) * 1e3 < budget_ms:
             if self._parts is None:
-                if anew:
+                if anew if amount == 1 else ended and solver.poll().converged:
                     break
-                self._parts, self._so_far, anew = solver.work(1, self._bands), 0.0, True
-            if next(self._parts, OVER) is OVER:
-                self._parts = None
+                self._parts, self._so_far, anew = solver.work(amount, self._bands), 0.0, True
+            more = self._next_part()
             self._gpu.ctx.finish()
             now = time.perf_counter()
             part, begun = (now - begun) * 1e3, now
             self._part, self._so_far = max(PART_STAYS * self._part, part), self._so_far + part
-            if self._parts is None:
-                self._unit, made = self._so_far, made + 1
+            if more is not None:
+                self._unit, made, ended = self._so_far, made + more, True
         return made
+
+    def _next_part(self) -> int | None:
+        """Do one; after the last of a piece of work, how much that was."""
+        assert self._parts is not None
+        try:
+            next(self._parts)
+        except StopIteration as last:
+            self._parts = None
+            return int(last.value or 0)  # nothing where another has ended it
+        return None

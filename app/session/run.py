@@ -183,12 +183,16 @@ class Run:
 
     # -- in a window ---------------------------------------------------------------------------------------------------
 
-    def advance(self, budget_ms: float, amount: int, *, interactive: bool) -> int:
-        """Do up to so much work within ``budget_ms``, see ``Pacer.advance``; how much was issued."""
+    def advance(self, *, fast: bool, interactive: bool) -> int:
+        """Do one unit of work, or as much as a frame has time for, see ``Pacer.advance``; how much was issued."""
         self.settled = False
-        made = self._pace.advance(self.solver, budget_ms, amount, interactive=interactive)
+        made = self._pace.advance(self.solver, fast=fast, interactive=interactive)
         self.seconds += self._pace.lap()
         return made
+
+    def drawn(self) -> None:
+        """The frame is drawn, see ``Pacer.drawn``."""
+        self._pace.drawn()
 
     def work(self, amount: int) -> int:
         """Up to so much work, of one batch at most, also when paused or converged; how much was issued."""

@@ -244,13 +244,14 @@ class Session:
         """Whether the light stays as it is by itself, and neither another scene nor solver is on its way."""
         return self.on_its_way is None and not self.solving and self.run.settled
 
-    def advance(self, *, budget_ms: float, amount: int = 1, interactive: bool = False) -> int:
-        """Do up to ``amount`` of work within ``budget_ms``; how much was issued. None when paused or converged, nor in a frame
-        that has already done something long. interactive: a hand is at the controls, see ``Pacer.advance``."""
+    def advance(self, *, fast: bool = False, interactive: bool = False) -> int:
+        """Do one unit of work, or if ``fast`` as much as a frame has time for; how much was issued. None when paused or
+        converged, nor in a frame that has already done something long. interactive: a hand is at the controls, see
+        ``Pacer.advance``."""
         if self._busy or not self.solving:
             return 0
         self.estimate.changed()
-        return self.run.advance(budget_ms, amount, interactive=interactive)
+        return self.run.advance(fast=fast, interactive=interactive)
 
     def work(self, amount: int = 1) -> int:
         """Up to so much work, of one batch at most, also when paused or converged; how much was issued."""

@@ -12,7 +12,7 @@ from app.ui.edits import let_go, redo, undo
 from app.ui.navigation import focus
 from app.ui.panels.compare import show, shown
 from app.ui.panels.solver import toggle
-from app.ui.state import Request, State
+from app.ui.state import Pace, Request, State
 
 if TYPE_CHECKING:
     from app.session.view import View
@@ -58,6 +58,11 @@ def _pause(view: View, state: State) -> None:
 def _one_step(view: View, state: State) -> None:
     view.session.run.running = False
     state.act(view.session.work)
+
+
+def flip_pace(view: View, state: State) -> None:
+    """Watch, or be fast: whichever it is not now."""
+    state.pace = Pace("watch" if state.pace.is_fast(view.session.run.seconds) else "fast")
 
 
 def _restart(view: View, state: State) -> None:
@@ -106,6 +111,7 @@ SHORTCUTS = (
     Shortcut("F12", "screenshot into the current folder", Key.f12, _screenshot, while_typing=True),
     Shortcut("Space", "run or pause", Key.space, _pause, needs_scene=True),
     Shortcut(".", "one step: a shot, or what else the solver counts", Key.period, _one_step, needs_scene=True),
+    Shortcut("P", "pace: watch one step after the other, or fast", Key.p, flip_pace, needs_scene=True),
     Shortcut("R", "restart", Key.r, _restart, needs_scene=True),
     Shortcut("F", "look at the picked point, or at the whole scene", Key.f, focus, needs_scene=True),
     Shortcut("C", "flip between solution and reference", Key.c, _flip, needs_scene=True),

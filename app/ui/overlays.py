@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from imgui_bundle import imgui
 
 from app.ui import edits, theme, widgets
-from app.ui.keys import POINTER, SHORTCUTS
+from app.ui.keys import POINTER, SHORTCUTS, flip_pace
 from app.ui.layout import PANELS
 from app.ui.navigation import look_through
 from app.ui.state import TOAST_SECONDS, Legend, Request, State
@@ -95,6 +95,8 @@ def status_bar(view: View, state: State) -> None:
         for text, colour in _status(view, state):
             imgui.text_colored(imgui.ImVec4(*colour), text)
             imgui.separator()
+        if state.stats is not None:
+            _pace(view, state)
         if view.session.message:
             imgui.text_unformatted(view.session.message)
         imgui.end_menu_bar()
@@ -118,6 +120,20 @@ def _status(view: View, state: State) -> list[tuple[str, theme.RGBA]]:
     if state.measured and state.live:
         parts += [f"{state.fps:.0f} fps"]
     return [(view.session.name, theme.TEXT), (word, colour), *((part, theme.DIM) for part in parts)]
+
+
+def _pace(view: View, state: State) -> None:
+    """Which pace is on; a click changes it."""
+    fast = state.pace.is_fast(view.session.run.seconds)
+    imgui.text_colored(
+        imgui.ImVec4(*theme.DIM), f"{ICONS.ICON_FA_FORWARD}  fast" if fast else f"{ICONS.ICON_FA_EYE}  watch"
+    )
+    if imgui.is_item_clicked():
+        flip_pace(view, state)
+    other = "click or P: watch one step after the other" if fast else "click or P: as much as there is time for"
+    what = "as many steps between two pictures as there is time for" if fast else "one step between two pictures"
+    widgets.tooltip(f"Pace: {what}; {other}")
+    imgui.separator()
 
 
 def help_overlay(state: State) -> None:

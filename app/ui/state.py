@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 RGB = tuple[float, float, float]
 TOAST_SECONDS = 6.0
+WATCH_SECONDS = 3.0  # of a solve, in which one sees shot after shot unless another pace was chosen
 
 
 class Request(Enum):
@@ -33,12 +34,16 @@ class Request(Enum):
 class Pace(Options):
     """How much is solved between two pictures."""
 
-    work_per_frame: int = option(
-        1, "shots, or what else the solver counts, between two pictures", minimum=1, maximum=256, logarithmic=True
+    pace: str = option(
+        "auto",
+        "watch: one step (a shot) between two pictures; fast: as many as there is time for; auto: watch for the first "
+        f"{WATCH_SECONDS:g} seconds, then fast",
+        choices=("auto", "watch", "fast"),
     )
-    frame_budget: float = option(
-        20.0, "time per picture after which no further work starts", unit="ms", minimum=1, maximum=90
-    )
+
+    def is_fast(self, seconds: float) -> bool:
+        """Whether it is, after so many seconds of solving."""
+        return self.pace == "fast" or (self.pace == "auto" and seconds >= WATCH_SECONDS)
 
 
 @dataclass(frozen=True)

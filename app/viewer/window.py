@@ -223,15 +223,16 @@ class ViewerWindow(WindowConfig):
             session.poll(interactive=self._ui.held)
             self._view.tell_observer()
             self._view.look_for_light()
-            solve, look = self._turns.next(frame_time) if session.solving else (False, True)
+            held, fast = self._ui.held, session.opened and state.pace.is_fast(session.run.seconds)
+            solve, look = self._turns.next(frame_time) if session.solving and (held or not fast) else (True, True)
             if solve:
-                pace = state.pace
-                session.advance(budget_ms=pace.frame_budget, amount=pace.work_per_frame, interactive=self._ui.held)
+                session.advance(fast=fast, interactive=held)
         except UserError as error:
             session.run.running = False
             state.notify(str(error), error=True)
         target, ratio = self.wnd.fbo, self.wnd.pixel_ratio
         requests = self._frame.draw(self._view, target, size=self.wnd.size, ratio=ratio, seconds=frame_time, look=look)
+        session.run.drawn()
         self._show_cursor()
         self._show_name()
         for request in requests:

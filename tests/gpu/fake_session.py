@@ -95,6 +95,7 @@ class FakeSession:
         self.seconds = 0.3  # of solving
         self.calls: list[tuple[object, ...]] = []
         self.session = self.run = self
+        self.seconds = 0.3
         self.compared = FakeCompared(self.calls)
         self.solver_name, self.family = DEFAULT_SOLVER, SOLVERS[DEFAULT_SOLVER]
         self.expected = ErrorEstimate(0.016, -0.003, 0.006, 240)
@@ -194,9 +195,9 @@ class FakeSession:
     def poll(self) -> None:
         pass
 
-    def advance(self, *, budget_ms: float, amount: int) -> int:
+    def advance(self, *, fast: bool = False) -> int:
         self.calls.append(("advance",)) if self.running else None
-        return amount if self.running else 0
+        return 1 if self.running else 0
 
     def draw(self, target, size, *, scale=None, samples=1, whole=True) -> None:
         target.clear(0.2, 0.3, 0.4, 1.0)

@@ -139,7 +139,7 @@ def frames(session: Session, until: Callable[[], bool]) -> None:
     while not until():
         assert time.monotonic() < end
         session.poll()
-        session.advance(budget_ms=20, amount=4)
+        session.advance(fast=True)
 
 
 def test_the_error_against_a_bake_is_that_of_its_light(session: Session, tmp_path: Path) -> None:

@@ -16,8 +16,6 @@ from app.session.session import Session
 from app.solvers import SOLVERS
 from app.solvers.local.options import LocalOptions
 
-BUDGET = 20.0  # ms
-
 
 @pytest.fixture
 def session(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
@@ -33,7 +31,7 @@ def session(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
 def frame(session: Session, *, interactive: bool = False) -> None:
     time.sleep(0.01)
     session.poll(interactive=interactive)
-    session.advance(budget_ms=BUDGET, interactive=interactive)
+    session.advance(interactive=interactive)
 
 
 def lamp(session: Session) -> int:

@@ -47,7 +47,7 @@ def frames(session: Session, until: Callable[[], bool]) -> int:
     while not until():
         assert time.monotonic() < end
         session.poll()
-        session.advance(budget_ms=20)
+        session.advance()
         count += 1
     return count
 
@@ -195,7 +195,7 @@ def test_a_slider_that_is_dragged_makes_no_book_until_it_rests(
     for _ in range(10):
         dim(session, 0.95)
         session.poll()
-        session.advance(budget_ms=20)
+        session.advance()
         time.sleep(0.02)
     assert not looks
     session.solver.poll(wait=True)

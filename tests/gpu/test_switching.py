@@ -84,7 +84,7 @@ def poll(session: Session, until: Callable[[], bool]) -> int:
     while not until():
         assert time.monotonic() < end
         session.poll()
-        session.advance(budget_ms=20)
+        session.advance()
         count += 1
         time.sleep(0.002)
     return count

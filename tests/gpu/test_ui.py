@@ -27,7 +27,7 @@ from app.ui.app import Ui
 from app.ui.file_dialog import readable
 from app.ui.keys import ANY_POPUP, SHORTCUTS
 from app.ui.quit_dialog import WORTH_SECONDS, duration
-from app.ui.state import Legend, Pace, Request
+from app.ui.state import WATCH_SECONDS, Legend, Pace, Request
 from app.viewer.ui_frame import save_screenshot
 
 __all__ = ["desk", "session", "where"]
@@ -42,6 +42,7 @@ EFFECTS: dict[str, Callable[[Desk], bool]] = {
     "F12": lambda d: Request.SCREENSHOT in d.requests,
     "Space": lambda d: not d.session.running,
     ".": lambda d: ("work",) in d.session.calls and not d.session.running,
+    "P": lambda d: d.ui.state.pace.is_fast(d.session.seconds),
     "R": lambda d: ("restart",) in d.session.calls,
     "F": lambda d: d.ui.state.flight is not None,
     "C": lambda d: d.session.display.show == "reference",
@@ -138,15 +139,28 @@ def test_with_ctrl_the_keys_of_flight_are_commands(desk: Desk) -> None:
 def test_keys_typed_into_a_field_are_text(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
     desk.frames()
     desk.ui.io.add_key_event(imgui.Key.mod_ctrl, True)
-    desk.click(*where["work_per_frame"])
+    desk.click(*where["exposure"])
     desk.ui.io.add_key_event(imgui.Key.mod_ctrl, False)
     desk.frames(2)
     assert desk.ui.io.want_text_input
     desk.key(imgui.Key.space)
-    desk.ui.io.add_input_characters_utf8("17")
+    desk.ui.io.add_input_characters_utf8("3.5")
     desk.key(imgui.Key.enter)
     assert desk.session.running
-    assert desk.ui.state.pace.work_per_frame == 17
+    assert desk.session.display.exposure == 3.5
+
+
+def test_the_pace_is_seen_and_changed(desk: Desk) -> None:
+    """Auto: watch at first, then fast; a key takes the other."""
+    desk.session.run.seconds = 0.5
+    desk.key(imgui.Key.p)
+    assert desk.ui.state.pace.pace == "fast", "it was watched"
+    desk.key(imgui.Key.p)
+    assert desk.ui.state.pace.pace == "watch"
+    desk.ui.state.pace = Pace()
+    desk.session.run.seconds = 2 * WATCH_SECONDS
+    desk.key(imgui.Key.p)
+    assert desk.ui.state.pace.pace == "watch", "it was fast"
 
 
 # -- widgets -----------------------------------------------------------------------------------------------------------

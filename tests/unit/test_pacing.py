@@ -1,4 +1,5 @@
-"""How much of a solve a frame does: whole shots where they are fast, else bands of one; less while a hand is at a control."""
+"""How much of a solve a frame does: a shot, or a band of one where it is slow; if fast as much as fits; less while a hand is at a
+control."""
 
 from __future__ import annotations
 
@@ -10,7 +11,19 @@ import pytest
 
 from app.session import pacing
 from app.session.history import History
-from app.session.pacing import INTERACTIVE_BUDGET, INTERACTIVE_FRAME, LONG_FRAME, MOST_BANDS, Pacer
+from app.session.pacing import (
+    EVEN_FAST,
+    INTERACTIVE_FRAME,
+    LEAST_BUDGET,
+    LONG_FRAME,
+    LONGEST_FAST,
+    MOST,
+    MOST_BANDS,
+    SHORTEST_FAST,
+    WATCH_BUDGET,
+    Pacer,
+)
+from app.ui.state import WATCH_SECONDS, Pace
 
 PART = 3.0  # ms of a part of a shot
 PARTS = 40
@@ -48,11 +61,14 @@ def pacer() -> Pacer:
     return Pacer(SimpleNamespace(ctx=SimpleNamespace(finish=lambda: None)))  # type: ignore[arg-type]
 
 
-def frame(pace: Pacer, work: Clockwork, seconds: float, *, interactive: bool, shots: int = 1) -> list[tuple[str, int]]:
+def frame(
+    pace: Pacer, work: Clockwork, seconds: float, *, interactive: bool, fast: bool = False
+) -> list[tuple[str, int]]:
     """What a frame that begins so long after the last one does."""
     work.now += seconds
+    pace.drawn()
     work.calls.clear()
-    pace.advance(work, 20.0, shots, interactive=interactive)  # type: ignore[arg-type]
+    pace.advance(work, fast=fast, interactive=interactive)  # type: ignore[arg-type]
     return list(work.calls)
 
 
@@ -77,9 +93,9 @@ def test_a_hand_gets_all_but_a_little_of_a_frame(clockwork: Clockwork) -> None:
     frame(pace, clockwork, 0.0, interactive=False)
     idle = frame(pace, clockwork, 2 * LONG_FRAME, interactive=False)
     held = frame(pace, clockwork, 2 * LONG_FRAME, interactive=True)
-    assert PART * len(idle) >= 20.0 > PART * (len(idle) - 1)
-    assert PART * len(held) >= INTERACTIVE_BUDGET > PART * (len(held) - 1)
-    assert frame(pace, clockwork, 2 * LONG_FRAME, interactive=True, shots=8)[0][0] == "part"
+    assert PART * len(idle) >= WATCH_BUDGET > PART * (len(idle) - 1)
+    assert PART * len(held) >= LEAST_BUDGET > PART * (len(held) - 1)
+    assert frame(pace, clockwork, 2 * LONG_FRAME, interactive=True, fast=True)[0][0] == "part"
 
 
 @pytest.mark.parametrize("seconds", [0.02, 0.4, 3.0])
@@ -113,9 +129,11 @@ def held_frames(clock: Clockwork, rest: float, count: int) -> list[tuple[int, in
     pace, solver, found = pacer(), Long(clock), []
     for _ in range(count):
         solver.parts = 0
-        made = pace.advance(solver, 30.0, 1, interactive=True)  # type: ignore[arg-type]
+        made = pace.advance(solver, fast=False, interactive=True)  # type: ignore[arg-type]
         found.append((solver.parts, made))
         clock.now += rest
+        pace.drawn()
+        clock.now += 0.004  # a screen that is waited for is not drawing
     return found
 
 
@@ -133,3 +151,71 @@ def test_a_frame_goes_on_with_the_next_unit(clockwork: Clockwork) -> None:
     short = [parts for parts, made in frames if made]
     assert len(short) > 5 and min(short) >= 5
     assert all(made <= 1 for _, made in frames)
+
+
+class Batches:
+    """A solver whose batches of eight take so many milliseconds, in so many parts; over: units after which it has converged."""
+
+    def __init__(self, clock: Clockwork, batch: float, parts: int = 4, over: int = 1 << 30) -> None:
+        self.clock, self.batch, self.parts, self.over = clock, batch, parts, over
+        self.made, self.asked = 0, set[int]()
+
+    def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
+        self.asked.add(amount)
+        shots = min(amount, 8)
+        for _ in range(self.parts * bands):
+            self.clock.now += self.batch * 1e-3 / (self.parts * bands)
+            yield
+        self.made += shots
+        return shots
+
+    def poll(self) -> SimpleNamespace:
+        return SimpleNamespace(converged=self.made >= self.over)
+
+
+def fast_frames(clock: Clockwork, solver: Batches, rest: float, count: int = 60) -> tuple[float, float]:
+    """Milliseconds of the longest of so many fast frames, of which drawing takes so long, and the share of them that solves."""
+    pace, longest, solved, whole = pacer(), 0.0, 0.0, 0.0
+    for nth in range(count):
+        start = clock.now
+        pace.advance(solver, fast=True)  # type: ignore[arg-type]
+        worked = clock.now - start
+        clock.now += rest * 1e-3
+        pace.drawn()
+        if nth >= 10:  # nothing is known of drawing and batches at first
+            longest, solved, whole = max(longest, clock.now - start), solved + worked, whole + clock.now - start
+    return longest * 1e3, solved / whole
+
+
+@pytest.mark.parametrize("batch", [0.4, 3.0, 20.0, 300.0])
+@pytest.mark.parametrize(
+    ("rest", "share", "longest"), [(1.0, 0.9, SHORTEST_FAST), (12.0, 0.7, 4 * 12.0), (30.0, 0.5, LONGEST_FAST)]
+)
+def test_fast_frames_solve_for_most_of_their_time(
+    clockwork: Clockwork, batch: float, rest: float, share: float, longest: float
+) -> None:
+    """Whether a batch is a small part of a frame or takes several."""
+    solver = Batches(clockwork, batch, parts=4 if batch < 100 else 60)
+    took, solved = fast_frames(clockwork, solver, rest)
+    assert solved >= share
+    assert took <= longest + 6.0, "no longer than a part more"
+    assert solver.asked == {MOST}, "batches are as large as the solver makes them"
+
+
+def test_solving_gets_as_long_as_drawing_where_that_is_slow(clockwork: Clockwork) -> None:
+    took, solved = fast_frames(clockwork, Batches(clockwork, 8.0), 45.0)
+    assert 0.45 <= solved <= 0.55 and took <= EVEN_FAST + 3.0
+
+
+def test_a_fast_frame_ends_with_the_solve(clockwork: Clockwork) -> None:
+    for batch in (0.4, 20.0):
+        pace, solver = pacer(), Batches(clockwork, batch, over=24)
+        for _ in range(6):
+            pace.advance(solver, fast=True)  # type: ignore[arg-type]
+            clockwork.now += 0.001
+        assert 24 <= solver.made <= 24 + 5 * 8, "one batch for each frame that asks once more"
+
+
+def test_one_watches_first_and_then_it_is_fast() -> None:
+    assert not Pace().is_fast(0.9 * WATCH_SECONDS) and Pace().is_fast(WATCH_SECONDS)
+    assert Pace("fast").is_fast(0.0) and not Pace("watch").is_fast(100.0)

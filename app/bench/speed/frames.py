@@ -3,7 +3,7 @@
 The scene opens as in the window, beside the first frames. A frame is the window's own, drawn into a texture instead: poll and
 solve, build the interface and draw it with the view, wait until the GPU has done it. Every part ends with glFinish, so that its
 time is its own. CPU time is that of the whole process over all cores: on a software rasteriser it includes the GPU's work, and
-other programs on the machine do not change it.
+other programs on the machine do not change it. Then work per second is counted at both paces of the window, and without one.
 
 With ``--drag`` a hand moves the sliders of the quadtrees meanwhile, a little in each frame: see slider_drag.py. With ``--walk``
 the eye walks along a path, a thirtieth of a second of it in each frame, once what is around its beginning is lit; then its lamps
@@ -32,11 +32,11 @@ from app.render.camera_path import load_path
 from app.scene.model import Material
 from app.scene.options import FileOptions
 from app.session.pacing import Turns
+from app.session.run import Stop
 from app.session.session import Session
 from app.session.view import View
 from app.solvers.local.solver import Local
 from app.ui.app import Ui
-from app.ui.state import Pace
 from app.util.console import Console
 from app.viewer.ui_frame import UiFrame
 
@@ -44,6 +44,7 @@ SIZE = (1280, 720)
 PARTS = ("poll", "solve", "draw")
 WARM_UP = 30  # frames: shaders are compiled, the panels stand
 FRAMES = 300
+RATE_SECONDS = 4.0  # of a solve from nothing, over which work is counted
 FRAMES_PER_SECOND = 30.0  # of a walk
 SLOW = 1e3 / FRAMES_PER_SECOND  # ms
 STANDING = 60.0  # s at most, in which what is around the beginning of a walk is lit
@@ -98,9 +99,11 @@ class _Viewer:
             raise UserError(self.session.message or f"{self.session.name}: did not open")
         return rows
 
-    def frame(self, light: LightmapOptions | None = None, camera: CameraView | None = None) -> list[float]:
+    def frame(
+        self, light: LightmapOptions | None = None, camera: CameraView | None = None, *, fast: bool = False
+    ) -> list[float]:
         """One frame: milliseconds by part, and of CPU time. light: the options that a hand at a slider asks for; camera: where it
-        leads the eye."""
+        leads the eye. fast: of that pace, else one step is watched."""
         session, held = self.session, light is not None or camera is not None
         if camera is not None:
             self._view.camera = camera
@@ -108,15 +111,16 @@ class _Viewer:
         session.poll(interactive=held)
         self._view.tell_observer()
         clock.append(time.perf_counter())
-        solve, look = self._turns.next(self._seconds) if session.solving else (False, True)
+        solve, look = self._turns.next(self._seconds) if session.solving and (held or not fast) else (True, True)
         if solve:
-            session.advance(budget_ms=Pace().frame_budget, amount=1, interactive=held)
+            session.advance(fast=fast, interactive=held)
         self._gpu.ctx.finish()
         clock.append(time.perf_counter())
         if light is not None and light != session.light:
             session.set_light(light)
         self._frame.draw(self._view, self._target, size=SIZE, look=look)
         self._gpu.ctx.finish()
+        session.run.drawn()
         clock.append(time.perf_counter())
         self._seconds = clock[-1] - clock[0]
         return [*(np.diff(clock) * 1e3), (time.process_time() - cpu) * 1e3]
@@ -136,7 +140,27 @@ def _measure(viewer: _Viewer) -> dict[str, Any]:
             viewer.session.restart()
         rows.append(viewer.frame())
     first = np.array(opening)[1:, :-1].sum(1)  # the very first builds the interface
-    return _summary(rows) | {"opening_worst_ms": float(first.max())}
+    rates = {pace: _rate(viewer, fast=pace == "fast") for pace in ("watch", "fast")}
+    rates["no window"] = _rate_without_window(viewer.session)
+    return _summary(rows) | {"opening_worst_ms": float(first.max()), "unit": viewer.session.family.unit, "rates": rates}
+
+
+def _rate(viewer: _Viewer, *, fast: bool) -> dict[str, float]:
+    """Work and frames per second of the first seconds of a solve."""
+    session = viewer.session
+    session.restart()
+    frames, start = 0, time.perf_counter()
+    while (seconds := time.perf_counter() - start) < RATE_SECONDS and not session.run.converged:
+        viewer.frame(fast=fast)
+        frames += 1
+    return {"work_per_second": session.solver.issued / seconds, "frames_per_second": frames / seconds}
+
+
+def _rate_without_window(session: Session) -> dict[str, float]:
+    """Work per second of the same seconds, where nothing is drawn."""
+    session.restart()
+    session.solve(Stop(seconds=RATE_SECONDS))
+    return {"work_per_second": session.solver.issued / session.run.seconds}
 
 
 def _measure_drags(viewer: _Viewer, tell: Callable[[str, float], None]) -> dict[str, Any]:
@@ -237,6 +261,12 @@ def _table(values: dict[str, Any]) -> str:
         f"99 % below {values['p99_ms']:.1f} ms, worst {values['worst_ms']:.1f} ms, CPU {values['cpu_ms']:.1f} ms",
         f"while the scene opens, and the first {WARM_UP} frames after: worst {values['opening_worst_ms']:.1f} ms",
         *_parts(values["parts_ms"]),
+        "",
+        *(
+            f"  {name:<10}{rate['work_per_second']:8.1f} {values['unit']}/s"
+            + (f"{rate['frames_per_second']:8.1f} frames/s" if "frames_per_second" in rate else "")
+            for name, rate in values["rates"].items()
+        ),
     ]
     return "\n".join(lines)
 

@@ -1,4 +1,4 @@
-"""Solver: which one; run, pause, one step, restart; how fast; its options; and the energy balance."""
+"""Solver: which one; run, pause, one step, restart; at which pace; its options; and the energy balance."""
 
 from __future__ import annotations
 
@@ -26,13 +26,12 @@ def draw(view: View, state: State) -> None:
     assert stats is not None
     _choice(view, state)
     _buttons(view, state, done=stats.converged)
+    state.pace = widgets.edit_options(state.pace)
     _progress(view, state)
     _figures(state)
     detail.draw(view, state)
     widgets.section("Energy [W]")
     _energy(state, unshot=session.family.distributes)
-    widgets.section("Pace")
-    state.pace = widgets.edit_options(state.pace)
     widgets.section(session.family.title)
     options = widgets.edit_options(session.options, starts=stats.resolved)
     if options is not session.options:
