@@ -28,7 +28,9 @@ class DisplayOptions(Options):
     split: float = option(
         0.5, "share of the picture that is the solution's, where both are shown", minimum=0, maximum=1
     )
-    exposure: float = option(0.0, "exposure; where not given, found from the light", unit="EV", minimum=-24, maximum=24)
+    exposure: float = option(
+        0.0, "exposure; where not given, found from the light", unit="EV", minimum=-24, maximum=24, usual=(-8, 8)
+    )
     tone_map: str = option("agx", "tone curve", choices=TONE_MAPS)
     interpolation: str = option("bilinear", "what is shown between the middles of texels", choices=INTERPOLATIONS)
     grid: bool = option(False, "draw texels and tiles, in a quadtree each level in its colour")
@@ -41,5 +43,6 @@ class DisplayOptions(Options):
         unit="lux or cd/m²",
         minimum=0,
         maximum=1e9,
+        logarithmic=True,
         zero="auto",
     )

@@ -121,6 +121,7 @@ class FakeSession:
         self.image = None
         self.flickers = False
         self.picked = None
+        self.scale: tuple[float, float] | None = None
         self.insets: list[tuple[tuple[int, int], bool]] = []
 
     @property
@@ -128,6 +129,8 @@ class FakeSession:
         return LAYERS[:8]
 
     def false_colour_scale(self) -> Scale:
+        if self.scale is not None:
+            return Scale(*self.scale, "lx")
         return false_colour_scale(self.display, self.lightmap)
 
     @property

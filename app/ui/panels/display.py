@@ -27,7 +27,10 @@ def draw(view: View, state: State) -> None:
         skip = (*skip, "last_shooter")
     unit = {"false_colour_max": UNITS[kind]} if kind in UNITS else {}
     display = view.display if view.display.layer in view.layers else view.shown
-    edited = widgets.edit_options(display, skip=(*skip, *COMPARED), units=unit, choices={"layer": view.layers})
+    top = {} if state.legend is None else {"false_colour_max": state.legend.maximum}
+    edited = widgets.edit_options(
+        display, skip=(*skip, *COMPARED), starts=top, units=unit, choices={"layer": view.layers}
+    )
     if edited.layer == "error" and view.display.layer != "error":
         state.act(lambda: compare.show(view, state, "error"))  # which says so where there is no reference
     else:

@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 
 from app.render.false_colour import WHITE_EFFICACY
 from app.scene.lights import Light
-from app.ui import colour, theme, widgets
+from app.ui import colour, slider, theme, widgets
 from app.ui.panels import sky
 from app.ui.state import RGB, State
 
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from app.session.view import View
 
 ROWS_SHOWN = 4  # of the list before it scrolls
-WEAKEST, STRONGEST = 1e-4, 1e6  # W/sr or W/m², ends of the slider
+STRENGTH = slider.Range(1e-4, 1e6, logarithmic=True)  # W/sr or W/m²
+UNTWEAKED = int(imgui.SliderFlags_.no_speed_tweaks)  # Shift is slower here
 STEP = 0.005  # of the scene's diagonal, for a pixel that a place is dragged by
 WIDEST = 10.0  # degrees across a directional light
 
@@ -105,8 +106,7 @@ def _intensity(light: Light) -> RGB:
     new_tint = colour.edit_tint("##colour", tint)
     imgui.same_line()
     imgui.set_next_item_width(-1)
-    unit, flags = "W/m²" if light.from_afar else "W/sr", widgets.SLIDER | widgets.LOGARITHMIC
-    scaled, now = imgui.slider_float("##strength", strength, WEAKEST, STRONGEST, f"%.4g {unit}", flags)
+    now = slider.slide("##strength", strength, STRENGTH, f"%.4g {'W/m²' if light.from_afar else 'W/sr'}")
     lumens = WHITE_EFFICACY * strength
     if light.from_afar:
         widgets.tooltip(f"Irradiance of what faces it; about {widgets.number(lumens, 3)} lx")
@@ -116,7 +116,7 @@ def _intensity(light: Light) -> RGB:
             f"Radiant intensity; in all {power} W. About {widgets.number(lumens, 3)} cd, "
             f"{widgets.number(light.solid_angle * lumens, 3)} lm"
         )
-    if (new_tint == tint and not scaled) or now != now:
+    if (new_tint, now) == (tint, strength):
         return light.intensity
     return colour.rgb(now * c for c in new_tint)
 
@@ -125,8 +125,9 @@ def _vector(label: str, value: RGB, step: float, text: str) -> RGB:
     widgets.labelled(label)
     imgui.set_next_item_width(-1)
     shown = [component + 0.0 for component in value]  # -0 is 0
-    changed, moved = imgui.drag_float3(f"##{label}", shown, step, 0.0, 0.0, text)
-    widgets.tooltip("Drag, or click twice to type")
+    slow = slider.FINE if imgui.get_io().key_shift else 1.0
+    changed, moved = imgui.drag_float3(f"##{label}", shown, slow * step, 0.0, 0.0, text, UNTWEAKED)
+    widgets.tooltip("Drag, with Shift finely, or click twice to type")
     if not changed or not all(map(math.isfinite, moved)):
         return value
     x, y, z = (float(c) for c in moved)
@@ -142,9 +143,9 @@ def _angle(label: str, value: float, most: float, help: str) -> float:
 def _slider(label: str, value: float, most: float, text: str, help: str) -> float:
     widgets.labelled(label)
     imgui.set_next_item_width(-1)
-    changed, moved = imgui.slider_float(f"##{label}", value, 0.0, most, text, widgets.SLIDER)
+    moved = slider.slide(f"##{label}", value, slider.Range(0.0, most), text)
     widgets.tooltip(help)
-    return float(moved) if changed and moved == moved else value
+    return moved
 
 
 __all__ = ["draw"]

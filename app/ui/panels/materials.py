@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from imgui_bundle import imgui
 
 from app.scene.model import MOST_ALBEDO
-from app.ui import colour, theme, widgets
+from app.ui import colour, slider, theme, widgets
 from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 ROWS_SHOWN = 12  # of the list before it scrolls
 WHITE = (1.0, 1.0, 1.0)
-STRONGEST = 1e5  # W/(sr m²), end of the slider: the sun's disc is brighter, lamps are not
+STRENGTH = slider.Range(0.0, 1e5, logarithmic=True, start=1.0)  # W/(sr m²): the sun's disc is brighter, lamps are not
 
 
 def draw(view: View, state: State) -> None:
@@ -84,11 +84,10 @@ def _emission(state: State, material: Any) -> RGB:
     new_tint = state.emission_colours[state.material] = colour.edit_tint("##emission", tint)
     imgui.same_line()
     imgui.set_next_item_width(-1)
-    flags = widgets.SLIDER | widgets.LOGARITHMIC
-    scaled, new_strength = imgui.slider_float("##strength", strength, 0.0, STRONGEST, "%.4g W/(sr m²)", flags)
+    new_strength = slider.slide("##strength", strength, STRENGTH, "%.4g W/(sr m²)" if strength else "off")
     widgets.tooltip("Radiance: colour times strength. Exitance is π times this. Right-click: off")
     if imgui.is_item_hovered() and imgui.is_mouse_clicked(1):
-        scaled, new_strength = True, 0.0
-    if (new_tint == tint and not scaled) or new_strength != new_strength:
+        new_strength = 0.0
+    if (new_tint, new_strength) == (tint, strength):
         return material.emission
     return colour.rgb(v * new_strength for v in new_tint)

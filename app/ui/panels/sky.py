@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
 from app.scene.sky import DEFAULT_SUN, LEAST_TURBIDITY, MOST_TURBIDITY, Sky, Sun
-from app.ui import colour, widgets
+from app.ui import colour, slider, widgets
 from app.ui.state import State
 
 if TYPE_CHECKING:
     from app.session.view import View
 
 NONE = "none"
-STRONGEST = 100.0  # end of the slider of strength
+STRENGTH = slider.Range(0.0, 100.0, logarithmic=True)
 LOWEST = 0.1  # degrees above the horizon
 
 
@@ -61,12 +60,10 @@ def _colour(sky: Sky) -> Sky:
     tint = colour.edit_colour("##sky colour", sky.colour)
     imgui.same_line()
     imgui.set_next_item_width(-1)
-    flags = widgets.SLIDER | widgets.LOGARITHMIC
-    strength = _changed(imgui.slider_float, "##sky strength", sky.strength, 0.0, STRONGEST, "%.3g", flags)
+    strength = slider.slide("##sky strength", sky.strength, STRENGTH, "× %.3g")
     widgets.tooltip("Multiplies all light of the sky, and of its sun")
-    if tint != sky.colour:
-        sky = dataclasses.replace(sky, colour=tint)
-    return sky if strength is None else dataclasses.replace(sky, strength=strength)
+    same = (tint, strength) == (sky.colour, sky.strength)
+    return sky if same else dataclasses.replace(sky, colour=tint, strength=strength)
 
 
 def _sun(sky: Sky) -> Sky:
@@ -81,26 +78,17 @@ def _sun(sky: Sky) -> Sky:
     azimuth = _slider("Sun azimuth", "of the sun, from north, -z, over east", sun.azimuth, 0.0, 360.0, "%.1f°")
     height = _slider("Sun height", "above the horizon", sun.height, LOWEST, 90.0, "%.1f°")
     turbidity = _slider("Haze", "turbidity of the air", sky.turbidity, LEAST_TURBIDITY, MOST_TURBIDITY, "%.2g")
-    if azimuth is not None or height is not None:
-        sky = dataclasses.replace(
-            sky, sun=Sun(sun.azimuth if azimuth is None else azimuth, sun.height if height is None else height)
-        )
-    return sky if turbidity is None else dataclasses.replace(sky, turbidity=turbidity)
+    same = (azimuth, height, turbidity) == (sun.azimuth, sun.height, sky.turbidity)
+    return sky if same else dataclasses.replace(sky, sun=Sun(azimuth, height), turbidity=turbidity)
 
 
-def _slider(label: str, help: str, value: float, low: float, high: float, text: str) -> float | None:
-    """What it was moved to, if it was."""
+def _slider(label: str, help: str, value: float, low: float, high: float, text: str) -> float:
+    """What it was moved to."""
     widgets.labelled(label)
     imgui.set_next_item_width(-1)
-    moved = _changed(imgui.slider_float, f"##{label}", value, low, high, text, widgets.SLIDER)
+    moved = slider.slide(f"##{label}", value, slider.Range(low, high), text)
     widgets.tooltip(help[:1].upper() + help[1:])
     return moved
-
-
-def _changed(widget: Callable[..., tuple[bool, Any]], *arguments: object) -> Any:
-    """What a widget holds afterwards, if it was changed to what is a number."""
-    changed, value = widget(*arguments)
-    return value if changed and value == value else None
 
 
 __all__ = ["draw"]
