@@ -17,6 +17,7 @@ OptionsT = TypeVar("OptionsT", bound=Options)
 
 LABEL_SHARE = 0.44  # of the panel's width
 TOOLTIP_EM = 22.0
+AS_READ = "Right-click: as in the file"
 TOOLTIP = int(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)
 
 
@@ -68,14 +69,20 @@ def edit_option(spec: Spec, value: Any, start: Any = None, *, off: str | None = 
         value = _optional(spec, value, start)
     edited = value if value is None else _editor(spec, value, start)
     imgui.end_disabled()
-    if off is None and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled) and imgui.is_mouse_clicked(1):
-        edited = spec.default
-        imgui.internal.clear_active_id()
+    edited = edited if off is not None else put_back(edited, spec.default)
     unit = f" [{spec.unit}]" if spec.unit else ""
     reason = "" if off is None else f"\nNo effect now: {off}"
     tooltip(f"{spec.help}{unit}: {spec.allowed}\nRight-click: default ({shown(spec.default)}){reason}")
     imgui.pop_id()
     return edited
+
+
+def put_back(value: Any, default: Any) -> Any:
+    """``default`` where the last item was right-clicked, which means that everywhere; else ``value``."""
+    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled) and imgui.is_mouse_clicked(1):
+        imgui.internal.clear_active_id()
+        return default
+    return value
 
 
 def title(name: str) -> str:

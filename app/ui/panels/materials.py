@@ -54,8 +54,9 @@ def _row(state: State, index: int, material: Any) -> None:
 
 def _editor(view: View, state: State, material: Any) -> None:
     index = state.material
+    came = view.session.unedited.materials[index]
     imgui.push_id("material")
-    edited = dataclasses.replace(material, albedo=_albedo(material), emission=_emission(state, material))
+    edited = dataclasses.replace(material, albedo=_albedo(material, came), emission=_emission(state, material, came))
     imgui.pop_id()
     if (edited.albedo, edited.emission) != (material.albedo, material.emission):
         state.act(lambda: view.session.set_material(index, edited))
@@ -66,28 +67,30 @@ def _editor(view: View, state: State, material: Any) -> None:
         widgets.dim(", ".join(notes))
 
 
-def _albedo(material: Any) -> RGB:
-    widgets.labelled("Albedo ρ")
+def _albedo(material: Any, came: Any) -> RGB:
+    """came: the material as it was read."""
+    widgets.labelled("Albedo ρ", changed=material.albedo != came.albedo)
     imgui.set_next_item_width(-1)
     edited = colour.edit_colour("##albedo", material.albedo, code=True, most=MOST_ALBEDO)
     widgets.tooltip(
         f"The share of light that it reflects: ρ {widgets.triple(material.albedo, 3)} of red, green, blue. The code is of what "
-        "the screen shows (sRGB), as everywhere"
+        f"the screen shows (sRGB), as everywhere. {widgets.AS_READ}"
     )
-    return edited
+    return widgets.put_back(edited, came.albedo)
 
 
-def _emission(state: State, material: Any) -> RGB:
-    """Colour × strength. A lamp that is dimmed to nothing keeps its colour in the state."""
+def _emission(state: State, material: Any, came: Any) -> RGB:
+    """Colour × strength. A lamp that is dimmed to nothing keeps its colour in the state. came: the material as it was read."""
     tint, strength = colour.tint_and_strength(material.emission, state.emission_colours.get(state.material, WHITE))
-    widgets.labelled("Emission L")
+    widgets.labelled("Emission L", changed=material.emission != came.emission)
     new_tint = state.emission_colours[state.material] = colour.edit_tint("##emission", tint)
+    back = widgets.put_back(False, True)
     imgui.same_line()
     imgui.set_next_item_width(-1)
     new_strength = slider.slide("##strength", strength, STRENGTH, "%.4g W/(sr m²)" if strength else "off")
-    widgets.tooltip("Radiance: colour times strength. Exitance is π times this. Right-click: off")
-    if imgui.is_item_hovered() and imgui.is_mouse_clicked(1):
-        new_strength = 0.0
+    widgets.tooltip(f"Radiance: colour times strength. Exitance is π times this. {widgets.AS_READ}")
+    if widgets.put_back(back, True):
+        return colour.rgb(came.emission)
     if (new_tint, new_strength) == (tint, strength):
         return material.emission
     return colour.rgb(v * new_strength for v in new_tint)
