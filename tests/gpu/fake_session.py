@@ -105,6 +105,8 @@ class FakeSession:
             materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras, sky=None, lights=()
         )
         self.scene.bounds = np.zeros(3), np.ones(3)
+        self.scene.material_ids = np.arange(len(MATERIALS))
+        self.scene.normals_areas = np.zeros((len(MATERIALS), 3)), np.ones(len(MATERIALS))
         self.unedited = self.scene
         self.charts = SimpleNamespace(density=40.0, tile=16, warnings=(), size=(160, 96))
         self.lightmap = SimpleNamespace(space=FakeSpace())

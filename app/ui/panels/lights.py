@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.render.false_colour import WHITE_EFFICACY
 from app.scene.lights import Light
-from app.ui import colour, slider, theme, widgets
+from app.ui import lamp, slider, theme, widgets
 from app.ui.panels import sky
 from app.ui.state import RGB, State
 
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
     from app.session.view import View
 
 ROWS_SHOWN = 4  # of the list before it scrolls
-STRENGTH = slider.Range(1e-4, 1e6, logarithmic=True)  # W/sr or W/m²
+WEAKEST = 1e-4  # W/sr or W/m²
 UNTWEAKED = int(imgui.SliderFlags_.no_speed_tweaks)  # Shift is slower here
 STEP = 0.005  # of the scene's diagonal, for a pixel that a place is dragged by
 WIDEST = 10.0  # degrees across a directional light
@@ -47,7 +46,8 @@ def _lamps(view: View, state: State) -> None:
     index = min(state.light, len(lights) - 1)
     low, high = view.session.scene.bounds
     imgui.push_id("light")
-    edited = _editor(lights[index], _as_read(view, index, lights[index]), float(math.dist(low, high)))
+    came = _as_read(view, index, lights[index])
+    edited = _editor(lights[index], came, view.display.quantities, float(math.dist(low, high)))
     imgui.pop_id()
     if edited != lights[index]:
         state.act(lambda: view.session.set_lights((*lights[:index], edited, *lights[index + 1 :])))
@@ -79,11 +79,15 @@ def _as_read(view: View, index: int, light: Light) -> Light:
     return came[index] if same else light
 
 
-def _editor(light: Light, came: Light, size: float) -> Light:
-    """The light as it was edited. came: as it was read. size: diagonal of the scene [m]."""
+def _editor(light: Light, came: Light, quantities: str, size: float) -> Light:
+    """The light as it was edited. came: as it was read. quantities: that it is counted in. size: diagonal of the scene [m]."""
     widgets.labelled("Shines", changed=light.on != came.on)
     on = widgets.put_back(imgui.checkbox("##on", light.on)[1], came.on)
-    light = dataclasses.replace(light, on=on, intensity=_intensity(light, came))
+    kind, spread = ("arrives", None) if light.from_afar else ("directed", light.solid_angle)
+    intensity, _ = lamp.edit_light(
+        light.intensity, kind, quantities, came=came.intensity, weakest=WEAKEST, spread=spread
+    )
+    light = dataclasses.replace(light, on=on, intensity=intensity)
     if not light.from_afar:
         place = _vector("Position [m]", light.position, came.position, STEP * size, "%.2f")
         help = "Of the lamp: above 0, shadows have soft edges"
@@ -104,32 +108,6 @@ def _editor(light: Light, came: Light, size: float) -> Light:
         wide = _angle("Angle", light.angle, came.angle, WIDEST, help)
         light = dataclasses.replace(light, angle=wide)
     return light
-
-
-def _intensity(light: Light, came: Light) -> RGB:
-    """Colour × strength, in W/sr or W/m². came: the light as it was read."""
-    tint, strength = colour.tint_and_strength(light.intensity)
-    widgets.labelled("Strength", changed=light.intensity != came.intensity)
-    new_tint = colour.edit_tint("##colour", tint)
-    back = widgets.put_back(False, True)
-    imgui.same_line()
-    imgui.set_next_item_width(-1)
-    now = slider.slide("##strength", strength, STRENGTH, f"%.4g {'W/m²' if light.from_afar else 'W/sr'}")
-    back = widgets.put_back(back, True)
-    lumens = WHITE_EFFICACY * strength
-    if light.from_afar:
-        widgets.tooltip(f"Irradiance of what faces it; about {widgets.number(lumens, 3)} lx")
-    else:
-        power = widgets.number(light.solid_angle * strength, 3)
-        widgets.tooltip(
-            f"Radiant intensity; in all {power} W. About {widgets.number(lumens, 3)} cd, "
-            f"{widgets.number(light.solid_angle * lumens, 3)} lm"
-        )
-    if back:
-        return came.intensity
-    if (new_tint, now) == (tint, strength):
-        return light.intensity
-    return colour.rgb(now * c for c in new_tint)
 
 
 def _vector(label: str, value: RGB, came: RGB, step: float, text: str) -> RGB:

@@ -5,18 +5,17 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from imgui_bundle import imgui
 
 from app.scene.model import MOST_ALBEDO
-from app.ui import colour, slider, theme, widgets
+from app.ui import colour, lamp, theme, widgets
 from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
     from app.session.view import View
 
 ROWS_SHOWN = 12  # of the list before it scrolls
-WHITE = (1.0, 1.0, 1.0)
-STRENGTH = slider.Range(0.0, 1e5, logarithmic=True, start=1.0)  # W/(sr m²): the sun's disc is brighter, lamps are not
 
 
 def draw(view: View, state: State) -> None:
@@ -56,7 +55,8 @@ def _editor(view: View, state: State, material: Any) -> None:
     index = state.material
     came = view.session.unedited.materials[index]
     imgui.push_id("material")
-    edited = dataclasses.replace(material, albedo=_albedo(material, came), emission=_emission(state, material, came))
+    albedo, light = _albedo(material, came), emission(view, state, material, came, index)
+    edited = dataclasses.replace(material, albedo=albedo, emission=light)
     imgui.pop_id()
     if (edited.albedo, edited.emission) != (material.albedo, material.emission):
         state.act(lambda: view.session.set_material(index, edited))
@@ -79,18 +79,25 @@ def _albedo(material: Any, came: Any) -> RGB:
     return widgets.put_back(edited, came.albedo)
 
 
-def _emission(state: State, material: Any, came: Any) -> RGB:
-    """Colour × strength. A lamp that is dimmed to nothing keeps its colour in the state. came: the material as it was read."""
-    tint, strength = colour.tint_and_strength(material.emission, state.emission_colours.get(state.material, WHITE))
-    widgets.labelled("Emission L", changed=material.emission != came.emission)
-    new_tint = state.emission_colours[state.material] = colour.edit_tint("##emission", tint)
-    back = widgets.put_back(False, True)
-    imgui.same_line()
-    imgui.set_next_item_width(-1)
-    new_strength = slider.slide("##strength", strength, STRENGTH, "%.4g W/(sr m²)" if strength else "off")
-    widgets.tooltip(f"Radiance: colour times strength. Exitance is π times this. {widgets.AS_READ}")
-    if widgets.put_back(back, True):
-        return colour.rgb(came.emission)
-    if (new_tint, new_strength) == (tint, strength):
-        return material.emission
-    return colour.rgb(v * new_strength for v in new_tint)
+def emission(view: View, state: State, material: Any, came: Any, index: int) -> RGB:
+    """Widgets of a material's emission. A lamp that is dimmed to nothing keeps its colour in the state. came: the
+    material as it was read."""
+    edited, state.emission_colours[index] = lamp.edit_light(
+        material.emission,
+        "seen",
+        view.display.quantities,
+        came=came.emission,
+        tint=state.emission_colours.get(index, lamp.WHITE),
+        spread=None if material.emission_texture is not None else np.pi * _emitting_area(view, state, index),
+    )
+    return edited
+
+
+def _emitting_area(view: View, state: State, index: int) -> float:
+    """Of both sides, where both emit [m²]."""
+    scene = view.session.scene
+    known = view.session.unedited, index
+    if state.emitting_area[0] != known:
+        area = float(scene.normals_areas[1][scene.material_ids == index].sum())
+        state.emitting_area = known, area * (1 + scene.materials[index].double_sided)
+    return state.emitting_area[1]
