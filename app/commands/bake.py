@@ -64,12 +64,16 @@ def bake(flags: argparse.Namespace) -> int:
             if against is not None or laid.squares > 1:
                 console.warn(note)
                 result["warnings"].append(note)
-        files = write_bake(flags.output, session.scene, laid.charts, laid.irradiance, laid.covered, result, files_asked)
+        light = laid.charts, laid.irradiance, laid.covered
+        files = write_bake(flags.output, session.scene, *light, result, files_asked, unedited=session.unedited)
+        for note in files.notes:
+            console.warn(note)
+            result["warnings"].append(note)
         line = summary(session, result) + _at_seams(result)
         session.release()
     if failure is not None:
         raise UserError(f"{failure}; {flags.output} has the light of all texels but {lost}")
-    result = {"output": [str(path) for path in vars(files).values()], **result}
+    result = {"output": [str(path) for path in files.paths], **result}
     console.result(result, f"{flags.output}: {line}")
     return 130 if result["interrupted"] or not whole else 0
 
