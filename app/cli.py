@@ -20,15 +20,12 @@ from app.atlas.options import AtlasOptions
 from app.bake.options import BakeOptions
 from app.commands.flags import (
     Parser,
-    fill,
     json_flag,
     output_flag,
     path_flags,
     positive,
     reference_flag,
     scene_flags,
-    settings_flag,
-    settings_named,
     size_flag,
     solver_flags,
     stop_flags,
@@ -37,6 +34,7 @@ from app.errors import UserError
 from app.lightmap.options import LightmapOptions
 from app.options import add_flags, specs
 from app.render.options import DisplayOptions
+from app.session.checkpoint import CheckpointOptions
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
 
 ERROR_SCENES = ("furnace", "cornell-box")
@@ -53,14 +51,7 @@ HARD_SIZES = ("small", "large")
 def run(arguments: list[str]) -> int:
     """Run one command. Returns the exit code."""
     arguments = arguments or ["view"]
-    try:
-        settings = settings_named(arguments)
-    except UserError as error:
-        print(f"glowtree: --settings {error}", file=sys.stderr)
-        return 2
-    solver = solver_named(arguments, settings.solver)
-    flags = build_parser(solver).parse_args(arguments)
-    fill(flags, solver, settings)
+    flags = build_parser(solver_named(arguments)).parse_args(arguments)
     command: Callable[[argparse.Namespace], int] = flags.command
     try:
         code = command(flags)
@@ -89,13 +80,12 @@ class Command(NamedTuple):
     run: Callable[[argparse.Namespace], int] | None = None
 
 
-def solver_named(arguments: Sequence[str], other: str | None = None) -> str:
-    """The solver that is asked for, whose flags are then known; where none is, or none of that name, the ``other`` one, else the
-    command's default."""
+def solver_named(arguments: Sequence[str]) -> str:
+    """The solver that is asked for, whose flags are then known; the command's default where none is, or none of that name."""
     words = [word for argument in arguments for word in argument.split("=", 1)]
     named = [value for flag, value in itertools.pairwise(words) if flag == "--solver" and value in SOLVERS]
     command = " ".join(arguments[: 2 if arguments[:1] == ["bench"] else 1])
-    return named[-1] if named else other or SOLVER_OF.get(command, DEFAULT_SOLVER)
+    return named[-1] if named else SOLVER_OF.get(command, DEFAULT_SOLVER)
 
 
 def build_parser(solver: str = DEFAULT_SOLVER) -> Parser:
@@ -177,6 +167,9 @@ def _bake_flags(bake: Parser, family: Family) -> None:
     help = "lay the lightmap out anew, also where the file has a layout for it (TEXCOORD_1 within 0 to 1, without overlaps)"
     bake.add_argument("--unwrap", action="store_true", help=help)
     add_flags(bake, BakeOptions)
+    add_flags(bake, CheckpointOptions)
+    help = "go on with the bake that was not finished in DIR: with the same scene and flags, but for when to stop"
+    bake.add_argument("--resume", action="store_true", help=help)
     json_flag(bake)
     solver_flags(bake, family, default=SOLVER_OF["bake"])
     stop_flags(bake, family)
@@ -184,7 +177,6 @@ def _bake_flags(bake: Parser, family: Family) -> None:
 
 def _info_flags(info: Parser, family: Family) -> None:
     scene_flags(info)
-    settings_flag(info)
     add_flags(info, LightmapOptions, only=("adaptive", "storage", "depth"))
     json_flag(info)
 

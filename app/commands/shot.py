@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from app.commands.flags import WalkOptions
-from app.commands.report import report, summary
 from app.commands.steps import check_display, estimate, open_scene, session_options, solve, stop_of
 from app.commands.walk import Walk, save_walk
 from app.errors import UserError
@@ -19,6 +18,7 @@ from app.options import from_flags
 from app.render.camera_path import CameraPath, load_path
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
+from app.session.report import report, summary
 from app.session.session import Session
 from app.session.view import View
 from app.util.console import Console

@@ -8,7 +8,6 @@ from typing import Any
 
 from app.atlas.options import AtlasOptions
 from app.commands.flags import sky_of
-from app.commands.report import notes
 from app.errors import UserError
 from app.lightmap.options import LightmapOptions
 from app.options import Options, from_flags, specs
@@ -16,7 +15,8 @@ from app.render.layers import LAYER_SHADERS, layers_with
 from app.render.options import DisplayOptions
 from app.scene.load import NO_LIGHT
 from app.scene.options import FileOptions
-from app.session.run import NotFiniteError, Stop
+from app.session.report import notes
+from app.session.run import Keeper, NotFiniteError, Stop
 from app.session.session import Session
 from app.session.stats import Stats
 from app.solvers import SOLVERS
@@ -88,8 +88,10 @@ def stop_of(flags: argparse.Namespace) -> Stop:
     return Stop(flags.work, flags.time, error, rms)
 
 
-def solve(session: Session, flags: argparse.Namespace, console: Console) -> NotFiniteError | None:
-    """Solve. What broke the light is returned: what there is can still be written."""
+def solve(
+    session: Session, flags: argparse.Namespace, console: Console, keeper: Keeper | None = None
+) -> NotFiniteError | None:
+    """Solve. What broke the light is returned: what there is can still be written. keeper: of the light as it goes on."""
     stop = stop_of(flags)
     said = set()
 
@@ -101,7 +103,7 @@ def solve(session: Session, flags: argparse.Namespace, console: Console) -> NotF
 
     with console.progress(session.family.title.lower()) as tell:
         try:
-            session.solve(stop, say)
+            session.solve(stop, say, keeper)
         except NotFiniteError as error:
             return error
     for note in notes(session):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from app.session.history import COLUMNS, History
 from app.session.pacing import Pacer
 from app.solvers import EnergyBalance, Family, Progress, Solver
 from app.solvers.run import solve_until
+from app.util.interrupt import held_back
 from app.util.parts import run_to_end
 from app.util.rows import CAPACITY
 from app.util.state import State, StateError
@@ -52,17 +53,28 @@ class Stop:
         return self.error is not None or self.rms is not None
 
 
+class Keeper(Protocol):
+    """Keeps the light of a solve that goes on: see checkpoint.py."""
+
+    def between(self) -> None:
+        """Between two pieces of work."""
+
+    def write(self) -> None:
+        """The solve is about to be stopped."""
+
+
 class Run:
     """The solve of the open scene. ``begin`` gives it a solver; it releases nothing.
 
-    running: whether ``advance`` works. seconds: of solving. interrupted: whether Ctrl-C ended the last ``solve``.
+    running: whether ``advance`` works. seconds: of solving; earlier: of these, before the light was kept that it goes on from.
+    interrupted: whether Ctrl-C ended the last ``solve``.
     settled: whether progress, energy and history are those of the last piece of work.
     """
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
         self.running, self.interrupted, self.settled = True, False, True
-        self.seconds = 0.0
+        self.seconds = self.earlier = 0.0
         self.history, self.effort = History(), Effort()
         self.solver: Solver[Any]
         self.family: Family
@@ -87,7 +99,8 @@ class Run:
         self._start_clock()
 
     def _start_clock(self) -> None:
-        self.seconds, self.settled = 0.0, True
+        self.seconds = self.earlier = 0.0
+        self.settled = True
         self.effort.begin()
         self._pace.begin()
         self._gpu.timers.reset()
@@ -107,7 +120,7 @@ class Run:
         if len(rows) > CAPACITY:
             raise StateError(f"a history of {len(rows)} rows")
         self.history.rows = rows
-        self.seconds = float(state.values["seconds"])
+        self.seconds = self.earlier = float(state.values["seconds"])
         self.effort.options_changed()
         self.settled = False
 
@@ -236,16 +249,22 @@ class Run:
     # -- without a window ----------------------------------------------------------------------------------------------
 
     def solve(
-        self, stop: Stop, tell: Callable[[], None] | None = None, good: Callable[[float], bool] | None = None
+        self,
+        stop: Stop,
+        tell: Callable[[], None] | None = None,
+        good: Callable[[float], bool] | None = None,
+        keeper: Keeper | None = None,
     ) -> None:
-        """Work until ``stop``, or until converged; ``tell`` is called a few times a second. Ctrl-C ends it early and is noted as
-        ``interrupted``. good: says whether settled light is as good as ``stop`` asks for, and may take about so many seconds; it
-        is asked again once the solve has taken half as long again. Raises NotFiniteError; progress and energy are those of the
-        last piece of work then, too."""
-        start, failure = time.perf_counter(), None
+        """Work until ``stop``, or until converged; ``tell`` is called a few times a second. Ctrl-C ends it after the piece of
+        work under way, a second one at once, and is noted as ``interrupted``. good: says whether settled light is as good as
+        ``stop`` asks for, and may take about so many seconds; it is asked again once the solve has taken half as long again.
+        keeper: of the light between pieces of work. Raises NotFiniteError; progress and energy are those of the last piece of
+        work then, too."""
+        start, failure = time.perf_counter() - self.earlier, None
         self.interrupted = False
         try:
-            self._solve(stop, start, tell, good)
+            with held_back() as asked:
+                self._solve(stop, start, tell, good, asked, keeper)
         except KeyboardInterrupt:
             self.interrupted = True
         except NotFiniteError as error:
@@ -257,7 +276,13 @@ class Run:
             raise failure
 
     def _solve(
-        self, stop: Stop, start: float, tell: Callable[[], None] | None, good: Callable[[float], bool] | None
+        self,
+        stop: Stop,
+        start: float,
+        tell: Callable[[], None] | None,
+        good: Callable[[float], bool] | None,
+        asked: Callable[[], bool],
+        keeper: Keeper | None,
     ) -> None:
         told, ask_at, self.settled = start, 0.0, False
 
@@ -266,6 +291,11 @@ class Run:
             now = time.perf_counter()
             self.seconds = now - start
             self.poll(energy=False)
+            if keeper is not None:
+                (keeper.write if asked() else keeper.between)()
+            if asked():
+                self.interrupted = True
+                return True
             if tell and now - told > TELL_SECONDS:
                 told = now
                 tell()

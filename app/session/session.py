@@ -28,7 +28,7 @@ from app.session.error_estimate import SECONDS, RunningEstimate
 from app.session.flicker import flickering
 from app.session.loading import Loading, load
 from app.session.opening import Opened, Opening, Prepare, Ready
-from app.session.run import Run, Stop
+from app.session.run import Keeper, Run, Stop
 from app.session.solver_choice import SolverChoice
 from app.session.stats import Stats, stats_of
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family, Solver
@@ -258,7 +258,7 @@ class Session:
         self.estimate.changed()
         return self.run.work(amount)
 
-    def solve(self, stop: Stop, tell: Callable[[Stats], None] | None = None) -> None:
+    def solve(self, stop: Stop, tell: Callable[[Stats], None] | None = None, keeper: Keeper | None = None) -> None:
         """Work until ``stop``, or until converged, see ``Run.solve``. Raises NotFiniteError."""
         self.estimate.changed()
 
@@ -267,7 +267,9 @@ class Session:
             error = self.expected
             return error is not None and error.within(median=stop.error, rms=stop.rms)
 
-        self.run.solve(stop, None if tell is None else lambda: tell(self.stats), good if stop.by_error else None)
+        self.run.solve(
+            stop, None if tell is None else lambda: tell(self.stats), good if stop.by_error else None, keeper
+        )
 
     def restart(self) -> None:
         """Forget all light and begin again."""

@@ -26,7 +26,7 @@ MOST_HEAD = 1 << 28  # bytes
 
 def write_state(path: Path, state: State) -> None:
     """Put the state there at once. Raises UserError where it cannot be written; the file that was there stays then."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    beside = _beside(path)
     try:
         with beside.open("wb") as file:
             dump_state(file, state)
@@ -38,6 +38,16 @@ def write_state(path: Path, state: State) -> None:
         raise UserError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
         beside.unlink(missing_ok=True)
+
+
+def remove_state(path: Path) -> None:
+    """And what a write that was cut short has left."""
+    for one in (path, _beside(path)):
+        one.unlink(missing_ok=True)
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".{path.name}.tmp")
 
 
 def read_state(path: Path) -> State:
@@ -129,4 +139,4 @@ def _sync_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
-__all__ = ["dump_state", "load_state", "read_state", "write_state"]
+__all__ = ["dump_state", "load_state", "read_state", "remove_state", "write_state"]

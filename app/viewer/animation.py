@@ -16,8 +16,7 @@ import numpy as np
 from PIL import Image
 
 from app.errors import UserError
-from app.util.files import replacing
-from app.viewer.picture import save_png
+from app.viewer.picture import replacing, save_png
 
 __all__ = ["FrameFolder", "animated", "check_animation", "frame_folder", "save_animation"]
 

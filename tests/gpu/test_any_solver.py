@@ -11,11 +11,11 @@ from constant_solver import FAMILY, SWEEPS, Constant
 
 from app.atlas.options import AtlasOptions
 from app.cli import build_parser
-from app.commands.report import report, summary
 from app.errors import UserError
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.options import Options
+from app.session.report import report, summary
 from app.session.run import Stop
 from app.session.session import Session
 from app.session.view import View

@@ -452,7 +452,8 @@ def test_ctrl_c_while_shooting_keeps_what_is_there(folder: Path, kind: str) -> N
     else:
         report = json.loads((output / "report.json").read_text())
         assert report["interrupted"] and report["rays"] > 0 and not report["converged"]
-        assert sorted(p.name for p in output.iterdir()) == ["irradiance.exr", "report.json", "scene.glb"]
+        names = ["bake.checkpoint", "irradiance.exr", "report.json", "scene.glb"]
+        assert sorted(p.name for p in output.iterdir()) == names
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app.commands.report import notes
+from app.session.report import notes
 from app.solvers import SOLVERS
 
 

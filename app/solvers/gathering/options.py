@@ -24,6 +24,5 @@ class GatheringOptions(Options):
         unit="MiB",
         minimum=0,
         maximum=65_536,
-        logarithmic=True,
     )
     smooth: bool = option(True, "smooth indirect light within charts, by as much as it is noisy")

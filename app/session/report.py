@@ -35,6 +35,7 @@ def report(session: Session) -> dict[str, Any]:
         session.family.threshold: stats.remaining,
         "converged": stats.converged,
         "interrupted": run.interrupted,
+        "resumed": run.earlier > 0,
         "seconds": {**session.load_seconds, "shoot": stats.seconds},
         "energy_w": {
             name: [float(x) for x in getattr(balance, name)]

@@ -1,0 +1,98 @@
+"""The light of an open session as the files of a bake: the command writes them, and so does the window."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.bake import BakeFiles, prepare_directory, write_bake
+from app.bake.options import BakeOptions
+from app.bake.own_layout import Laid, laid_out, why_not_kept
+from app.lightmap.collapse import collapse
+from app.lightmap.gutter import fill_gutter
+from app.lightmap.seams import jumps
+from app.session.report import picture, report, summary
+from app.session.session import Session
+
+__all__ = ["Baked", "bake_folder", "write_light"]
+
+
+@dataclass(frozen=True, eq=False)
+class Baked:
+    """The files of a bake, its report, that in a line, what the user should know, and how many texels' light is no number."""
+
+    files: BakeFiles
+    result: dict[str, Any]
+    line: str
+    notes: tuple[str, ...]
+    lost: int
+
+
+def write_light(session: Session, folder: Path, how: BakeOptions, *, unwrap: bool = False) -> Baked:
+    """Write the light as it is now, with the scene as it was edited. unwrap: not by the file's own layout. Waits for the GPU.
+    Raises UserError."""
+    clock = time.perf_counter()
+    lightmap = session.lightmap
+    irradiance, covered = collapse(lightmap.pool, lightmap.irradiance(ambient=True))
+    session.load_seconds["read back"] = time.perf_counter() - clock
+    finite = np.asarray(np.isfinite(irradiance).all(-1))
+    lost = int((covered & ~finite).sum())
+    result = report(session) | picture(session) | {"texels_not_finite": lost}
+    irradiance = np.where(finite[..., None], np.maximum(irradiance, 0), np.float32(0))  # no light is still owed
+    laid = Laid(session.charts, irradiance, covered & finite)
+    result |= _seams(laid)
+    notes: tuple[str, ...] = ()
+    if not unwrap and session.scene.uv1 is not None:
+        laid, notes = _own_layout(session, laid)
+        result["atlas"] = list(laid.charts.size)
+        result["warnings"] += notes
+    files = write_bake(folder, session.scene, laid.charts, laid.irradiance, laid.covered, result, how)
+    return Baked(files, result, summary(session, result) + _at_seams(result), notes, lost)
+
+
+def _own_layout(session: Session, laid: Laid) -> tuple[Laid, tuple[str, ...]]:
+    """The light as the file's own layout has it, where that will do, and what there is to say of it."""
+    against = why_not_kept(session.scene, laid)
+    if against is not None:
+        return laid, (f"the file's own layout, TEXCOORD_1, is not kept: {against}",)
+    own = laid_out(session.scene, laid)
+    squares = f"the squares that {own.squares} objects have in TEXCOORD_1 are placed side by side"
+    return own, (squares,) if own.squares > 1 else ()
+
+
+def _seams(laid: Laid) -> dict[str, Any]:
+    """How far light jumps at seams, before and after it was made one there, and beside them from texel to texel: over its mean,
+    median and 90 % quantile. Nothing where there are none."""
+    if not len(laid.charts.seams):
+        return {}
+    before = jumps(fill_gutter(laid.irradiance, laid.covered), laid.charts)
+    after = jumps(laid.image, laid.charts)
+    return {"seams": {"places": after.places, "before": before.across, "after": after.across, "beside": before.within}}
+
+
+def _at_seams(result: dict[str, Any]) -> str:
+    """The same, in words."""
+    if "seams" not in result:
+        return ""
+    before, after, beside = (result["seams"][name][0] for name in ("before", "after", "beside"))
+    return f", light jumps by {after:.1%} at seams ({before:.1%} before, {beside:.1%} between texels beside them)"
+
+
+@contextlib.contextmanager
+def bake_folder(path: Path) -> Iterator[None]:
+    """A folder that can be written to; what was made of it is gone again if nothing came of it. Raises UserError."""
+    made = list(itertools.takewhile(lambda folder: not folder.exists(), (path, *path.parents)))
+    prepare_directory(path)
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):  # not empty: that is the normal case
+            for folder in made:
+                folder.rmdir()

@@ -1,0 +1,81 @@
+"""A checkpoint is a file with the light of a solve that goes on: every so many seconds, and when it is stopped.
+
+Whatever ends the program, the last checkpoint is whole, and no more is lost than what was done since.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.errors import UserError
+from app.options import Options, option
+from app.session.light_state import light_state, restore_light
+from app.session.session import Session
+from app.util.state_file import read_state, remove_state, write_state
+
+CHECKPOINT_NAME = "bake.checkpoint"
+
+
+@dataclass(frozen=True)
+class CheckpointOptions(Options):
+    """How often."""
+
+    checkpoint: float = option(
+        60.0,
+        "write the light so far every so many seconds, to resume from",
+        unit="s",
+        minimum=0,
+        maximum=86400,
+        zero="never",
+    )
+
+
+class Checkpoint:
+    """Of one session's solve, in one file. say: is told once why it cannot be written, if so; the solve goes on."""
+
+    def __init__(self, session: Session, path: Path, seconds: float, say: Callable[[str], None]) -> None:
+        """seconds: between two, 0 for never."""
+        self._session, self.path, self._seconds, self._say = session, path, seconds, say
+        self._works = seconds > 0
+        self.begin()
+
+    def begin(self) -> None:
+        """The solve goes on from now."""
+        self._due = time.perf_counter() + self._seconds
+
+    def resume(self) -> bool:
+        """Let the session, which has the same scene open, go on from the file; False where there is none. Raises UserError."""
+        if not self.path.exists():
+            return False
+        state = read_state(self.path)
+        try:
+            restore_light(self._session, state)
+        except UserError as error:
+            raise UserError(f"{self.path}: {error}") from None
+        return True
+
+    def between(self) -> None:
+        """Between two pieces of work: write it if it is time."""
+        if time.perf_counter() >= self._due:
+            self.write()
+
+    def write(self) -> None:
+        """Write it now, in place of the one before."""
+        if not self._works:
+            return
+        try:
+            write_state(self.path, light_state(self._session))
+        except UserError as error:
+            self._works = False
+            self._say(f"{error}: the bake goes on without checkpoints")
+        self.begin()
+
+    def remove(self) -> None:
+        """What it was kept for is done."""
+        remove_state(self.path)
+
+
+__all__ = ["CHECKPOINT_NAME", "Checkpoint", "CheckpointOptions"]
