@@ -20,12 +20,15 @@ from app.atlas.options import AtlasOptions
 from app.bake.options import BakeOptions
 from app.commands.flags import (
     Parser,
+    fill,
     json_flag,
     output_flag,
     path_flags,
     positive,
     reference_flag,
     scene_flags,
+    settings_flag,
+    settings_named,
     size_flag,
     solver_flags,
     stop_flags,
@@ -51,7 +54,14 @@ HARD_SIZES = ("small", "large")
 def run(arguments: list[str]) -> int:
     """Run one command. Returns the exit code."""
     arguments = arguments or ["view"]
-    flags = build_parser(solver_named(arguments)).parse_args(arguments)
+    try:
+        settings = settings_named(arguments)
+    except UserError as error:
+        print(f"glowtree: --settings {error}", file=sys.stderr)
+        return 2
+    solver = solver_named(arguments, settings.solver)
+    flags = build_parser(solver).parse_args(arguments)
+    fill(flags, solver, settings)
     command: Callable[[argparse.Namespace], int] = flags.command
     try:
         code = command(flags)
@@ -80,12 +90,13 @@ class Command(NamedTuple):
     run: Callable[[argparse.Namespace], int] | None = None
 
 
-def solver_named(arguments: Sequence[str]) -> str:
-    """The solver that is asked for, whose flags are then known; the command's default where none is, or none of that name."""
+def solver_named(arguments: Sequence[str], other: str | None = None) -> str:
+    """The solver that is asked for, whose flags are then known; where none is, or none of that name, the ``other`` one, else the
+    command's default."""
     words = [word for argument in arguments for word in argument.split("=", 1)]
     named = [value for flag, value in itertools.pairwise(words) if flag == "--solver" and value in SOLVERS]
     command = " ".join(arguments[: 2 if arguments[:1] == ["bench"] else 1])
-    return named[-1] if named else SOLVER_OF.get(command, DEFAULT_SOLVER)
+    return named[-1] if named else other or SOLVER_OF.get(command, DEFAULT_SOLVER)
 
 
 def build_parser(solver: str = DEFAULT_SOLVER) -> Parser:
@@ -177,6 +188,7 @@ def _bake_flags(bake: Parser, family: Family) -> None:
 
 def _info_flags(info: Parser, family: Family) -> None:
     scene_flags(info)
+    settings_flag(info)
     add_flags(info, LightmapOptions, only=("adaptive", "storage", "depth"))
     json_flag(info)
 

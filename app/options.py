@@ -40,6 +40,7 @@ class Spec:
     multiple: int = 1
     optional: bool = False
     zero: str = ""
+    usual: tuple[float, float] | None = None
 
     @property
     def flag(self) -> str:
@@ -95,11 +96,14 @@ def option(
     logarithmic: bool = False,
     multiple: int = 1,
     zero: str = "",
+    usual: tuple[float, float] | None = None,
 ) -> Any:
-    """Declare one field of an ``Options`` dataclass. zero: what a widget shows instead of 0."""
+    """Declare one field of an ``Options`` dataclass. zero: what a widget shows instead of 0. usual: ends of a widget's range,
+    inside of what is legal."""
     meta = {"help": help, "unit": unit, "minimum": minimum, "maximum": maximum, "choices": tuple(choices)}
     return dataclasses.field(
-        default=default, metadata={**meta, "logarithmic": logarithmic, "multiple": multiple, "zero": zero}
+        default=default,
+        metadata={**meta, "logarithmic": logarithmic, "multiple": multiple, "zero": zero, "usual": usual},
     )
 
 

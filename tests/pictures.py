@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
-from app.render.false_colour import LUMINANCE
 from app.render.frame import FrameRenderer
 from app.render.options import DisplayOptions
+from app.render.units import LUMINANCE
 from app.scene.model import F64
 
 

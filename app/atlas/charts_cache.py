@@ -25,7 +25,15 @@ from app.util import cache
 
 FEWEST = 16384  # triangles that a file is worth
 CACHE_FILES = 8  # kept, newest first: of a million triangles a file takes 150 MB
-BY_TRIANGLE = ("material_ids", "object_ids", "uv0", "uv1", "normals", "colours")  # of a scene, that cutting changes
+BY_TRIANGLE = (
+    "material_ids",
+    "object_ids",
+    "listed",
+    "uv0",
+    "uv1",
+    "normals",
+    "colours",
+)  # of a scene, that cutting changes
 GEOMETRY = ("positions", "triangles", *BY_TRIANGLE)
 LIBRARIES = ("numpy", "scipy", "shapely", "xatlas")
 SCENE, SEAMS = "scene_", "seams_"  # before the names of what is theirs

@@ -6,6 +6,7 @@ writing leaves the previous files as they were.
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,9 +18,10 @@ from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
 from app.bake.exr import write_irradiance
+from app.bake.gltf_edit import edited_glb_bytes, is_of_gltf
 from app.bake.gltf_writer import glb_bytes
 from app.bake.options import BakeOptions
-from app.errors import UserError
+from app.errors import SceneError, UserError
 from app.lightmap.seams import finished
 from app.scene.model import F32, Scene
 from app.util.json_text import json_text
@@ -33,11 +35,16 @@ REPORT_NAME = "report.json"
 
 @dataclass(frozen=True)
 class BakeFiles:
-    """Where the files of a bake are."""
+    """Where the files of a bake are. notes: what the user should know."""
 
     irradiance: Path
     scene: Path
     report: Path
+    notes: tuple[str, ...] = ()
+
+    @property
+    def paths(self) -> list[Path]:
+        return [self.irradiance, self.scene, self.report]
 
 
 def prepare_directory(directory: Path) -> Path:
@@ -60,11 +67,14 @@ def write_bake(
     covered: NDArray[np.bool_],
     report: Mapping[str, Any],
     options: BakeOptions | None = None,
+    *,
+    unedited: Scene | None = None,
 ) -> BakeFiles:
     """Write the lightmap, the scene that uses it and the report into ``directory``, which is made if need be.
 
     irradiance (H, W, 3) f32 [W/m²] over the virtual atlas, row 0 at v = 0, finite wherever ``covered`` (H, W).
-    In the report, numbers that are not finite become null. UserError if the folder cannot be written.
+    unedited: the scene as it was read; of a glTF file, its document is kept then, see gltf_edit.py. In the report, numbers
+    that are not finite become null. UserError if the folder cannot be written.
     """
     finer = irradiance.shape[0] // charts.size[1]
     assert irradiance.shape == (charts.size[1] * finer, charts.size[0] * finer, 3), f"{irradiance.shape}, {charts.size}"
@@ -73,11 +83,12 @@ def write_bake(
     options = options or BakeOptions()
     prepare_directory(directory)
     files = BakeFiles(directory / IRRADIANCE_NAME, directory / SCENE_NAME, directory / REPORT_NAME)
-    temporary = {path: path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") for path in vars(files).values()}
+    temporary = {path: path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") for path in files.paths}
     try:
         write_irradiance(temporary[files.irradiance], finished(irradiance, covered, charts))
-        temporary[files.scene].write_bytes(glb_bytes(scene, charts, IRRADIANCE_NAME, moz_lightmap=options.moz_lightmap))
-        temporary[files.report].write_text(json_text(report), encoding="utf-8")
+        glb, notes = _scene_bytes(scene, unedited, charts, options)
+        temporary[files.scene].write_bytes(glb)
+        temporary[files.report].write_text(json_text(_with_notes(report, notes)), encoding="utf-8")
         for path, written in temporary.items():
             os.replace(written, path)
     except OSError as error:
@@ -85,4 +96,22 @@ def write_bake(
     finally:
         for written in temporary.values():
             written.unlink(missing_ok=True)
-    return files
+    return dataclasses.replace(files, notes=notes)
+
+
+def _scene_bytes(
+    scene: Scene, unedited: Scene | None, charts: Charts, options: BakeOptions
+) -> tuple[bytes, tuple[str, ...]]:
+    """scene.glb, and what the user should know of it."""
+    notes: tuple[str, ...] = ()
+    if unedited is not None and is_of_gltf(scene):
+        try:
+            moz = options.moz_lightmap
+            return edited_glb_bytes(scene, unedited, charts, IRRADIANCE_NAME, moz_lightmap=moz), notes
+        except SceneError as error:  # it was there when it was opened: the light is not lost for it
+            notes = (f"{error}: {SCENE_NAME} has what light depends on, not all that the file had",)
+    return glb_bytes(scene, charts, IRRADIANCE_NAME, moz_lightmap=options.moz_lightmap), notes
+
+
+def _with_notes(report: Mapping[str, Any], notes: tuple[str, ...]) -> dict[str, Any]:
+    return {**report, "warnings": [*report.get("warnings", ()), *notes]} if notes else dict(report)

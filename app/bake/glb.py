@@ -12,16 +12,18 @@ from numpy.typing import NDArray
 MAGIC, VERSION, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 COMPONENT_TYPES = {"float32": 5126, "uint16": 5123, "uint32": 5125}
-ELEMENT_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
+ELEMENT_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 RESTART_INDEX = {"uint16": 0xFFFF}  # the largest index of a type is not allowed (glTF 2.0, 3.7.2.1)
 
 
 class GlbBuilder:
     """Collects objects by kind (``nodes``, ``materials``...) and binary data; ``to_bytes`` is the file."""
 
-    def __init__(self, generator: str) -> None:
-        self.document: dict[str, Any] = {"asset": {"version": "2.0", "generator": generator}}
-        self._extensions: set[str] = set()
+    def __init__(self, generator: str, document: dict[str, Any] | None = None) -> None:
+        """document: what there is already, without binary data."""
+        self.document: dict[str, Any] = document or {}
+        self.document["asset"] = {"version": "2.0", **self.document.get("asset", {}), "generator": generator}
+        self._extensions = set(self.document.pop("extensionsUsed", ()))
         self._binary = bytearray()
 
     def add(self, kind: str, item: dict[str, Any]) -> int:
@@ -40,8 +42,15 @@ class GlbBuilder:
     def use_extension(self, name: str) -> None:
         self._extensions.add(name)
 
+    def drop_extension(self, name: str) -> None:
+        """It is neither used nor required any more."""
+        self._extensions.discard(name)
+        required = [other for other in self.document.pop("extensionsRequired", ()) if other != name]
+        if required:
+            self.document["extensionsRequired"] = required
+
     def add_vertices(self, values: NDArray[np.float32], *, bounds: bool = False) -> int:
-        """An accessor of (n, 2|3) f32 vertex values, with the bounds that POSITION must state."""
+        """An accessor of (n, 1 to 4) f32 vertex values, with the bounds that POSITION must state."""
         item = self._accessor(np.ascontiguousarray(values, np.float32), ARRAY_BUFFER)
         if bounds:
             item |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
@@ -55,7 +64,7 @@ class GlbBuilder:
 
     def add_image(self, png: bytes, name: str) -> int:
         """An embedded PNG."""
-        view = {"bufferView": self._view(png, {}), "mimeType": "image/png"}
+        view = {"bufferView": self.add_view(png, {}), "mimeType": "image/png"}
         return self.add("images", view | ({"name": name} if name else {}))
 
     def to_bytes(self) -> bytes:
@@ -74,13 +83,14 @@ class GlbBuilder:
     def _accessor(self, values: NDArray[Any], target: int) -> dict[str, Any]:
         width = 1 if values.ndim == 1 else values.shape[1]
         return {
-            "bufferView": self._view(values.tobytes(), {"target": target}),
+            "bufferView": self.add_view(values.tobytes(), {"target": target}),
             "componentType": COMPONENT_TYPES[values.dtype.name],
             "count": len(values),
             "type": ELEMENT_TYPES[width],
         }
 
-    def _view(self, data: bytes, extra: dict[str, Any]) -> int:
+    def add_view(self, data: bytes, extra: dict[str, Any]) -> int:
+        """A buffer view of some bytes. extra: what its object has beside place and length."""
         self._binary += b"\0" * (-len(self._binary) % 4)
         offset = len(self._binary)
         self._binary += data

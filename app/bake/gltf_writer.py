@@ -19,6 +19,7 @@ Every triangle has its own lightmap area:
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,7 +41,7 @@ NEAR_PLANE = 1e-3  # of the scene's radius: glTF cameras must have one, the scen
 
 
 @dataclass(frozen=True, eq=False)
-class _Sides:
+class Sides:
     """The triangle sides to write, (k,) each. uv (k, 3, 2) in [0, 1], in the triangle's corner order; 0 if not lit."""
 
     triangle: NDArray[np.int64]
@@ -49,33 +50,41 @@ class _Sides:
     double_sided: NDArray[np.bool_]
     uv: F64
 
+    def only(self, rows: NDArray[np.int64]) -> Sides:
+        return Sides(**{name: values[rows] for name, values in vars(self).items()})
+
 
 def glb_bytes(scene: Scene, charts: Charts, lightmap: str, *, moz_lightmap: bool = False) -> bytes:
     """The whole GLB file. lightmap: the EXR's file name beside it. moz_lightmap: name it as a texture, too."""
     glb = GlbBuilder(f"glowtree {__version__}")
-    texture = _lightmap_texture(glb, lightmap) if moz_lightmap else None
+    texture = lightmap_texture(glb, lightmap) if moz_lightmap else None
     materials = MaterialWriter(glb, scene.materials, lightmap, texture)
 
     lower, upper = scene.bounds
     centre, radius = (lower + upper) / 2, float(np.linalg.norm(upper - lower)) / 2
     offset = centre if np.linalg.norm(centre) > FAR * radius else np.zeros(3)
-    nodes = _add_objects(glb, scene, _sides(scene, charts), materials, offset)
-    nodes += [_add_camera(glb, camera, NEAR_PLANE * radius) for camera in scene.cameras]
-    nodes += [_add_light(glb, light) for light in scene.lights if light.emits]
-    about = {"file": lightmap, "quantity": "irradiance", "unit": "W/m2", "texCoord": 1, "firstRow": "v = 0"}
-    glb.add("scenes", {"name": scene.name, "nodes": nodes, "extras": {"lightmap": about}})
+    nodes = add_objects(glb, scene, sides_of(scene, charts), materials, offset)
+    nodes += [add_camera(glb, camera, radius) for camera in scene.cameras]
+    nodes += [add_light(glb, light) for light in scene.lights if light.emits]
+    glb.add("scenes", {"name": scene.name, "nodes": nodes, "extras": {"lightmap": about_lightmap(lightmap)}})
     glb.document["scene"] = 0
     return glb.to_bytes()
 
 
-def _lightmap_texture(glb: GlbBuilder, uri: str) -> int:
+def about_lightmap(file: str) -> dict[str, Any]:
+    """What the glTF scene says of the lightmap."""
+    return {"file": file, "quantity": "irradiance", "unit": "W/m2", "texCoord": 1, "firstRow": "v = 0"}
+
+
+def lightmap_texture(glb: GlbBuilder, uri: str) -> int:
+    """The lightmap's file as a glTF texture, whatever format it has."""
     image = glb.add("images", {"uri": uri, "name": "irradiance"})
     sampler = glb.add("samplers", {"magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071})
     return glb.add("textures", {"source": image, "sampler": sampler, "name": "irradiance"})
 
 
-def _sides(scene: Scene, charts: Charts) -> _Sides:
-    """Which sides of which triangles are written, front before back."""
+def sides_of(scene: Scene, charts: Charts) -> Sides:
+    """Which sides of which triangles are written, front before back: see above."""
     face = np.full((len(scene.triangles), 2), -1)
     face[charts.face_triangle, charts.face_back.astype(int)] = np.arange(len(charts.face_triangle))
     front_lit, back_lit = face[:, 0] >= 0, face[:, 1] >= 0
@@ -87,7 +96,7 @@ def _sides(scene: Scene, charts: Charts) -> _Sides:
     lit = written >= 0
     uv = np.zeros((len(triangle), 3, 2))
     uv[lit] = charts.face_uv[written[lit]] / np.array(charts.size)
-    return _Sides(
+    return Sides(
         triangle=triangle,
         back=side == 1,
         lit=lit,
@@ -96,17 +105,15 @@ def _sides(scene: Scene, charts: Charts) -> _Sides:
     )
 
 
-def _add_objects(glb: GlbBuilder, scene: Scene, sides: _Sides, materials: MaterialWriter, offset: F64) -> list[int]:
+def add_objects(glb: GlbBuilder, scene: Scene, sides: Sides, materials: MaterialWriter, offset: F64) -> list[int]:
     """One node and mesh for each object that has triangles, one primitive for each glTF material; returns the nodes."""
     keys = np.stack(
         [scene.object_ids[sides.triangle], scene.material_ids[sides.triangle], sides.double_sided, sides.lit], axis=1
     )
-    groups, group_of = np.unique(keys, axis=0, return_inverse=True)
-    members = np.split(np.argsort(group_of, kind="stable"), np.cumsum(np.bincount(group_of))[:-1])
     primitives: dict[int, list[dict[str, Any]]] = {}
-    for (obj, material, double_sided, lit), rows in zip(groups.tolist(), members, strict=True):
+    for (obj, material, double_sided, lit), rows in grouped(keys):
         vertices = _vertices(scene, sides, rows, materials.texcoords(material, lit=bool(lit)), bool(lit), offset)
-        primitive = _add_primitive(glb, vertices)
+        primitive = add_primitive(glb, vertices)
         primitive["material"] = materials.index(material, double_sided=bool(double_sided), lit=bool(lit))
         primitives.setdefault(obj, []).append(primitive)
     nodes = []
@@ -119,8 +126,16 @@ def _add_objects(glb: GlbBuilder, scene: Scene, sides: _Sides, materials: Materi
     return nodes
 
 
+def grouped(keys: NDArray[np.int64]) -> Iterator[tuple[list[int], NDArray[np.int64]]]:
+    """Each different row of keys (n, k), in order, and which rows are like it."""
+    if len(keys):
+        groups, group_of = np.unique(keys, axis=0, return_inverse=True)
+        order = np.argsort(group_of.reshape(-1), kind="stable")
+        yield from zip(groups.tolist(), np.split(order, np.cumsum(np.bincount(group_of.reshape(-1)))[:-1]), strict=True)
+
+
 def _vertices(
-    scene: Scene, sides: _Sides, rows: NDArray[np.int64], texcoords: dict[int, int], lit: bool, offset: F64
+    scene: Scene, sides: Sides, rows: NDArray[np.int64], texcoords: dict[int, int], lit: bool, offset: F64
 ) -> dict[str, F32]:
     """Attribute name → (3k, 2|3) f32, three vertices per side, counter-clockwise from where the side is seen."""
     triangle, back = sides.triangle[rows], sides.back[rows]
@@ -136,17 +151,16 @@ def _vertices(
             attributes[f"TEXCOORD_{slot}"] = uv[triangle]
     if lit:
         attributes["TEXCOORD_1"] = sides.uv[rows]
-    # + 0.0 makes -0.0 and 0.0 one vertex
     return {
         name: np.take_along_axis(values, order[:, :, None], axis=1).astype(np.float32).reshape(-1, values.shape[2])
-        + 0.0
         for name, values in attributes.items()
     }
 
 
-def _add_primitive(glb: GlbBuilder, attributes: dict[str, F32]) -> dict[str, Any]:
-    """Equal vertices become one, in the order in which they come first."""
-    rows = np.ascontiguousarray(np.concatenate(list(attributes.values()), axis=1))
+def add_primitive(glb: GlbBuilder, attributes: dict[str, F32]) -> dict[str, Any]:
+    """A primitive of attributes (3k, 1 to 4) f32, of three vertices for each triangle. Equal ones become one, in the order in
+    which they come first."""
+    rows = np.ascontiguousarray(np.concatenate(list(attributes.values()), axis=1)) + 0.0  # -0.0 and 0.0 are one vertex
     whole = rows.view(np.dtype((np.void, rows.itemsize * rows.shape[1])))[:, 0]
     _, first, inverse = np.unique(whole, return_index=True, return_inverse=True)
     order = np.argsort(first)
@@ -159,14 +173,15 @@ def _add_primitive(glb: GlbBuilder, attributes: dict[str, F32]) -> dict[str, Any
     return {"attributes": written, "indices": glb.add_indices(rank[inverse])}
 
 
-def _add_camera(glb: GlbBuilder, camera: Camera, near: float) -> int:
-    perspective = {"yfov": camera.yfov, "znear": near}
+def add_camera(glb: GlbBuilder, camera: Camera, radius: float) -> int:
+    """A node with the camera. radius: of the scene [m]."""
+    perspective = {"yfov": camera.yfov, "znear": NEAR_PLANE * radius}
     index = glb.add("cameras", {"name": camera.name, "type": "perspective", "perspective": perspective})
     matrix = camera.world_from_camera.T.reshape(-1).tolist()
     return glb.add("nodes", {"name": camera.name, "camera": index, "matrix": matrix})
 
 
-def _add_light(glb: GlbBuilder, light: Light) -> int:
+def add_light(glb: GlbBuilder, light: Light) -> int:
     """A node with the light in cd or lx (KHR_lights_punctual)."""
     strength = max(light.intensity)
     item: dict[str, Any] = {

@@ -40,7 +40,7 @@ def bake(flags: argparse.Namespace) -> int:
         console.warn(note)
     if failure is not None:
         raise UserError(f"{failure}; {flags.output} has the light of all texels but {baked.lost}")
-    result = {"output": [str(path) for path in vars(baked.files).values()], **baked.result}
+    result = {"output": [str(path) for path in baked.files.paths], **baked.result}
     console.result(result, f"{flags.output}: {baked.line}")
     return 130 if result["interrupted"] or not whole else 0
 

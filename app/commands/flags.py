@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import itertools
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
@@ -21,7 +22,9 @@ from app.scene.options import FileOptions
 from app.scene.sky import DEFAULT_SUN, Sky, Sun
 from app.scene.sky_image import SUFFIXES, read_sky_image
 from app.scene.validate import one_line
+from app.session.settings import PRESETS, Settings, settings_of
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
+from app.ui.state import Pace
 
 DEFAULT_SCENE = "cornell-box"
 ALIKE = 0.75  # share of letters in common that makes a flag a likely slip for another; all begin with the same dashes
@@ -78,8 +81,34 @@ def scene_flags(parser: Parser, *, optional: bool = False) -> None:
     add_flags(parser, AtlasOptions)
 
 
+def settings_flag(parser: Parser) -> None:
+    help = f"settings from a .toml file, or {', '.join(PRESETS)}; flags come before them"
+    parser.add_argument("--settings", metavar="FILE", help=help)
+
+
+def settings_named(arguments: Sequence[str]) -> Settings:
+    """Those that are asked for by --settings, before flags are read: which ones there are depends on the solver. Raises
+    UserError."""
+    words = [word for argument in arguments for word in argument.split("=", 1)]
+    named = [value for flag, value in itertools.pairwise(words) if flag == "--settings"]
+    return settings_of(named[-1], {"pace": Pace}) if named else Settings()
+
+
+def fill(flags: argparse.Namespace, solver: str, settings: Settings) -> None:
+    """Give the flags that were not given the values of settings, as far as the command has such flags. solver: that is asked for
+    by a flag or settings."""
+    flags.given = settings
+    if getattr(flags, "solver", None) is not None:
+        flags.solver = solver
+    for table, values in settings.tables.items():
+        for name, value in values.items() if table == solver or table not in SOLVERS else ():
+            if getattr(flags, name, 0) is None:
+                setattr(flags, name, value)
+
+
 def solver_flags(parser: Parser, family: Family, *, default: str = DEFAULT_SOLVER) -> None:
-    """Which solver, its options, and how light is held."""
+    """Settings; which solver, its options, and how light is held."""
+    settings_flag(parser)
     help = "; ".join(f"{name}: {row.help}" for name, row in SOLVERS.items())
     parser.add_argument("--solver", choices=tuple(SOLVERS), default=default, help=f"{help} (default %(default)s)")
     add_flags(parser, family.options)

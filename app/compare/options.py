@@ -11,7 +11,7 @@ from app.options import Options, option
 @dataclass(frozen=True)
 class ReferenceOptions(Options):
     texels: int | None = option(
-        None, "texels of the reference; unset: four times as many", minimum=1, maximum=MAX_TEXELS
+        None, "texels of the reference; unset: four times as many", minimum=1, maximum=MAX_TEXELS, logarithmic=True
     )
     residual: float = option(
         1e-4, "it is solved until this share of the emitted power is unshot", minimum=1e-9, maximum=1, logarithmic=True

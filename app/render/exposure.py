@@ -18,10 +18,10 @@ from app.estimate.forecast import forecast
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.tile_pool import TilePool
 from app.options import specs
-from app.render.false_colour import LUMINANCE
 from app.render.options import DisplayOptions
 from app.render.sample import irradiance_at, sampled_colours, sampled_tiles
 from app.render.seen import Texels
+from app.render.units import LUMINANCE
 from app.scene.model import F64
 
 KEY = 0.18  # mid grey [Reinhard02]

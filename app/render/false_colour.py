@@ -1,8 +1,5 @@
-"""False colour: illuminance E_v = 179·Y(H) [lx] and luminance L_v = 179·Y(B)/π [cd/m²] as colours with a scale.
-
-179 lm/W is Radiance's luminous efficacy of white light [Ward94; WHTEFFICACY in RADIANCE's color.h], so the numbers are
-those that its tools give for the same scene. Y is luminance from linear Rec.709.
-"""
+"""False colour: illuminance E_v = 179·Y(H) [lx] and luminance L_v = 179·Y(B)/π [cd/m²] as colours with a scale, or both in W, see
+app/render/units.py."""
 
 from __future__ import annotations
 
@@ -16,18 +13,16 @@ from app.lightmap.lightmap import Lightmap
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
 from app.render.sample import sampled_colours, sampled_irradiance, sampled_tiles
+from app.render.units import LUMINANCE, QUANTITIES, Quantity, per_watt
 from app.scene.model import F32, F64
 
-WHITE_EFFICACY = 179.0  # lm/W
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec.709 [IEC 61966-2-1]
 # Per cent of the area of what does not emit, between which a scale found from the light runs. A lamp's own luminance, or the
 # illuminance beside it, lies decades above a room's; with them in it all of the room would get one colour.
 SHARES = (1.0, 99.0)
 DECADES = (0.5, 3.0)  # of a logarithmic scale: fewer would be noise, more cannot be told apart
 NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # ends of a scale, times a power of ten
-UNITS = {
-    "illuminance": "lx",
-    "luminance": "cd/m²",
+LIGHT = {"illuminance": "arrives", "luminance": "seen"}  # the quantity of each
+UNITS = {  # of what is no light
     "error": "%",
     "expected error": "%",
     "jump at seams": "%",
@@ -55,22 +50,25 @@ class Scale(NamedTuple):
     unit: str
 
 
-ERRORS = Scale(0.1, 100.0, UNITS["error"])  # the same in every picture, so that they can be compared
+ERRORS = Scale(0.1, 100.0, "%")  # the same in every picture, so that they can be compared
 
 
 def measured(display: DisplayOptions) -> str:
-    """What is shown in false colour, a key of UNITS, or ``off`` for nothing. Layers that are no colours go first."""
+    """What is shown in false colour, a key of LIGHT or of UNITS, or ``off`` for nothing. Layers that are no colours go first."""
     return LAYER_SHADERS[display.layer].measures or display.false_colour
 
 
-def value_per_radiance(kind: str) -> float:
-    """What a layer's radiance of 1 W/(sr m²) measures: lx for irradiance (shown as H/π), cd/m² for radiance B/π. Errors [%] and
-    counts are no radiance."""
-    if UNITS[kind] == "%":
-        return 100.0
-    if kind == "rays":
-        return 1.0
-    return WHITE_EFFICACY * np.pi if kind == "illuminance" else WHITE_EFFICACY
+def value_per_radiance(kind: str, units: str = "photometric") -> float:
+    """What a layer's radiance of 1 W/(sr m²) measures: lx for irradiance (shown as H/π), cd/m² for radiance B/π, or either in W.
+    Errors [%] and counts are no radiance."""
+    if kind in UNITS:
+        return 100.0 if UNITS[kind] == "%" else 1.0
+    return per_watt(units) * (np.pi if kind == "illuminance" else 1.0)
+
+
+def quantity(kind: str, units: str) -> Quantity:
+    """What the scale says that it shows."""
+    return QUANTITIES[units][LIGHT[kind]] if kind in LIGHT else Quantity(kind, UNITS[kind])
 
 
 def false_colour_scale(
@@ -80,18 +78,19 @@ def false_colour_scale(
     lower end where ``false_colour_max`` gives the upper one. Waits for the GPU. Of errors it is always the same; of counts it
     reaches from 0 to the highest of those that are ``offered``."""
     kind, high, low = measured(display), display.false_colour_max, 0.0
-    if UNITS[kind] == "%":
+    unit = quantity(kind, display.quantities).unit
+    if unit == "%":
         return ERRORS
     if kind == "rays":
         counts = np.frombuffer((offered or {})["rays"].read(), np.float32)
-        return Scale(0.0, _nice_above(float(counts.max())), UNITS[kind])
+        return Scale(0.0, _nice_above(float(counts.max())), unit)
     if not high or display.false_colour_log:
-        darkest, brightest = _ends(kind, lightmap)
+        darkest, brightest = _ends(kind, lightmap, display.quantities)
         high = high or _nice_above(brightest)
         if display.false_colour_log:
             fewest, most = DECADES
             low = _nice_below(min(max(darkest, high / 10**most), high / 10**fewest))
-    return Scale(low, high, UNITS[kind])
+    return Scale(low, high, unit)
 
 
 def colour_map(count: int) -> F64:
@@ -101,13 +100,15 @@ def colour_map(count: int) -> F64:
     return np.asarray(np.clip(powers @ VIRIDIS, 0.0, 1.0))
 
 
-def _ends(kind: str, lightmap: Lightmap) -> tuple[float, float]:
-    """Between which the illuminance [lx] or luminance [cd/m²] of nearly all that does not emit lies, from an even sample of the
+def _ends(kind: str, lightmap: Lightmap, units: str) -> tuple[float, float]:
+    """Between which the illuminance or luminance of nearly all that does not emit lies, from an even sample of the
     tiles; unlit texels are left out."""
     pool, sample = lightmap.pool, sampled_tiles(lightmap.pool)
     materials, area = lightmap.scene.materials, pool.surfaces.area[sample]
     emission = sampled_colours(pool, [m.emission for m in materials], pool.emission_tiles, sample)
-    light: F32 = lightmap.with_ambient(sampled_irradiance(lightmap)) * np.float32(value_per_radiance(kind) / np.pi)
+    light: F32 = lightmap.with_ambient(sampled_irradiance(lightmap)) * np.float32(
+        value_per_radiance(kind, units) / np.pi
+    )
     if kind == "luminance":
         light = light * sampled_colours(pool, [m.albedo for m in materials], pool.albedo_tiles, sample)
     values = light @ LUMINANCE

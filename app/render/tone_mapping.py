@@ -20,7 +20,7 @@ def curve(display: DisplayOptions, scale: Scale | None, *, exposed: bool) -> tup
         uniforms = {
             "u_range": (scale.low, scale.high),
             "u_logarithmic": float(scale.low > 0),
-            "u_per_radiance": value_per_radiance(measured(display)),
+            "u_per_radiance": value_per_radiance(measured(display), display.quantities),
         }
         return "false_colour", uniforms | {"u_gain": 1.0}
     return "tone_maps/" + (display.tone_map if exposed else "clamp"), {

@@ -56,6 +56,7 @@ def with_ceiling_light(scene: Scene) -> Scene:
         uv1=extended(scene.uv1, square),
         normals=extended(scene.normals, down),
         colours=extended(scene.colours, np.ones((2, 3, 3), np.float32)),
+        listed=None if scene.listed is None else np.append(scene.listed, [-1, -1]).astype(np.int32),
     )
 
 

@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from app.scene.colorimetry import NM, PEAK_EFFICACY, REC709_FROM_XYZ, STEP, black_body, matching
+
 F64 = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 GROUND = 0.2  # albedo: usual where nothing is known of the ground [Liu63]
 WHITE_EFFICACY = 179.0  # lm/W, of white light [Ward94]
-PEAK_EFFICACY = 683.0  # lm/W, at 555 nm: what ȳ counts from
 SUN_KELVIN, SUN_STERADIANS = 5778.0, 6.72e-5  # effective temperature, IAU 2015; a disc of 0.53°
 OZONE_CM = 0.35  # column of it [Preetham99, A.1]
 LEVEL = 1e-3  # least cosine that is looked up beside the horizon, where the model divides by it
@@ -43,9 +44,6 @@ ZENITH = np.array(
             (0.15346, -0.26756, 0.06670, 0.26688),
         ],
     ]
-)
-REC709_FROM_XYZ = np.array(  # ITU-R BT.709-6, white D65
-    [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
 )
 # absorption of ozone by wavelength [nm, 1/cm] [Iqbal83, as in Preetham99]
 OZONE_NM = (440, 445, 460, 480, 500, 520, 540, 560, 575, 590, 605, 620, 640, 660, 680, 700, 730, 780)
@@ -100,28 +98,11 @@ def sun_irradiance(height: float, turbidity: float) -> F64:
     """(3,) on a surface that faces the sun at so many degrees above the horizon [W/m²], linear Rec.709; 0 below it."""
     if height <= 0:
         return np.zeros(3)
-    nm = np.arange(380.0, 781.0, 5.0)
-    um, metres = nm / 1000, nm * 1e-9
+    um = NM / 1000
     air_mass = 1 / (np.sin(np.radians(height)) + 0.15 * (3.885 + height) ** -1.253)
     aerosols = 0.04608 * turbidity - 0.04586  # Ångström's β
-    ozone = np.interp(nm, OZONE_NM, OZONE_ABSORPTION) * OZONE_CM
+    ozone = np.interp(NM, OZONE_NM, OZONE_ABSORPTION) * OZONE_CM
     depth = 0.008735 * um**-4.08 + aerosols * um**-1.3 + ozone
-    radiance = 1.191043e-16 / metres**5 / np.expm1(1.438777e-2 / (metres * SUN_KELVIN))  # Planck [W/(sr m³)]
-    E = radiance * SUN_STERADIANS * np.exp(-air_mass * depth)
-    XYZ = (_matching(nm) * E).sum(1) * 5e-9 * (PEAK_EFFICACY / WHITE_EFFICACY)
+    E = black_body(SUN_KELVIN) * SUN_STERADIANS * np.exp(-air_mass * depth)
+    XYZ = matching() @ E * STEP * (PEAK_EFFICACY / WHITE_EFFICACY)
     return np.asarray(np.maximum(REC709_FROM_XYZ @ XYZ, 0.0))
-
-
-def _matching(nm: F64) -> F64:
-    """(3, n) x̄, ȳ, z̄ of CIE 1931, fitted by lobes [Wyman13]."""
-
-    def lobe(height: float, middle: float, below: float, above: float) -> F64:
-        return np.asarray(height * np.exp(-0.5 * ((nm - middle) / np.where(nm < middle, below, above)) ** 2))
-
-    return np.stack(
-        [
-            lobe(1.056, 599.8, 37.9, 31.0) + lobe(0.362, 442.0, 16.0, 26.7) + lobe(-0.065, 501.1, 20.4, 26.2),
-            lobe(0.821, 568.8, 46.9, 40.5) + lobe(0.286, 530.9, 16.3, 31.1),
-            lobe(1.217, 437.0, 11.8, 36.0) + lobe(0.681, 459.0, 26.0, 13.8),
-        ]
-    )

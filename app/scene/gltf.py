@@ -33,9 +33,14 @@ VALUES = {"TEXCOORD_0": ("VEC2",), "TEXCOORD_1": ("VEC2",), "NORMAL": ("VEC3",),
 
 
 @dataclass(frozen=True, eq=False)
-class _Shape:
-    """A primitive in its own space; ``material`` None where the file names none."""
+class Shape:
+    """A primitive in its own space, or posed by its joints in the world; ``material`` None where the file names none.
 
+    number: which of its mesh's primitives. vertices (n,): which of the file's vertices those of the triangles are.
+    """
+
+    number: int
+    vertices: NDArray[np.int64]
     positions: F64
     triangles: NDArray[np.int64]
     material: int | None
@@ -46,13 +51,15 @@ class _Shape:
 
 
 @dataclass(frozen=True, eq=False)
-class _Placed:
-    """A shape once for each of (k, 4, 4) matrices."""
+class Placed:
+    """A shape once for each of (k, 4, 4) matrices. node: of the document; skinned: its joints place it."""
 
-    shape: _Shape
+    shape: Shape
     worlds: F64
     object_id: int
     material: int
+    node: int
+    skinned: bool
 
     @property
     def triangles(self) -> int:
@@ -62,10 +69,10 @@ class _Placed:
 @np.errstate(all="ignore")
 def load_gltf(path: Path) -> Scene:
     """Read a .glb or .gltf file. SceneError for anything that makes it unusable."""
-    reader = _Reader(GltfFile(path))
+    reader = GltfReader(GltfFile(path))
     reader.walk()
     materials, notes = reader.read_materials()
-    parts = [_part(placed) for placed in reader.placed]
+    parts = [part_of(placed) for placed in reader.placed]
     notes = [*reader.warnings(), *notes]
     return validate(path, path.stem, parts, reader.objects, materials, reader.cameras, notes, reader.lights)
 
@@ -74,7 +81,7 @@ def load_gltf(path: Path) -> Scene:
 def outline_gltf(path: Path, most: int) -> Outline | None:
     """Of a file with more than so many triangles; None where it has no more. Nothing is placed, and nothing checked that only a
     Scene must be. SceneError as for ``load_gltf``."""
-    reader = _Reader(GltfFile(path))
+    reader = GltfReader(GltfFile(path))
     reader.walk()
     if sum(placed.triangles for placed in reader.placed) <= most:
         return None
@@ -100,18 +107,18 @@ def outline_gltf(path: Path, most: int) -> Outline | None:
     )
 
 
-class _Reader:
+class GltfReader:
     """Walks the node tree of one file and collects shapes as they are placed, objects and cameras."""
 
     def __init__(self, file: GltfFile) -> None:
         self.file = file
-        self.placed: list[_Placed] = []
+        self.placed: list[Placed] = []
         self.objects: list[str] = []
         self.cameras: list[Camera] = []
         self.lights: list[Light] = []
         self.used_materials: set[int] = set()
-        self._worlds: dict[int, F64] = {}  # world-from-node of the scene's nodes, parents first
-        self._shapes: dict[tuple[int, int | None, tuple[float, ...]], list[_Shape]] = {}
+        self.nodes: dict[int, F64] = {}  # world-from-node of the scene's nodes, parents first
+        self._shapes: dict[tuple[int, int | None, tuple[float, ...]], list[Shape]] = {}
         self._triangle_count = 0
         self.unpainted = 0  # primitives without material
         self._not_triangles = self._skinned = self._not_pinholes = 0
@@ -146,11 +153,11 @@ class _Reader:
         while stack:
             index, world_from_parent = stack.pop()
             node = self.file.pick(nodes, index, "node")
-            if index in self._worlds:
+            if index in self.nodes:
                 raise self.file.error(f"node {index} is reached twice: the nodes form a cycle, or it has two parents")
-            self._worlds[index] = world_from_parent @ _parent_from_node(node)
-            stack.extend((child, self._worlds[index]) for child in reversed(node.children))
-        for index, world_from_node in self._worlds.items():
+            self.nodes[index] = world_from_parent @ _parent_from_node(node)
+            stack.extend((child, self.nodes[index]) for child in reversed(node.children))
+        for index, world_from_node in self.nodes.items():
             self._visit(index, nodes[index], world_from_node)
 
     def _visit(self, index: int, node: Node, world_from_node: F64) -> None:
@@ -171,7 +178,7 @@ class _Reader:
         joints = None
         if node.skin is not None:
             skin = self.file.pick(self.file.document.skins, node.skin, "skin")
-            joints = joint_matrices(self.file, skin, self._worlds)
+            joints = joint_matrices(self.file, skin, self.nodes)
             self._skinned += joints is None
         # Joints alone place a skin (glTF 2.0, 3.7.3.3).
         worlds = np.eye(4)[None] if joints is not None else world_from_node @ self._instances(node)
@@ -183,7 +190,8 @@ class _Reader:
             self._triangle_count += len(worlds) * len(shape.triangles)
             check_triangle_count(self.file.path, self._triangle_count)
             material = len(self.file.document.materials) if shape.material is None else shape.material
-            self.placed.append(_Placed(shape, worlds, len(self.objects) - 1, material))
+            owner = len(self.objects) - 1
+            self.placed.append(Placed(shape, worlds, owner, material, index, joints is not None))
 
     def _instances(self, node: Node) -> F64:
         """(k, 4, 4) node-from-instance matrices; one identity without EXT_mesh_gpu_instancing."""
@@ -202,16 +210,18 @@ class _Reader:
             values.get("SCALE", np.ones((k, 3))),
         )
 
-    def _read(self, mesh: Mesh, where: str, joints: F64 | None, weights: tuple[float, ...]) -> list[_Shape]:
+    def _read(self, mesh: Mesh, where: str, joints: F64 | None, weights: tuple[float, ...]) -> list[Shape]:
         """The shapes of a mesh's primitives, with these weights of their morph targets and these matrices of their joints."""
         shapes = []
         for k, primitive in enumerate(mesh.primitives):
-            shape = self._shape(primitive, f"{where} primitive {k}", joints, weights)
+            shape = self._shape(primitive, k, f"{where} primitive {k}", joints, weights)
             if shape is not None:
                 shapes.append(shape)
         return shapes
 
-    def _shape(self, primitive: Primitive, where: str, joints: F64 | None, weights: tuple[float, ...]) -> _Shape | None:
+    def _shape(
+        self, primitive: Primitive, number: int, where: str, joints: F64 | None, weights: tuple[float, ...]
+    ) -> Shape | None:
         attributes = primitive.attributes
         if primitive.mode < TRIANGLES or "POSITION" not in attributes:
             self._not_triangles += 1
@@ -251,12 +261,16 @@ class _Reader:
             normals = None if normals is None else turned_normals(linear, normals)
             mirrored = (np.linalg.det(linear) < 0.0)[triangles].sum(axis=1) > 1
             triangles = np.where(mirrored[:, None], triangles[:, [0, 2, 1]], triangles)
-        return _compact(positions, triangles, primitive.material, [uv0, uv1, normals, colours])
+        return _compact(number, positions, triangles, primitive.material, [uv0, uv1, normals, colours])
 
 
 def _compact(
-    positions: NDArray[Any], triangles: NDArray[np.int64], material: int | None, values: list[NDArray[Any] | None]
-) -> _Shape:
+    number: int,
+    positions: NDArray[Any],
+    triangles: NDArray[np.int64],
+    material: int | None,
+    values: list[NDArray[Any] | None],
+) -> Shape:
     """Without the vertices that no triangle uses: primitives often share one large vertex array."""
     used = np.zeros(len(positions), bool)
     used[triangles] = True
@@ -264,7 +278,7 @@ def _compact(
         triangles = (np.cumsum(used) - 1)[triangles]
         positions = positions[used]
         values = [None if v is None else v[used] for v in values]
-    return _Shape(positions.astype(np.float64), triangles, material, *values)
+    return Shape(number, np.flatnonzero(used), positions.astype(np.float64), triangles, material, *values)
 
 
 def _triangles(corners: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
@@ -322,7 +336,7 @@ def _transforms(translation: NDArray[Any], rotation: NDArray[Any], scale: NDArra
     return matrices
 
 
-def _part(placed: _Placed) -> Part:
+def part_of(placed: Placed) -> Part:
     """All copies of the shape; mirrored ones keep their front."""
     shape, worlds = placed.shape, placed.worlds
     k, n, m = len(worlds), len(shape.positions), len(shape.triangles)
@@ -346,7 +360,7 @@ def _part(placed: _Placed) -> Part:
     )
 
 
-def _boxes(placed: _Placed) -> F64:
+def _boxes(placed: Placed) -> F64:
     """(k, 2, 3) lower and upper corner of a box around each copy: around the shape's own box, turned."""
     low, high = placed.shape.positions.min(axis=0), placed.shape.positions.max(axis=0)
     linear, middle, half = placed.worlds[:, :3, :3], (low + high) / 2, (high - low) / 2
@@ -354,7 +368,7 @@ def _boxes(placed: _Placed) -> F64:
     return np.stack([centre - reach, centre + reach], axis=1)
 
 
-def _area(placed: _Placed) -> float:
+def _area(placed: Placed) -> float:
     """Of all copies [m²], as if each were scaled evenly."""
     a, b, c = np.moveaxis(placed.shape.positions[placed.shape.triangles], 1, 0)
     area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2

@@ -60,7 +60,7 @@ MAX_ELEMENTS = 3 * MAX_TRIANGLES
 
 
 class GltfFile:
-    """One file: ``document`` is its checked JSON; ``accessor`` and ``view`` give its binary data."""
+    """One file: ``document`` is its checked JSON, ``text`` that as written; ``accessor`` and ``view`` give its binary data."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -70,9 +70,9 @@ class GltfFile:
             raise SceneError(path, f"cannot be read: {error.strerror}") from error
         if not data:
             raise self.error("the file is empty")
-        text, self._bin = self._split(data)
+        self.text, self._bin = self._split(data)
         try:
-            self.document = Document.model_validate_json(text)
+            self.document = Document.model_validate_json(self.text)
         except ValidationError as error:
             if any(problem["loc"] == ("asset",) and problem["type"] == "missing" for problem in error.errors()):
                 raise self.error('not a glTF file: it has no "asset"') from error

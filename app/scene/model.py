@@ -96,6 +96,8 @@ class Scene:
     into ``materials`` and ``objects`` (names). Per corner, where the file has them: uv0, uv1 (m, 3, 2) f32 with v = 0
     at the top, normals (m, 3, 3) f32 unit (kept for export; light transport uses geometric normals), colours (m, 3, 3)
     f32, linear Rec.709, in [0, 1], which multiply the albedo. What of the light is reflected is nowhere above MOST_ALBEDO.
+    listed (m,) i32: the number of the triangle in its file that each is, or is a piece of, among all that the loader lists; -1
+    for those that no file has. world_from_file (4, 4): from the file's axes and unit.
     ``warnings`` are one-line counted repairs and omissions. sky: what is seen where no surface is; None is black. lights: lamps
     without area. Every value is finite, every index in range, every triangle has an area: ``validate`` guarantees it.
     """
@@ -112,6 +114,8 @@ class Scene:
     uv1: F32 | None = None
     normals: F32 | None = None
     colours: F32 | None = None
+    listed: I32 | None = None
+    world_from_file: F64 = field(default_factory=lambda: np.eye(4))
     warnings: tuple[str, ...] = ()
     source: Path | None = None
     sky: Sky | None = None

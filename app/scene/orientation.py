@@ -69,8 +69,11 @@ def _placed(scene: Scene, scale: float, turn: NDArray[Any]) -> Scene:
         u, v, w = (turn @ np.array(light.direction)).tolist()
         far, radius = scale * light.range, scale * light.radius
         lights.append(dataclasses.replace(light, position=(x, y, z), direction=(u, v, w), range=far, radius=radius))
+    placing = np.eye(4)
+    placing[:3, :3] = scale * turn
     return dataclasses.replace(
         scene,
+        world_from_file=placing @ scene.world_from_file,
         lights=tuple(lights),
         positions=scale * (scene.positions @ turn.T),
         normals=None if scene.normals is None else (scene.normals @ turn.T).astype(np.float32),

@@ -133,6 +133,7 @@ def validate(
         uv0=None if uvs[0] is None else np.nan_to_num(uvs[0], nan=0.0, posinf=0.0, neginf=0.0),
         uv1=None if uvs[1] is None else np.nan_to_num(uvs[1], nan=0.0, posinf=0.0, neginf=0.0),
         colours=colours,
+        listed=np.flatnonzero(keep).astype(np.int32),
         source=Path(source),
         lights=_check_lights(source, lights, notes),
     )

@@ -53,7 +53,10 @@ def write_light(session: Session, folder: Path, how: BakeOptions, *, unwrap: boo
         laid, notes = _own_layout(session, laid)
         result["atlas"] = list(laid.charts.size)
         result["warnings"] += notes
-    files = write_bake(folder, session.scene, laid.charts, laid.irradiance, laid.covered, result, how)
+    light = laid.charts, laid.irradiance, laid.covered
+    files = write_bake(folder, session.scene, *light, result, how, unedited=session.unedited)
+    notes += tuple(files.notes)
+    result["warnings"] += files.notes
     return Baked(files, result, summary(session, result) + _at_seams(result), notes, lost)
 
 

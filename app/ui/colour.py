@@ -17,7 +17,12 @@ from app.ui.state import RGB
 
 STEP = 1.0 / 255  # of a hex code
 FINEST = 2e-4  # of the shown colour: its numbers have three digits
-FLAGS = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.display_hex)
+FLAGS = int(
+    imgui.ColorEditFlags_.float
+    | imgui.ColorEditFlags_.no_label
+    | imgui.ColorEditFlags_.display_hex
+    | imgui.ColorEditFlags_.no_options  # a right click puts the default back, as everywhere
+)
 SWATCH = int(imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop | imgui.ColorEditFlags_.no_border)
 
 

@@ -130,6 +130,8 @@ POINTER = (
     ("Right or middle drag", "pan"),
     ("Wheel", "nearer and farther"),
     ("W A S D Q E", "fly; Shift is faster, Alt slower"),
+    ("Drag a number", "change it; with Shift a tenth as far"),
+    ("Double click, Ctrl+click", "type a number"),
     ("Drop a file", "open it; an .exr as a reference"),
 )
 

@@ -128,6 +128,7 @@ class State:
     draw_lights: bool = True
     atlas: AtlasOptions | None = None
     adaptive: bool | None = None
+    emitting_area: tuple[object, float] = (None, 0.0)
     emission_colours: dict[int, RGB] = field(default_factory=dict)
     plot: str = "work"
     reference: ReferenceOptions = field(default_factory=ReferenceOptions)

@@ -30,6 +30,7 @@ PANEL = _rgba(0x1D1D1F)  # also what the host clears the window to: see ``see_th
 GOOD = _rgba(0x7CB987)
 BLUE = _rgba(0x6FA3D8)
 BAD = _rgba(0xE5705F)
+FRAME, FILL = _rgba(0x2C2C30), _rgba(0x5C4628)  # of a slider: what is left of its value
 
 # What the energy went into, the same in every plot, bar and table
 ABSORBED, ESCAPED, UNSHOT = AMBER, BLUE, _rgba(0x8E8C85)
@@ -44,7 +45,7 @@ _COLOURS: dict[imgui.Col_, RGBA] = {
     _C.popup_bg: _rgba(0x252528),
     _C.border: _rgba(0x3A3A3E),
     _C.border_shadow: _rgba(0x000000, 0.0),
-    _C.frame_bg: _rgba(0x2C2C30),
+    _C.frame_bg: FRAME,
     _C.frame_bg_hovered: _rgba(0x38383D),
     _C.frame_bg_active: _rgba(0x424248),
     _C.title_bg: _rgba(0x161618),

@@ -11,16 +11,13 @@ from typing import Any, TypeVar
 from imgui_bundle import imgui
 
 from app.options import Options, Spec, specs
-from app.ui import theme
+from app.ui import slider, theme
 
 OptionsT = TypeVar("OptionsT", bound=Options)
 
 LABEL_SHARE = 0.44  # of the panel's width
-WIDE_SPAN = 1e6  # a slider over more than this cannot be set: drag instead
-SLIDER = int(imgui.SliderFlags_.always_clamp | imgui.SliderFlags_.no_round_to_format)
-LOGARITHMIC = int(imgui.SliderFlags_.logarithmic)
-DRAG_SPEED = 0.01  # of the value per pixel
 TOOLTIP_EM = 22.0
+AS_READ = "Right-click: as in the file"
 TOOLTIP = int(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)
 
 
@@ -36,7 +33,7 @@ def edit_options(
 ) -> OptionsT:
     """One widget per declared option; returns ``options`` itself, or a checked copy where something was changed.
 
-    A right-click or double-click puts the default back. Labels of options that are not at their default are bright.
+    A right-click puts the default back. Labels of options that are not at their default are bright.
     ``only`` some of them, in that order, or all but ``skip``. ``off`` says of options that have no effect now why: they are grey.
     ``starts`` are the values that optional ones have while they are not given one, and begin with when they are; ``units`` and
     ``choices`` what is shown instead of those that are declared.
@@ -70,18 +67,22 @@ def edit_option(spec: Spec, value: Any, start: Any = None, *, off: str | None = 
     imgui.begin_disabled(off is not None)
     if spec.optional:
         value = _optional(spec, value, start)
-    edited = value if value is None else _editor(spec, value)
+    edited = value if value is None else _editor(spec, value, start)
     imgui.end_disabled()
-    if off is None and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
-        double = imgui.is_mouse_double_clicked(0) and spec.type in (int, float) and not spec.choices
-        if imgui.is_mouse_clicked(1) or double:
-            edited = spec.default
-            imgui.internal.clear_active_id()
+    edited = edited if off is not None else put_back(edited, spec.default)
     unit = f" [{spec.unit}]" if spec.unit else ""
     reason = "" if off is None else f"\nNo effect now: {off}"
     tooltip(f"{spec.help}{unit}: {spec.allowed}\nRight-click: default ({shown(spec.default)}){reason}")
     imgui.pop_id()
     return edited
+
+
+def put_back(value: Any, default: Any) -> Any:
+    """``default`` where the last item was right-clicked, which means that everywhere; else ``value``."""
+    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled) and imgui.is_mouse_clicked(1):
+        imgui.internal.clear_active_id()
+        return default
+    return value
 
 
 def title(name: str) -> str:
@@ -109,7 +110,7 @@ def _optional(spec: Spec, value: Any, start: Any) -> Any:
     return value
 
 
-def _editor(spec: Spec, value: Any) -> Any:
+def _editor(spec: Spec, value: Any, start: Any = None) -> Any:
     imgui.set_next_item_width(-1)
     if spec.type is bool:
         return imgui.checkbox("##value", value)[1]
@@ -117,32 +118,24 @@ def _editor(spec: Spec, value: Any) -> Any:
         index = spec.choices.index(value)
         return spec.choices[imgui.combo("##value", index, [str(choice) for choice in spec.choices])[1]]
     if spec.type in (int, float):
-        return _number(spec, value)
+        return _number(spec, value, start)
     return imgui.input_text("##value", value)[1]
 
 
-def _number(spec: Spec, value: float) -> float:
-    """A slider where the range is one that a hand can set, else a drag. What is no number changes nothing."""
+def _number(spec: Spec, value: float, start: float | None) -> float:
+    """A slider, or where no end is known a drag. start: what 0 means, where that is a number."""
     unit = " " + spec.unit.replace("%", "%%") if spec.unit else ""
     # Dear ImGui shows a format without a number as it stands
     text = (f"{value:,}" if spec.type is int else "%.4g") + unit
     if value == 0 and spec.zero:
         text = spec.zero
-    flags = SLIDER
-    low, high = spec.minimum, spec.maximum
-    if low is not None and high is not None and (spec.logarithmic or high - low <= WIDE_SPAN):
-        if spec.logarithmic:
-            flags |= LOGARITHMIC
-        slider: Any = imgui.slider_int if spec.type is int else imgui.slider_float
-        edited = slider("##value", value, spec.type(low), spec.type(high), text, flags)[1]
-    else:
-        biggest = 2**31 - 1 if spec.type is int else 3e38
-        drag: Any = imgui.drag_int if spec.type is int else imgui.drag_float
-        bounds = spec.type(-biggest if low is None else low), spec.type(biggest if high is None else high)
-        edited = drag("##value", value, max(abs(value), 1.0) * DRAG_SPEED, *bounds, text, flags)[1]
-    if not math.isfinite(edited) or abs(edited - value) <= 1e-6 * abs(value):  # widgets hold 32-bit floats
-        return value
-    return min(max(edited, -math.inf if low is None else low), math.inf if high is None else high)
+    assert spec.minimum is not None and spec.maximum is not None, "a number that a widget edits has ends"
+    multiple = spec.multiple if spec.type is int else 0
+    ends = slider.Range(
+        spec.minimum, spec.maximum, usual=spec.usual, logarithmic=spec.logarithmic, multiple=multiple, start=start
+    )
+    edited = slider.slide("##value", value, ends, text)
+    return spec.type(edited) if edited != value else value
 
 
 def labelled(text: str, *, changed: bool = False) -> None:

@@ -16,7 +16,8 @@ import numpy as np
 from PIL import Image
 
 from app.errors import UserError
-from app.viewer.picture import replacing, save_png
+from app.util.files import replacing
+from app.viewer.picture import save_png
 
 __all__ = ["FrameFolder", "animated", "check_animation", "frame_folder", "save_animation"]
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +11,10 @@ from app.errors import UserError
 from app.gpu import Gpu
 from app.render.false_colour import measured
 from app.session.view import View
+from app.util.files import replacing
 from app.viewer.ui_frame import SAMPLES, pixels, ui_image
 
-__all__ = ["check_size", "picture", "replacing", "save_png"]
+__all__ = ["check_size", "picture", "save_png"]
 
 
 def picture(view: View, size: tuple[int, int]) -> np.ndarray:
@@ -48,14 +46,3 @@ def save_png(path: Path, image: np.ndarray, *, level: int = 6) -> None:
             Image.fromarray(image).save(partial, format="PNG", compress_level=level)
     except OSError as error:
         raise UserError(f"-o {path}: cannot be written: {error.strerror or error}") from None
-
-
-@contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A name beside ``path`` to write to, which takes its place in the end: a picture is whole or not there."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        yield partial
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)

@@ -16,7 +16,7 @@ from PIL import Image
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, ShaderError, Texture
 from app.gpu.imgui import ImguiRenderer
-from app.render.false_colour import Scale, colour_map, measured
+from app.render.false_colour import Scale, colour_map, measured, quantity
 from app.render.resolve import BORDER, TEXELS_PER_FRAME, display_size
 from app.session.view import View
 from app.ui import theme
@@ -66,7 +66,7 @@ class UiFrame:
         seconds: since the last frame. look: draw the view anew, or show it as it was drawn last. Reloads shaders itself.
         """
         scale = self._false_colour(view)
-        legend = None if scale is None else _legend(measured(view.shown), scale)
+        legend = None if scale is None else _legend(quantity(measured(view.shown), view.shown.quantities).name, scale)
         data = self._ui.frame(
             view, size=size, ratio=ratio, seconds=seconds, texture_id=self._renderer.texture_id, legend=legend
         )
@@ -124,7 +124,14 @@ class UiFrame:
         kind = measured(display)
         if kind == "off":
             return None
-        asked = (lightmap, view.session.solver, kind, display.false_colour_log, display.false_colour_max)
+        asked = (
+            lightmap,
+            view.session.solver,
+            kind,
+            display.quantities,
+            display.false_colour_log,
+            display.false_colour_max,
+        )
         now = time.perf_counter()
         if self._scale is None or asked != self._scale_of or (now >= self._scale_due and not display.false_colour_max):
             self._scale = view.false_colour_scale()
@@ -143,9 +150,9 @@ class UiFrame:
             state.notify("shaders reloaded")
 
 
-def _legend(kind: str, scale: Scale) -> Legend:
+def _legend(name: str, scale: Scale) -> Legend:
     colours = tuple((float(r), float(g), float(b)) for r, g, b in colour_map(LEGEND_COLOURS))
-    return Legend(kind.capitalize(), scale.unit, max(scale.low, 0.0), scale.high, scale.low > 0, colours)
+    return Legend(name.capitalize(), scale.unit, max(scale.low, 0.0), scale.high, scale.low > 0, colours)
 
 
 def ui_image(

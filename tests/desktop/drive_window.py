@@ -106,7 +106,7 @@ def main() -> None:
     def make_view(gpu: Gpu) -> View:
         session = ReportingSession(gpu, folder)
         imgui.button = session.view.note(imgui.button, lambda label, *_: label.split("###")[-1])
-        widgets._editor = session.view.note(widgets._editor, lambda spec, _: spec.name)
+        widgets._editor = session.view.note(widgets._editor, lambda spec, *_: spec.name)
         session.open("cornell-box")
         return session.view
 

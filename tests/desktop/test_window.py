@@ -110,7 +110,7 @@ def test_a_user_at_the_window(window: Driven, tmp_path: Path) -> None:
     before = state["exposure"]
     x, y = (round(v) for v in state["places"]["exposure"])
     window.do("mousemove", x, y, "mousedown", 1)
-    window.do("mousemove", x + 20, y)
+    window.do("mousemove", x + 100, y)
     window.do("mouseup", 1)
     dragged = window.until(lambda s: s["exposure"] > before + 4)["exposure"]
     x, y = (round(v) for v in state["places"]["Auto"])

@@ -123,5 +123,5 @@ def where(monkeypatch: pytest.MonkeyPatch) -> dict[str, tuple[float, float]]:
         return wrapper
 
     monkeypatch.setattr(imgui, "button", noting(imgui.button, lambda label, *_: label.split("##")[0].split(" ")[-1]))
-    monkeypatch.setattr(widgets, "_editor", noting(widgets._editor, lambda spec, _: spec.name))
+    monkeypatch.setattr(widgets, "_editor", noting(widgets._editor, lambda spec, *_: spec.name))
     return centres

@@ -105,6 +105,8 @@ class FakeSession:
             materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras, sky=None, lights=()
         )
         self.scene.bounds = np.zeros(3), np.ones(3)
+        self.scene.material_ids = np.arange(len(MATERIALS))
+        self.scene.normals_areas = np.zeros((len(MATERIALS), 3)), np.ones(len(MATERIALS))
         self.unedited = self.scene
         self.charts = SimpleNamespace(density=40.0, tile=16, warnings=(), size=(160, 96))
         self.lightmap = SimpleNamespace(space=FakeSpace())
@@ -121,6 +123,7 @@ class FakeSession:
         self.image = None
         self.flickers = False
         self.picked = None
+        self.scale: tuple[float, float] | None = None
         self.insets: list[tuple[tuple[int, int], bool]] = []
 
     @property
@@ -128,6 +131,8 @@ class FakeSession:
         return LAYERS[:8]
 
     def false_colour_scale(self) -> Scale:
+        if self.scale is not None:
+            return Scale(*self.scale, "lx")
         return false_colour_scale(self.display, self.lightmap)
 
     @property

@@ -9,9 +9,10 @@ from boxes import SIZE, STEP, box, cornell, even, picture, put
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.render.exposure import BRIGHT, exposure_of
-from app.render.false_colour import LUMINANCE, colour_map, false_colour_scale
+from app.render.false_colour import colour_map, false_colour_scale
 from app.render.options import DisplayOptions
 from app.render.seen import Texels, seen_texels
+from app.render.units import LUMINANCE
 
 __all__ = ["box", "cornell"]
 

@@ -12,6 +12,7 @@ from imgui_bundle import imgui
 
 from app.scene.lights import Light
 from app.scene.sky import Sky
+from app.ui import widgets
 
 __all__ = ["desk", "session", "where"]
 
@@ -127,3 +128,33 @@ def test_the_menu_names_what_would_be_undone(desk: Desk, monkeypatch: pytest.Mon
     monkeypatch.setattr(imgui, "end_menu", lambda: None)
     desk.frames()
     assert items == [("Undo camera" if drag else "Undo", drag), ("Redo", False)]
+
+
+# -- a right click ------------------------------------------------------------------------------------------------------
+
+
+def test_a_right_click_puts_a_lamp_back_to_its_file_and_not_off(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = desk.session
+    session.unedited = SimpleNamespace(**vars(session.scene))
+    desk.front("Materials")
+    desk.ui.state.material = 3
+    lamp = session.materials[3]
+    session.set_material(3, dataclasses.replace(lamp, emission=(1.0, 1.0, 1.0), albedo=(0.1, 0.1, 0.1)))
+    desk.frames(2)
+    real = widgets.put_back
+    at: list[tuple[float, float]] = []
+
+    def noted(value: object, default: object) -> object:
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        at.append(((low.x + high.x) / 2, (low.y + high.y) / 2))
+        return real(value, default)
+
+    with monkeypatch.context() as hand:
+        hand.setattr(widgets, "put_back", noted)
+        desk.frames(1)
+    for place in at:
+        desk.click(*place, button=1)
+    assert (session.materials[3].emission, session.materials[3].albedo) == (lamp.emission, lamp.albedo)
+    undo(desk)
+    undo(desk)
+    assert (session.materials[3].emission, session.materials[3].albedo) == ((1.0, 1.0, 1.0), (0.1, 0.1, 0.1))

@@ -22,7 +22,7 @@ from app.ui import layout
 SIZE = (1920, 2400)  # high enough for every section of every panel
 CONTROLS = """
     button small_button invisible_button selectable checkbox radio_button combo menu_item begin_menu collapsing_header tree_node
-    slider_float slider_float3 slider_int slider_angle drag_float drag_float3 drag_int input_text input_float color_edit3
+    drag_float drag_float3 drag_int input_text input_float color_edit3
     color_button color_picker3 begin_combo text_link arrow_button
 """.split()
 

@@ -108,7 +108,7 @@ def test_image_of_another_size_is_refused(tmp_path, inputs):
 @pytest.mark.parametrize("step", ["write_irradiance", "glb_bytes", "json_text"])
 def test_failing_half_way_keeps_the_files_of_the_last_bake(tmp_path, inputs, monkeypatch, step):
     files = write_bake(tmp_path, *inputs, {"shots": 1})
-    before = {path: path.read_bytes() for path in vars(files).values()}
+    before = {path: path.read_bytes() for path in files.paths}
 
     def full(*args, **more):
         raise OSError(28, "No space left on device")

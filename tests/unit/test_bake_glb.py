@@ -6,7 +6,6 @@ import dataclasses
 import json
 import os
 import struct
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ import OpenEXR
 import pytest
 import trimesh
 from bake_scenes import CELL, LIT, owners, sides_charts, sides_scene, with_second_uv_set
-from npm import npm_package
+from khronos import validator_messages
 
 from app.atlas.parametrize import parametrize
 from app.bake import write_bake
@@ -25,30 +24,7 @@ from app.scene.gltf import load_gltf
 from app.scene.gltf_materials import uv_transform
 from app.scene.gltf_schema import TextureTransform
 
-VALIDATOR = "gltf-validator@2.0.0-dev.3.10"
-VALIDATE = """
-const fs = require('fs'), path = require('path');
-const file = process.argv[1], folder = path.dirname(file);
-const read = uri => fs.promises.readFile(path.join(folder, uri)).then(data => new Uint8Array(data));
-require('gltf-validator').validateBytes(new Uint8Array(fs.readFileSync(file)), {externalResourceFunction: read})
-    .then(report => console.log(JSON.stringify(report.issues)));
-"""
 F32_STEP = 2.0**-23  # relative spacing of 32-bit floats
-
-
-@pytest.fixture(scope="module")
-def validate():
-    """The Khronos validator as a function from a file to its messages."""
-    folder = npm_package(VALIDATOR).parent
-
-    def messages(path: Path) -> list[dict[str, object]]:
-        run = subprocess.run(
-            ["node", "-e", VALIDATE, str(path)], cwd=folder, capture_output=True, text=True, timeout=120, check=True
-        )
-        found: list[dict[str, object]] = json.loads(run.stdout)["messages"]
-        return found
-
-    return messages
 
 
 def baked(folder, scene, charts):
@@ -84,25 +60,25 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_khronos_validator_passes(name, validate, tmp_path):
+def test_khronos_validator_passes(name, tmp_path):
     scene = SCENES[name]()
-    messages = validate(baked(tmp_path, scene, sides_charts(scene)).scene)
+    messages = validator_messages(baked(tmp_path, scene, sides_charts(scene)).scene)
     assert [m for m in messages if m["severity"] < 2] == []
 
 
-def test_the_lightmap_as_a_texture_is_all_that_the_validator_does_not_know(validate, tmp_path):
+def test_the_lightmap_as_a_texture_is_all_that_the_validator_does_not_know(tmp_path):
     scene = sides_scene()
     charts, options = sides_charts(scene), BakeOptions(moz_lightmap=True)
-    messages = validate(write_bake(tmp_path, scene, charts, *_black(charts), {}, options).scene)
+    messages = validator_messages(write_bake(tmp_path, scene, charts, *_black(charts), {}, options).scene)
     assert [m["code"] for m in messages if m["severity"] < 2] == ["IMAGE_UNRECOGNIZED_FORMAT"]
 
 
-def test_khronos_validator_finds_errors(validate, tmp_path):
+def test_khronos_validator_finds_errors(tmp_path):
     """The check itself can fail."""
     scene = sides_scene()
     glb = glb_bytes(scene, sides_charts(scene), "missing.exr").replace(b'"VEC3"', b'"VEC2"', 1)
     (tmp_path / "broken.glb").write_bytes(glb)
-    assert any(m["severity"] == 0 for m in validate(tmp_path / "broken.glb"))
+    assert any(m["severity"] == 0 for m in validator_messages(tmp_path / "broken.glb"))
 
 
 @pytest.mark.parametrize("centre", [(0.0, 0.0, 0.0), (3e6, -2e6, 1e6)])
@@ -287,10 +263,10 @@ def test_texture_transform_is_the_inverse_of_reading(rotation, scale):
 
 
 @pytest.mark.skipif("GLOWTREE_SCENES" not in os.environ, reason="GLOWTREE_SCENES names no folder of scenes")
-def test_real_scene_passes_the_validator(validate, tmp_path):
+def test_real_scene_passes_the_validator(tmp_path):
     scene = load_gltf(Path(os.environ["GLOWTREE_SCENES"]) / "cornell-box.glb")
     charts = parametrize(scene, texels=20_000)
-    messages = validate(write_bake(tmp_path, scene, charts, *_black(charts), {}).scene)
+    messages = validator_messages(write_bake(tmp_path, scene, charts, *_black(charts), {}).scene)
     assert [m for m in messages if m["severity"] < 2] == []
 
 

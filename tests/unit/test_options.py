@@ -124,7 +124,7 @@ def test_every_option_of_the_program_is_well_declared(options: type[Options], sp
             with pytest.raises(UserError):
                 spec.check(spec.type(beyond))
     if spec.logarithmic:
-        assert spec.minimum is not None and spec.minimum > 0
+        assert spec.minimum is not None and spec.minimum >= 0  # where it is 0, that lies below the least on the slider
 
 
 def test_no_two_options_share_a_flag() -> None:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from pictures import CURVES, tone_map
 
-from app.render.false_colour import LUMINANCE, Scale, _nice_above, colour_map, value_per_radiance
+from app.render.false_colour import Scale, _nice_above, colour_map, value_per_radiance
 from app.render.options import LAYERS, TONE_MAPS, DisplayOptions
 from app.render.tone_mapping import encode_srgb
+from app.render.units import LUMINANCE
 
 GREYS = np.concatenate([[0.0], np.geomspace(1e-4, 1e3, 400)])[:, None] * np.ones(3)
 

@@ -21,9 +21,9 @@ from app.lightmap.tile_pool import SolverSpace
 from app.reference.irradiance import CACHE_FILES, ReferenceIrradiance
 from app.render.camera import CameraView
 from app.render.exposure import KEY
-from app.render.false_colour import LUMINANCE
 from app.render.surfaces import uniform_matrix
 from app.render.tone_mapping import encode_srgb
+from app.render.units import LUMINANCE
 from app.scene.arrays import arrays_of
 from app.scene.model import F64, Scene, Texture
 from app.util import cache

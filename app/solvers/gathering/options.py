@@ -24,5 +24,6 @@ class GatheringOptions(Options):
         unit="MiB",
         minimum=0,
         maximum=65_536,
+        logarithmic=True,
     )
     smooth: bool = option(True, "smooth indirect light within charts, by as much as it is noisy")

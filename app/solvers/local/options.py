@@ -32,6 +32,7 @@ class LocalOptions(Options):
         "else 4096",
         minimum=16,
         maximum=16_384,
+        logarithmic=True,
     )
     swaps: int = option(
         8,
@@ -47,19 +48,26 @@ class LocalOptions(Options):
         minimum=0,
         maximum=4,
     )
-    rays: int = option(256, "rays of each patch that find its form factors", minimum=16, maximum=1024, multiple=16)
+    rays: int = option(
+        256, "rays of each patch that find its form factors", minimum=16, maximum=1024, multiple=16, logarithmic=True
+    )
     shadow_rays: int = option(
-        64, "from each texel to each set of lamps, in the end", minimum=4, maximum=1024, multiple=4
+        64, "from each texel to each set of lamps, in the end", minimum=4, maximum=1024, multiple=4, logarithmic=True
     )
     bits: int = option(16, "of each number in the matrix", choices=(16, 32))
-    matrix_memory: int = option(160, "memory for the matrix", unit="MiB", minimum=1, maximum=65_536)
+    matrix_memory: int = option(160, "memory for the matrix", unit="MiB", minimum=1, maximum=65_536, logarithmic=True)
     row_memory: int = option(
         512,
         "memory for rows of form factors; those of patches that are far away go first",
         unit="MiB",
         minimum=1,
         maximum=65_536,
+        logarithmic=True,
     )
     missing: float = option(
-        1e-3, "converged when so much of the local set, and of shadow rays, is still to come", minimum=0, maximum=1
+        1e-3,
+        "converged when so much of the local set, and of shadow rays, is still to come",
+        minimum=0,
+        maximum=1,
+        logarithmic=True,
     )

@@ -2,6 +2,9 @@
 
 Σ_j A_j F_ji V_ji plus what leaves the scene should be A_i. Where a patch sees from its middle what its edges do not, in a coffer
 or beside a box, it is not. Most light is shot by few patches, so only strong ones are audited, each once.
+
+What dividing does not mend is no fault of the patch: maps are coarse for a scene of many small triangles, and all shots lose as
+much. So quarters of a patch are tried before it is divided, and what all of them lose as well is allowed to patches of its chart.
 """
 
 from __future__ import annotations
@@ -24,6 +27,11 @@ from app.solvers.shooting.shooters import ShooterBatch
 # patch is divided: a hall under skylights in coffers gains 5.8 % without. A patch of two texels along its edge sees what its
 # texels see.
 AUDITED, SOUND, SMALL = 0.005, 0.02, 2
+# What a patch makes or loses because of its extent falls as its edge, to half in its quarters: where more than this share of it
+# is left in all of them, it has other causes.
+MENDED = 0.75
+
+Patch = tuple[int, int, int]  # column, row, edge
 
 
 @dataclass(frozen=True)
@@ -57,13 +65,43 @@ class AuditTargets:
         self._gpu.release_all(self.light_target, self.power_target, self.light, self.powers)
 
 
+class Found:
+    """What audits found: by how much of its power each patch is off, and what dividing does not mend in a chart."""
+
+    def __init__(self) -> None:
+        self._off, self._unmended = dict[Patch, float](), dict[int, float]()
+
+    def clear(self) -> None:
+        self._off.clear()
+        self._unmended.clear()
+
+    def enter(self, shooter: np.void, off: float) -> None:
+        """A patch, SHOOTER, makes that share of its power, or loses it."""
+        self._off[_patch_of(shooter)] = off
+
+    def knows(self, shooter: np.void) -> bool:
+        return _patch_of(shooter) in self._off
+
+    def fails(self, shooter: np.void) -> bool:
+        """Whether a known patch is off by more than dividing leaves."""
+        off, allowed = self._off[_patch_of(shooter)], self._unmended.get(int(shooter["chart"]), 0.0)
+        return max(off - max(allowed, 0.0), min(allowed, 0.0) - off) > SOUND
+
+    def learn(self, shooter: np.void, quarters: list[np.void]) -> None:
+        """See whether a known patch is off as much in quarters of it, which are known, too."""
+        left = min((self._off[_patch_of(quarter)] for quarter in quarters), key=abs, default=0.0)
+        if abs(left) > MENDED * abs(self._off[_patch_of(shooter)]):
+            self._unmended[int(shooter["chart"])] = left
+
+
 class Auditor:
-    """Tries shots. wanted: whether batches are still strong enough to be audited; never, unless ``enabled``."""
+    """Tries shots. wanted: whether batches are still strong enough to be audited; never, unless ``enabled``. found: so far."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch, ledger: Ledger, *, enabled: bool) -> None:
         self._gpu, self._lightmap, self._shooters, self._ledger = gpu, lightmap, shooters, ledger
         self._sum = Pass(gpu, "solvers/shooting/audit", defines=lightmap.defines("TILE"))
-        self._enabled, self._sound = enabled, set[tuple[int, int, int]]()  # patches that passed: column, row, edge
+        self._enabled = enabled
+        self.found = Found()
         self.begin()
 
     def begin(self) -> None:
@@ -81,29 +119,30 @@ class Auditor:
 
     def forget(self) -> None:
         """Patches may be others now."""
-        self._sound.clear()
+        self.found.clear()
 
     def failed(self, see: See, receive: Receive, shots: int) -> Generator[None, None, list[np.void]]:
         """The shooters of the batch, SHOOTER, that would make or lose light and can shoot from finer patches. After the first
         batch without any strong one, none is audited any more. In parts; waits for the GPU."""
         shooters = self._shooters.read(shots)
-        power, edge = powers_of(shooters), sizes_of(shooters)
-        strong = power * self._ledger.watt > AUDITED * self._ledger.emitted.sum()
+        strong = powers_of(shooters) * self._ledger.watt > AUDITED * self._ledger.emitted.sum()
         self.wanted = bool(strong.any())
-        corners = zip(shooters["patch_x"], shooters["patch_y"], edge, strict=True)
-        patches = [(int(x), int(y), int(size)) for x, y, size in corners]
-        tried = [k for k in np.flatnonzero(strong & (edge > SMALL)).tolist() if patches[k] not in self._sound]
+        divisible = np.flatnonzero(strong & (sizes_of(shooters) > SMALL)).tolist()
+        yield from self.audit(see, receive, divisible, shooters)
+        return [shooters[shot] for shot in divisible if self.found.fails(shooters[shot])]
+
+    def audit(
+        self, see: See, receive: Receive, shots: list[int], shooters: NDArray[np.void]
+    ) -> Generator[None, None, None]:
+        """Find out what those shots of the batch would make or lose, unless that is known. In parts; waits for the GPU."""
+        tried = [shot for shot in shots if not self.found.knows(shooters[shot])]
         if not tried:
-            return []
-        failed = []
+            return
         with AuditTargets(self._gpu, self._lightmap) as targets:
             for shot in tried:
-                if abs(sum(self.shares(targets, see, receive, shot, power[shot])) - 1) > SOUND:
-                    failed.append(shooters[shot])
-                else:
-                    self._sound.add(patches[shot])
+                shares = self.shares(targets, see, receive, shot, float(powers_of(shooters[shot])))
+                self.found.enter(shooters[shot], sum(shares) - 1)
                 yield
-        return failed
 
     def shares(
         self, targets: AuditTargets, see: See, receive: Receive, shot: int, power: float
@@ -123,3 +162,7 @@ class Auditor:
         """``shares`` with targets of its own."""
         with AuditTargets(self._gpu, self._lightmap) as targets:
             return self.shares(targets, see, receive, shot, power)
+
+
+def _patch_of(shooter: np.void) -> Patch:
+    return int(shooter["patch_x"]), int(shooter["patch_y"]), int(sizes_of(shooter))

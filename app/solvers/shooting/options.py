@@ -52,4 +52,5 @@ class ShootingOptions(Options):
         minimum=64,
         maximum=2048,
         multiple=64,
+        logarithmic=True,
     )

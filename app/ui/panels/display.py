@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.render.false_colour import UNITS, measured
-from app.render.options import FALSE_COLOURS
+from app.render.false_colour import measured, quantity
+from app.render.options import FALSE_COLOURS, DisplayOptions
+from app.render.units import per_watt
 from app.ui import widgets
 from app.ui.panels import compare
 from app.ui.state import State
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from app.session.view import View
 
 SCALED, DEVELOPED = ("false_colour_log", "false_colour_max"), ("tone_map", "exposure")
+MOST = 1e9  # of a top
 COMPARED = ("show", "split")  # the Compare panel has them
 
 
@@ -25,9 +27,13 @@ def draw(view: View, state: State) -> None:
     skip = SCALED if kind == "off" else DEVELOPED if kind in FALSE_COLOURS else (*SCALED, *DEVELOPED)
     if not view.session.family.distributes:
         skip = (*skip, "last_shooter")
-    unit = {"false_colour_max": UNITS[kind]} if kind in UNITS else {}
+    unit = {} if kind == "off" else {"false_colour_max": quantity(kind, view.display.quantities).unit}
     display = view.display if view.display.layer in view.layers else view.shown
-    edited = widgets.edit_options(display, skip=(*skip, *COMPARED), units=unit, choices={"layer": view.layers})
+    top = {} if state.legend is None else {"false_colour_max": state.legend.maximum}
+    edited = widgets.edit_options(
+        display, skip=(*skip, *COMPARED), starts=top, units=unit, choices={"layer": view.layers}
+    )
+    edited = counted(edited, edited.quantities, before=display.quantities)
     if edited.layer == "error" and view.display.layer != "error":
         state.act(lambda: compare.show(view, state, "error"))  # which says so where there is no reference
     else:
@@ -39,3 +45,14 @@ def draw(view: View, state: State) -> None:
         widgets.tooltip(
             "Set the exposure from the light of the scene: what surfaces reflect becomes mid grey on average"
         )
+
+
+def counted(display: DisplayOptions, quantities: str, *, before: str | None = None) -> DisplayOptions:
+    """The same display with light counted in lumen or in watts; a top that the scale was given stays where it is."""
+    ratio = per_watt(quantities) / per_watt(before or display.quantities)
+    top = min(display.false_colour_max * ratio, MOST)
+    return (
+        display
+        if ratio == 1 and display.quantities == quantities
+        else display.replace(quantities=quantities, false_colour_max=top)
+    )

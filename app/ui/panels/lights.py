@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.render.false_colour import WHITE_EFFICACY
 from app.scene.lights import Light
-from app.ui import colour, theme, widgets
+from app.ui import lamp, slider, theme, widgets
 from app.ui.panels import sky
 from app.ui.state import RGB, State
 
@@ -18,7 +17,8 @@ if TYPE_CHECKING:
     from app.session.view import View
 
 ROWS_SHOWN = 4  # of the list before it scrolls
-WEAKEST, STRONGEST = 1e-4, 1e6  # W/sr or W/m², ends of the slider
+WEAKEST = 1e-4  # W/sr or W/m²
+UNTWEAKED = int(imgui.SliderFlags_.no_speed_tweaks)  # Shift is slower here
 STEP = 0.005  # of the scene's diagonal, for a pixel that a place is dragged by
 WIDEST = 10.0  # degrees across a directional light
 
@@ -46,7 +46,8 @@ def _lamps(view: View, state: State) -> None:
     index = min(state.light, len(lights) - 1)
     low, high = view.session.scene.bounds
     imgui.push_id("light")
-    edited = _editor(lights[index], float(math.dist(low, high)))
+    came = _as_read(view, index, lights[index])
+    edited = _editor(lights[index], came, view.display.quantities, float(math.dist(low, high)))
     imgui.pop_id()
     if edited != lights[index]:
         state.act(lambda: view.session.set_lights((*lights[:index], edited, *lights[index + 1 :])))
@@ -71,80 +72,75 @@ def _row(state: State, index: int, light: Light) -> None:
     imgui.pop_id()
 
 
-def _editor(light: Light, size: float) -> Light:
-    """The light as it was edited. size: diagonal of the scene [m]."""
-    widgets.labelled("Shines")
-    on = imgui.checkbox("##on", light.on)[1]
-    light = dataclasses.replace(light, on=on, intensity=_intensity(light))
+def _as_read(view: View, index: int, light: Light) -> Light:
+    """That light as the file has it, or as it is where it was added since."""
+    came = view.session.unedited.lights
+    same = index < len(came) and (came[index].name, came[index].kind) == (light.name, light.kind)
+    return came[index] if same else light
+
+
+def _editor(light: Light, came: Light, quantities: str, size: float) -> Light:
+    """The light as it was edited. came: as it was read. quantities: that it is counted in. size: diagonal of the scene [m]."""
+    widgets.labelled("Shines", changed=light.on != came.on)
+    on = widgets.put_back(imgui.checkbox("##on", light.on)[1], came.on)
+    kind, spread = ("arrives", None) if light.from_afar else ("directed", light.solid_angle)
+    intensity, _ = lamp.edit_light(
+        light.intensity, kind, quantities, came=came.intensity, weakest=WEAKEST, spread=spread
+    )
+    light = dataclasses.replace(light, on=on, intensity=intensity)
     if not light.from_afar:
-        light = dataclasses.replace(light, position=_vector("Position [m]", light.position, STEP * size, "%.2f"))
-        radius = _slider("Radius", light.radius, 0.1 * size, "%.3g m", "Of the lamp: above 0, shadows have soft edges")
-        light = dataclasses.replace(light, radius=radius)
+        place = _vector("Position [m]", light.position, came.position, STEP * size, "%.2f")
+        help = "Of the lamp: above 0, shadows have soft edges"
+        radius = _slider("Radius", light.radius, came.radius, 0.1 * size, "%.3g m", help)
+        light = dataclasses.replace(light, position=place, radius=radius)
     if light.kind != "point":
-        aim = _vector("Direction", light.direction, STEP, "%.3f")
+        aim = _vector("Direction", light.direction, came.direction, STEP, "%.3f")
         length = math.hypot(*aim)
         if aim != light.direction and length > 0:
             x, y, z = (c / length for c in aim)
             light = dataclasses.replace(light, direction=(x, y, z))
     if light.kind == "spot":
-        outer = _angle("Cone", light.outer, 90.0, "Angle from the axis, at which the light ends")
-        inner = _angle("Full within", light.inner, 90.0, "Angle from the axis, up to which it is even")
+        outer = _angle("Cone", light.outer, came.outer, 90.0, "Angle from the axis, at which the light ends")
+        inner = _angle("Full within", light.inner, came.inner, 90.0, "Angle from the axis, up to which it is even")
         light = dataclasses.replace(light, outer=outer, inner=min(inner, outer))
     if light.from_afar:
-        wide = _angle(
-            "Angle", light.angle, WIDEST, "That it is seen under: above 0, shadows have soft edges; the sun 0.53°"
-        )
+        help = "That it is seen under: above 0, shadows have soft edges; the sun 0.53°"
+        wide = _angle("Angle", light.angle, came.angle, WIDEST, help)
         light = dataclasses.replace(light, angle=wide)
     return light
 
 
-def _intensity(light: Light) -> RGB:
-    """Colour × strength, in W/sr or W/m²."""
-    tint, strength = colour.tint_and_strength(light.intensity)
-    widgets.labelled("Strength")
-    new_tint = colour.edit_tint("##colour", tint)
-    imgui.same_line()
-    imgui.set_next_item_width(-1)
-    unit, flags = "W/m²" if light.from_afar else "W/sr", widgets.SLIDER | widgets.LOGARITHMIC
-    scaled, now = imgui.slider_float("##strength", strength, WEAKEST, STRONGEST, f"%.4g {unit}", flags)
-    lumens = WHITE_EFFICACY * strength
-    if light.from_afar:
-        widgets.tooltip(f"Irradiance of what faces it; about {widgets.number(lumens, 3)} lx")
-    else:
-        power = widgets.number(light.solid_angle * strength, 3)
-        widgets.tooltip(
-            f"Radiant intensity; in all {power} W. About {widgets.number(lumens, 3)} cd, "
-            f"{widgets.number(light.solid_angle * lumens, 3)} lm"
-        )
-    if (new_tint == tint and not scaled) or now != now:
-        return light.intensity
-    return colour.rgb(now * c for c in new_tint)
-
-
-def _vector(label: str, value: RGB, step: float, text: str) -> RGB:
-    widgets.labelled(label)
+def _vector(label: str, value: RGB, came: RGB, step: float, text: str) -> RGB:
+    widgets.labelled(label, changed=value != came)
+    imgui.begin_group()
     imgui.set_next_item_width(-1)
     shown = [component + 0.0 for component in value]  # -0 is 0
-    changed, moved = imgui.drag_float3(f"##{label}", shown, step, 0.0, 0.0, text)
-    widgets.tooltip("Drag, or click twice to type")
+    slow = slider.FINE if imgui.get_io().key_shift else 1.0
+    changed, moved = imgui.drag_float3(f"##{label}", shown, slow * step, 0.0, 0.0, text, UNTWEAKED)
+    imgui.end_group()
+    widgets.tooltip(f"Drag, with Shift finely, or click twice to type. {widgets.AS_READ}")
+    if widgets.put_back(False, True):
+        return came
     if not changed or not all(map(math.isfinite, moved)):
         return value
     x, y, z = (float(c) for c in moved)
     return (x, y, z)
 
 
-def _angle(label: str, value: float, most: float, help: str) -> float:
+def _angle(label: str, value: float, came: float, most: float, help: str) -> float:
     """In radians; shown in degrees."""
-    degrees = _slider(label, math.degrees(value), most, "%.2f°", help)
+    degrees = _slider(label, math.degrees(value), math.degrees(came), most, "%.2f°", help)
+    if degrees == math.degrees(came):
+        return came
     return value if degrees == math.degrees(value) else math.radians(degrees)
 
 
-def _slider(label: str, value: float, most: float, text: str, help: str) -> float:
-    widgets.labelled(label)
+def _slider(label: str, value: float, came: float, most: float, text: str, help: str) -> float:
+    widgets.labelled(label, changed=value != came)
     imgui.set_next_item_width(-1)
-    changed, moved = imgui.slider_float(f"##{label}", value, 0.0, most, text, widgets.SLIDER)
-    widgets.tooltip(help)
-    return float(moved) if changed and moved == moved else value
+    moved = slider.slide(f"##{label}", value, slider.Range(0.0, most), text)
+    widgets.tooltip(f"{help}. {widgets.AS_READ}")
+    return float(widgets.put_back(moved, came))
 
 
 __all__ = ["draw"]

@@ -5,18 +5,17 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from imgui_bundle import imgui
 
 from app.scene.model import MOST_ALBEDO
-from app.ui import colour, theme, widgets
+from app.ui import colour, lamp, theme, widgets
 from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
     from app.session.view import View
 
 ROWS_SHOWN = 12  # of the list before it scrolls
-WHITE = (1.0, 1.0, 1.0)
-STRONGEST = 1e5  # W/(sr m²), end of the slider: the sun's disc is brighter, lamps are not
 
 
 def draw(view: View, state: State) -> None:
@@ -54,8 +53,10 @@ def _row(state: State, index: int, material: Any) -> None:
 
 def _editor(view: View, state: State, material: Any) -> None:
     index = state.material
+    came = view.session.unedited.materials[index]
     imgui.push_id("material")
-    edited = dataclasses.replace(material, albedo=_albedo(material), emission=_emission(state, material))
+    albedo, light = _albedo(material, came), emission(view, state, material, came, index)
+    edited = dataclasses.replace(material, albedo=albedo, emission=light)
     imgui.pop_id()
     if (edited.albedo, edited.emission) != (material.albedo, material.emission):
         state.act(lambda: view.session.set_material(index, edited))
@@ -66,29 +67,37 @@ def _editor(view: View, state: State, material: Any) -> None:
         widgets.dim(", ".join(notes))
 
 
-def _albedo(material: Any) -> RGB:
-    widgets.labelled("Albedo ρ")
+def _albedo(material: Any, came: Any) -> RGB:
+    """came: the material as it was read."""
+    widgets.labelled("Albedo ρ", changed=material.albedo != came.albedo)
     imgui.set_next_item_width(-1)
     edited = colour.edit_colour("##albedo", material.albedo, code=True, most=MOST_ALBEDO)
     widgets.tooltip(
         f"The share of light that it reflects: ρ {widgets.triple(material.albedo, 3)} of red, green, blue. The code is of what "
-        "the screen shows (sRGB), as everywhere"
+        f"the screen shows (sRGB), as everywhere. {widgets.AS_READ}"
+    )
+    return widgets.put_back(edited, came.albedo)
+
+
+def emission(view: View, state: State, material: Any, came: Any, index: int) -> RGB:
+    """Widgets of a material's emission. A lamp that is dimmed to nothing keeps its colour in the state. came: the
+    material as it was read."""
+    edited, state.emission_colours[index] = lamp.edit_light(
+        material.emission,
+        "seen",
+        view.display.quantities,
+        came=came.emission,
+        tint=state.emission_colours.get(index, lamp.WHITE),
+        spread=None if material.emission_texture is not None else np.pi * _emitting_area(view, state, index),
     )
     return edited
 
 
-def _emission(state: State, material: Any) -> RGB:
-    """Colour × strength. A lamp that is dimmed to nothing keeps its colour in the state."""
-    tint, strength = colour.tint_and_strength(material.emission, state.emission_colours.get(state.material, WHITE))
-    widgets.labelled("Emission L")
-    new_tint = state.emission_colours[state.material] = colour.edit_tint("##emission", tint)
-    imgui.same_line()
-    imgui.set_next_item_width(-1)
-    flags = widgets.SLIDER | widgets.LOGARITHMIC
-    scaled, new_strength = imgui.slider_float("##strength", strength, 0.0, STRONGEST, "%.4g W/(sr m²)", flags)
-    widgets.tooltip("Radiance: colour times strength. Exitance is π times this. Right-click: off")
-    if imgui.is_item_hovered() and imgui.is_mouse_clicked(1):
-        scaled, new_strength = True, 0.0
-    if (new_tint == tint and not scaled) or new_strength != new_strength:
-        return material.emission
-    return colour.rgb(v * new_strength for v in new_tint)
+def _emitting_area(view: View, state: State, index: int) -> float:
+    """Of both sides, where both emit [m²]."""
+    scene = view.session.scene
+    known = view.session.unedited, index
+    if state.emitting_area[0] != known:
+        area = float(scene.normals_areas[1][scene.material_ids == index].sum())
+        state.emitting_area = known, area * (1 + scene.materials[index].double_sided)
+    return state.emitting_area[1]
