@@ -1,12 +1,11 @@
-"""A finished bake as files: ``irradiance.exr``, ``scene.glb`` and ``report.json`` in one folder.
+"""A finished bake as files: ``irradiance.exr``, ``scene.glb`` and ``report.json`` in one folder, and what else is asked for.
 
-All three are written beside their final names first and then renamed, so that a bake that fails or is stopped while
+All are written beside their final names first and then renamed, so that a bake that fails or is stopped while
 writing leaves the previous files as they were.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
-from app.bake.exr import write_irradiance
+from app.bake.exr import IRRADIANCE, fits_half, write_exr
 from app.bake.gltf_edit import edited_glb_bytes, is_of_gltf
 from app.bake.gltf_writer import glb_bytes
 from app.bake.options import BakeOptions
+from app.bake.rgbe import write_hdr, write_rgbe_png
+from app.bake.staged import Staged
 from app.errors import SceneError, UserError
 from app.lightmap.seams import finished
 from app.scene.model import F32, Scene
@@ -31,20 +32,24 @@ __all__ = ["IRRADIANCE_NAME", "REPORT_NAME", "SCENE_NAME", "BakeFiles", "prepare
 IRRADIANCE_NAME = "irradiance.exr"
 SCENE_NAME = "scene.glb"
 REPORT_NAME = "report.json"
+HDR_NAME = "irradiance.hdr"
+RGBE_NAME = "irradiance.rgbe.png"
+OPTIONAL = (HDR_NAME, RGBE_NAME)
 
 
 @dataclass(frozen=True)
 class BakeFiles:
-    """Where the files of a bake are. notes: what the user should know."""
+    """Where the files of a bake are. more: what was asked for beside these; notes: what the user should know."""
 
     irradiance: Path
     scene: Path
     report: Path
+    more: tuple[Path, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
     def paths(self) -> list[Path]:
-        return [self.irradiance, self.scene, self.report]
+        return [self.irradiance, self.scene, self.report, *self.more]
 
 
 def prepare_directory(directory: Path) -> Path:
@@ -82,21 +87,33 @@ def write_bake(
     assert np.isfinite(irradiance[covered]).all(), "irradiance that is not finite"
     options = options or BakeOptions()
     prepare_directory(directory)
-    files = BakeFiles(directory / IRRADIANCE_NAME, directory / SCENE_NAME, directory / REPORT_NAME)
-    temporary = {path: path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") for path in files.paths}
+    light = finished(irradiance, covered, charts)
     try:
-        write_irradiance(temporary[files.irradiance], finished(irradiance, covered, charts))
-        glb, notes = _scene_bytes(scene, unedited, charts, options)
-        temporary[files.scene].write_bytes(glb)
-        temporary[files.report].write_text(json_text(_with_notes(report, notes)), encoding="utf-8")
-        for path, written in temporary.items():
-            os.replace(written, path)
+        with Staged(directory) as staged:
+            notes = _write_light(staged, light, options)
+            glb, more = _scene_bytes(scene, unedited, charts, options)
+            notes += more
+            staged(SCENE_NAME).write_bytes(glb)
+            staged(REPORT_NAME).write_text(json_text(_with_notes(report, notes)), encoding="utf-8")
+        for name in set(OPTIONAL) - {path.name for path in staged.paths}:  # of another bake
+            (directory / name).unlink(missing_ok=True)
     except OSError as error:
         raise UserError(f"{directory}: cannot write the bake ({error.strerror or error})") from error
-    finally:
-        for written in temporary.values():
-            written.unlink(missing_ok=True)
-    return dataclasses.replace(files, notes=notes)
+    usual = directory / IRRADIANCE_NAME, directory / SCENE_NAME, directory / REPORT_NAME
+    return BakeFiles(*usual, more=tuple(path for path in staged.paths if path not in usual), notes=notes)
+
+
+def _write_light(staged: Staged, light: F32, options: BakeOptions) -> tuple[str, ...]:
+    """The lightmap in the formats that are asked for; what the user should know of it."""
+    fits = fits_half(light)
+    write_exr(staged(IRRADIANCE_NAME), light, IRRADIANCE, half=fits and not options.exr_float)
+    if options.hdr:
+        write_hdr(staged(HDR_NAME), light)
+    if options.rgbe_png:
+        write_rgbe_png(staged(RGBE_NAME), light)
+    if fits or options.exr_float:
+        return ()
+    return (f"half floats do not hold light of {light.max():.3g} W/m² well: {IRRADIANCE_NAME} has 32-bit floats",)
 
 
 def _scene_bytes(

@@ -9,6 +9,11 @@ from app.options import Options, option
 
 @dataclass(frozen=True)
 class BakeOptions(Options):
+    exr_float: bool = option(
+        False, "write 32-bit floats: three times the size, for what is computed on; half floats are right to 0.05 %"
+    )
+    hdr: bool = option(False, "write the lightmap as irradiance.hdr, too (Radiance RGBE, right to 0.4 %)")
+    rgbe_png: bool = option(False, "write the lightmap as irradiance.rgbe.png, too: RGBE in the channels of a PNG")
     moz_lightmap: bool = option(
         False, "name the lightmap in scene.glb by MOZ_lightmap, too, which readers that parse all images may refuse"
     )

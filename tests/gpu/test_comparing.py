@@ -25,6 +25,7 @@ from solver_scenes import table_room
 from app.atlas.options import AtlasOptions
 from app.atlas.points import random_points
 from app.bake import write_bake
+from app.bake.options import BakeOptions
 from app.compare.comparison import POINTS, POINTS_SEED
 from app.compare.options import ReferenceOptions
 from app.compare.reference_light import ReferenceLight
@@ -129,7 +130,8 @@ def baked(session: Session, folder: Path, factor: float = 1.0) -> Path:
     """The light of a session, times a factor."""
     irradiance, covered = collapse(session.lightmap.pool, session.lightmap.irradiance(ambient=True))
     report = {"texels": session.lightmap.texel_count, "residual": session.stats.remaining}
-    write_bake(folder, session.scene, session.charts, np.float32(factor) * irradiance, covered, report)
+    light = np.float32(factor) * irradiance, covered
+    write_bake(folder, session.scene, session.charts, *light, report, BakeOptions(exr_float=True))
     return folder
 
 

@@ -10,13 +10,17 @@ import numpy as np
 import OpenEXR
 import pytest
 from bake_scenes import sides_charts, sides_scene
+from PIL import Image
 
 import app.bake
 from app.atlas.charts import GAP
 from app.bake import prepare_directory, write_bake
-from app.bake.exr import write_irradiance
+from app.bake.exr import IRRADIANCE, write_exr
+from app.bake.options import BakeOptions
+from app.bake.rgbe import rgbe
 from app.errors import UserError
 from app.lightmap.gutter import GUTTER, fill_gutter
+from app.scene.sky_image import radiance_hdr
 
 NAMES = ["irradiance.exr", "report.json", "scene.glb"]
 
@@ -39,7 +43,7 @@ def inputs():
 
 def test_exr_reads_back_exactly(tmp_path):
     values = np.random.default_rng(2).lognormal(0, 8, (5, 7, 3)).astype(np.float32)
-    write_irradiance(tmp_path / "e.exr", values)
+    write_exr(tmp_path / "e.exr", values, IRRADIANCE, half=False)
     file = OpenEXR.File(str(tmp_path / "e.exr"), separate_channels=True)
     assert sorted(file.channels()) == ["B", "G", "R"]
     for c, name in enumerate("RGB"):
@@ -86,9 +90,46 @@ def test_writes_three_files_and_nothing_else(tmp_path, inputs):
     assert sorted(p.name for p in files.scene.parent.iterdir()) == NAMES
     _, _, irradiance, covered = inputs
     pixels = OpenEXR.File(str(files.irradiance)).channels()["RGB"].pixels
+    assert pixels.dtype == np.float32  # the numbers of this light are beyond what half floats hold, which is said
+    (note,) = files.notes
+    assert "half floats do not hold light of" in note
     np.testing.assert_array_equal(pixels[covered], irradiance[covered])
     assert np.isfinite(pixels).all()
-    assert json.loads(files.report.read_text()) == {"shots": 3}
+    assert json.loads(files.report.read_text()) == {"shots": 3, "warnings": [note]}
+
+
+def test_half_floats_are_right_to_a_twentieth_of_a_per_cent(tmp_path, inputs):
+    scene, charts, irradiance, covered = inputs
+    light = np.clip(np.nan_to_num(irradiance), 1e-3, 100.0).astype(np.float32)
+    sizes = []
+    for options in (BakeOptions(), BakeOptions(exr_float=True)):
+        files = write_bake(tmp_path, scene, charts, light, covered, {}, options)
+        assert files.notes == ()
+        pixels = OpenEXR.File(str(files.irradiance)).channels()["RGB"].pixels
+        np.testing.assert_allclose(pixels[covered], light[covered], rtol=2.0**-11)  # half of the last of 11 bits
+        sizes.append(files.irradiance.stat().st_size)
+    assert sizes[0] < 0.6 * sizes[1]
+
+
+def test_rgbe_is_right_to_8_bits_of_the_brightest_colour(tmp_path, inputs):
+    scene, charts, irradiance, covered = inputs
+    files = write_bake(tmp_path, scene, charts, irradiance, covered, {}, BakeOptions(hdr=True, rgbe_png=True))
+    assert sorted(path.name for path in files.more) == ["irradiance.hdr", "irradiance.rgbe.png"]
+    exact = OpenEXR.File(str(files.irradiance)).channels()["RGB"].pixels
+    packed = np.asarray(Image.open(tmp_path / "irradiance.rgbe.png")).astype(np.float64)
+    decoded = (packed[..., :3] + 0.5) * 2.0 ** (packed[..., 3:] - 128 - 8)
+    for read in (decoded, radiance_hdr((tmp_path / "irradiance.hdr").read_bytes())):
+        assert (np.abs(read - exact).max(2) <= 2.0**-8 * exact.max(2)).all()
+    write_bake(tmp_path, scene, charts, irradiance, covered, {})
+    assert sorted(path.name for path in tmp_path.iterdir()) == NAMES  # none of another bake is left
+
+
+def test_rgbe_of_nothing_and_of_the_extremes():
+    light = np.float32([[[0, 0, 0], [1e-44, 0, 0], [1e38, 1, 0], [255.9, 255.9, 255.9]]])
+    packed = rgbe(light).astype(np.float64)[0]
+    read = (packed[:, :3] + 0.5) * 2.0 ** (packed[:, 3:] - 136)
+    assert (packed[:2] == 0).all() and np.isfinite(read).all()
+    np.testing.assert_allclose(read[2:].max(1), light[0, 2:].max(1), rtol=2.0**-7)
 
 
 def test_irradiance_that_is_not_finite_is_refused(tmp_path, inputs):
@@ -105,7 +146,7 @@ def test_image_of_another_size_is_refused(tmp_path, inputs):
         write_bake(tmp_path, scene, charts, irradiance[1:], covered[1:], {})
 
 
-@pytest.mark.parametrize("step", ["write_irradiance", "glb_bytes", "json_text"])
+@pytest.mark.parametrize("step", ["write_exr", "glb_bytes", "json_text"])
 def test_failing_half_way_keeps_the_files_of_the_last_bake(tmp_path, inputs, monkeypatch, step):
     files = write_bake(tmp_path, *inputs, {"shots": 1})
     before = {path: path.read_bytes() for path in files.paths}
@@ -130,7 +171,7 @@ def test_folder_that_cannot_be_made(tmp_path, inputs):
 
 def test_exr_that_cannot_be_written_is_an_os_error(tmp_path):
     with pytest.raises(OSError, match="nowhere"):
-        write_irradiance(tmp_path / "nowhere" / "e.exr", np.zeros((2, 2, 3), np.float32))
+        write_exr(tmp_path / "nowhere" / "e.exr", np.zeros((2, 2, 3), np.float32), IRRADIANCE, half=True)
 
 
 # -- report ------------------------------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from app.atlas.charts import Charts
 from app.atlas.parametrize import parametrize
 from app.atlas.points import Points, barycentric, bilinear
 from app.bake import write_bake
+from app.bake.options import BakeOptions
 from app.bake.read import read_bake
 from app.compare.reference_light import ReferenceLight, light_of_bake
 from app.compare.reference_task import ReferenceTask
@@ -45,7 +46,7 @@ def written(folder: Path, scene: Scene, report: dict[str, object] | None = None)
     """A bake of random light; its image."""
     charts = charts_of(scene)
     image = np.random.default_rng(5).uniform(1, 2, (*charts.size[::-1], 3)).astype(np.float32)
-    write_bake(folder, scene, charts, image, np.ones(image.shape[:2], bool), report or {})
+    write_bake(folder, scene, charts, image, np.ones(image.shape[:2], bool), report or {}, BakeOptions(exr_float=True))
     return image
 
 

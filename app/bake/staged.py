@@ -1,0 +1,40 @@
+"""Files that are written beside their final names first and take these together, so that a failure leaves what was there."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from types import TracebackType
+
+
+class Staged:
+    """A folder's new files, in a ``with`` block: they are there once it ends without an exception, and none of them otherwise."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._written: dict[Path, Path] = {}
+
+    def __call__(self, name: str) -> Path:
+        """Where to write what shall be called so."""
+        path = self._folder / name
+        self._written[path] = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+        return self._written[path]
+
+    @property
+    def paths(self) -> list[Path]:
+        """The final names, in the order in which they were asked for."""
+        return list(self._written)
+
+    def __enter__(self) -> Staged:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                for path, written in self._written.items():
+                    os.replace(written, path)
+        finally:
+            for written in self._written.values():
+                written.unlink(missing_ok=True)
