@@ -68,7 +68,7 @@ def lit_sides(scene: Scene) -> Sides:
     fronts = reach_front > FLAT
     two_sided = scene.sides
     backs = two_sided & (reach_back > FLAT)
-    if scene.sky is not None or scene.lights or (not fronts.any() and not backs.any()):
+    if scene.open_to_lights or (not fronts.any() and not backs.any()):
         fronts, backs = np.ones_like(fronts), two_sided
     triangle = np.concatenate([np.flatnonzero(fronts), np.flatnonzero(backs)]).astype(np.int32)
     back = np.arange(len(triangle)) >= np.count_nonzero(fronts)

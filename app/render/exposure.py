@@ -22,7 +22,7 @@ from app.render.options import DisplayOptions
 from app.render.sample import irradiance_at, sampled_colours, sampled_tiles
 from app.render.seen import Texels
 from app.render.units import LUMINANCE
-from app.scene.model import F64
+from app.scene.model import F64, Scene
 
 KEY = 0.18  # mid grey [Reinhard02]
 BRIGHT = 0.99  # quantile of what is seen
@@ -33,15 +33,17 @@ TRAPPED = 1e-4  # of that even light: what leaks from texel to texel through clo
 LEAST_ABSORBED = 0.01  # 1 − ρ̄: in a furnace of ρ̄ = 1 light never ends, but its exposure may
 
 
-def first_exposure(pool: TilePool, seen: Texels) -> float:
-    """EV for the light to come on what is seen, before the first shot; 0 where there is none. Needs no GPU."""
-    materials = pool.scene.materials
+def first_exposure(pool: TilePool, seen: Texels, scene: Scene | None = None) -> float:
+    """EV for the light to come on what is seen, before the first shot; 0 where there is none. Needs no GPU. scene: the
+    pool's, as it was edited."""
+    scene = scene or pool.scene
+    materials = scene.materials
     albedo = sampled_colours(pool, [m.albedo for m in materials], pool.albedo_tiles, slice(None))
     emission = sampled_colours(pool, [m.emission for m in materials], pool.emission_tiles, slice(None))
     some = Texels(*(values[:: -(-len(seen.slot) // FORECAST) or 1] for values in seen))
     asked = (some.slot * pool.tile + some.row) * pool.tile + some.column
-    sky = pool.scene.sky if pool.scene.lit_by_sky else None
-    light = forecast(pool.surfaces, albedo, np.float32(np.pi) * emission, asked, sky, pool.scene.lights)
+    sky = scene.sky if scene.lit_by_sky else None
+    light = forecast(pool.surfaces, albedo, np.float32(np.pi) * emission, asked, sky, scene.lights)
     return _exposure(albedo[some] * light.asked)
 
 

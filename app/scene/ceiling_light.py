@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from app.scene.model import Material, Scene
+from app.scene.lamp_surfaces import with_rectangle
+from app.scene.model import Scene
 from app.scene.rooms import OPEN, AxisRays, Free, find_room
 
 LIGHT_SHARE = 0.25  # its edges, of the room's
@@ -21,7 +21,7 @@ LOOKS = 5  # along each edge, for what hangs from the ceiling or stands in its w
 HALVINGS = 6  # of its edges, at most, until nothing does
 
 
-def with_ceiling_light(scene: Scene) -> Scene:
+def with_ceiling_light(scene: Scene, name: str = "ceiling light") -> Scene:
     """The scene with a one-sided, downward square of light under the ceiling of a room: the one that the first camera stands in,
     else the one that ``find_room`` finds.
 
@@ -33,31 +33,7 @@ def with_ceiling_light(scene: Scene) -> Scene:
     (x, y, z), u, v, ground = _square(scene)
     radiance = MEAN_IRRADIANCE * ground / (math.pi * 4 * u * v)
     corners = np.array([(x - u, y, z - v), (x + u, y, z - v), (x + u, y, z + v), (x - u, y, z + v)])
-    light = Material("ceiling light", albedo=(0.0, 0.0, 0.0), emission=(radiance, radiance, radiance))
-    first = len(scene.positions)
-    triangles = np.array([(first, first + 1, first + 2), (first, first + 2, first + 3)], np.int32)
-    down = np.broadcast_to(np.array([0.0, -1.0, 0.0], np.float32), (2, 3, 3))
-    square = np.array([(0, 1), (1, 1), (1, 0), (0, 0)], np.float32)[[(0, 1, 2), (0, 2, 3)]]
-
-    def extended(
-        values: np.ndarray[tuple[int, ...], np.dtype[np.float32]] | None, new: np.ndarray
-    ) -> np.ndarray | None:
-        return None if values is None else np.concatenate([values, new])
-
-    return dataclasses.replace(
-        scene,
-        positions=np.concatenate([scene.positions, corners]),
-        triangles=np.concatenate([scene.triangles, triangles]),
-        material_ids=np.append(scene.material_ids, [len(scene.materials)] * 2).astype(np.int32),
-        object_ids=np.append(scene.object_ids, [len(scene.objects)] * 2).astype(np.int32),
-        objects=(*scene.objects, "ceiling light"),
-        materials=(*scene.materials, light),
-        uv0=extended(scene.uv0, square),
-        uv1=extended(scene.uv1, square),
-        normals=extended(scene.normals, down),
-        colours=extended(scene.colours, np.ones((2, 3, 3), np.float32)),
-        listed=None if scene.listed is None else np.append(scene.listed, [-1, -1]).astype(np.int32),
-    )
+    return with_rectangle(scene, corners, name, (radiance, radiance, radiance))
 
 
 class _Square(NamedTuple):

@@ -158,6 +158,11 @@ class Scene:
         return any(light.emits for light in self.lights)
 
     @property
+    def open_to_lights(self) -> bool:
+        """Whether there is a sky, or a lamp without area, on or off: light may come from beyond all surfaces."""
+        return self.sky is not None or bool(self.lights)
+
+    @property
     def sides(self) -> NDArray[np.bool_]:
         """(m,) whether the triangle also reflects and emits at its back."""
         return np.array([m.double_sided for m in self.materials], bool)[self.material_ids]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from app.atlas.charts import Charts
 from app.atlas.charts_cache import charts_of
@@ -19,6 +21,7 @@ from app.scene.model import Scene
 from app.scene.options import FileOptions
 from app.scene.sky import Sky
 from app.session.ray_tree import SORTING
+from app.session.versions import Version
 from app.solvers import SOLVERS
 from app.util.background import BackgroundTask, Progress
 from app.visibility.rays import tree_of
@@ -68,11 +71,16 @@ def load(
     sky: Sky | None = None,
     expose: bool = False,
     rays: bool = False,
+    make: Callable[[Scene], Scene] | None = None,
     progress: Progress | None = None,
 ) -> Loaded:
     """Read a scene, or take one as it is; unfold it, cut it into texels, with ``expose`` find its exposure, and with ``rays``
-    build the tree that they walk. file: as of ``read_and_unfold``. Raises UserError (SceneError)."""
+    build the tree that they walk. file: as of ``read_and_unfold``. make: makes another scene of one that is taken as it is.
+    Raises UserError (SceneError)."""
     tell: Progress = progress or (lambda stage, share: None)
+    if make is not None:
+        assert isinstance(source, Scene)
+        source = make(source)
     options = options or LightmapOptions()
     scene, charts, seconds = read_and_unfold(
         source, atlas, default_light, tell, file=file, sky=sky, roots=options.adaptive
@@ -95,7 +103,8 @@ def load(
 
 
 class Loading(BackgroundTask[Loaded]):
-    """A scene on its way, see ``load``. solver: by name, what it is made ready for. atlas, light: how it is cut and held."""
+    """A scene on its way, see ``load``. solver: by name, what it is made ready for. atlas, light: how it is cut and held.
+    version: what the open scene becomes, if it is that."""
 
     def __init__(
         self,
@@ -108,11 +117,14 @@ class Loading(BackgroundTask[Loaded]):
         default_light: bool = False,
         sky: Sky | None = None,
         expose: bool = False,
+        version: Version | None = None,
     ) -> None:
         self.source, self.solver, self.atlas, self.light = source, solver, atlas, options
-        more = {"default_light": default_light, "expose": expose, "rays": SOLVERS[solver].rays}
+        self.version, make = version, None if version is None else version.make
+        more: dict[str, Any] = {"default_light": default_light, "expose": expose, "rays": SOLVERS[solver].rays}
         super().__init__(
-            "this scene", lambda tell: load(source, atlas, options, file=file, sky=sky, **more, progress=tell)
+            "this scene",
+            lambda tell: load(source, atlas, options, file=file, sky=sky, make=make, **more, progress=tell),
         )
 
     @property

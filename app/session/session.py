@@ -31,6 +31,7 @@ from app.session.opening import Opened, Opening, Prepare, Ready
 from app.session.run import Keeper, Run, Stop
 from app.session.solver_choice import SolverChoice
 from app.session.stats import Stats, stats_of
+from app.session.versions import Version
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family, Solver
 from app.util.background import BackgroundTask
 from app.util.state import State
@@ -42,7 +43,8 @@ class Session:
 
     options: of the solver that is at work. atlas, light: how scenes are cut, and how their light is held. expose_on_open:
     whether the exposure is forecast of a scene that opens. unedited: the open scene as it was read, the same through edits and
-    however it is cut. load_seconds: of each stage of opening. message: what the user should know.
+    however it is cut. edited: what edits are of: another object where those of before are not edits of what is open now.
+    load_seconds: of each stage of opening. message: what the user should know.
     """
 
     def __init__(
@@ -72,6 +74,7 @@ class Session:
         self._opening = Opening(gpu)
         self._on_open: Opened | None = None
         self._opened = self._busy = False
+        self.edited: object = None
         self._steady: Scene | None = None  # as it was edited, while its lamps flicker
         self._then_reference: Path | None = None
 
@@ -85,7 +88,7 @@ class Session:
         """Start to load in the background; ``poll`` swaps the scene when it is there. file: its unit and axes,
         guessed if None. reference: a bake to open then."""
         self._then_reference = reference
-        more = {"default_light": self.default_light, "expose": self.expose_on_open}
+        more: dict[str, Any] = {"default_light": self.default_light, "expose": self.expose_on_open}
         self._opening.begin(
             Loading(source, self.atlas, self.light, self.chosen_solver, file=file, sky=self.sky, **more)
         )
@@ -98,7 +101,8 @@ class Session:
     ) -> None:
         """Load and wait. file: as of ``open``."""
         solver = self.chosen_solver
-        more = {"default_light": self.default_light, "expose": self.expose_on_open, "rays": SOLVERS[solver].rays}
+        rays = SOLVERS[solver].rays
+        more: dict[str, Any] = {"default_light": self.default_light, "expose": self.expose_on_open, "rays": rays}
         loaded = load(source, self.atlas, self.light, file=file, sky=self.sky, **more, progress=progress)
         self._take_over(self._opening.at_once(loaded, solver, self._choice.options))
 
@@ -109,6 +113,25 @@ class Session:
             raise UserError(f"{self.loading.name} is loading: cut {self.name or 'it'} anew before or after that")
         light = self.light if adaptive is None else self.light.replace(adaptive=adaptive)
         self._opening.begin(Loading(self.unedited, atlas, light, self.chosen_solver))
+
+    def change_surfaces(self, version: Version) -> None:
+        """Let the open scene have other surfaces, cut in the background: its edits, exposure and camera stay, light begins again.
+        Raises UserError while another scene is on its way."""
+        if self.loading is not None:
+            raise UserError(f"{self.loading.name} is loading: change {self.name} before or after that")
+        dark = not self.edited_scene.emits
+        self._opening.begin(
+            Loading(version.of, self.atlas, self.light, self.chosen_solver, expose=dark, version=version)
+        )
+
+    def _open_to_the_sky(self, before: Scene) -> None:
+        """Cut the scene anew where it has a sky or lights now and had none ``before``: sides that face nothing may be lit now."""
+        now = self.edited_scene
+        if before.open_to_lights or not now.open_to_lights or not self.charts.dark_faces or self.loading is not None:
+            return
+        sky, lights = now.sky, now.lights
+        same = tuple(range(len(self.unedited.materials)))
+        self.change_surfaces(Version(self.unedited, lambda scene: scene.with_sky(sky).with_lights(lights), same))
 
     @property
     def asked_cut(self) -> tuple[AtlasOptions, bool]:
@@ -144,13 +167,13 @@ class Session:
         try:
             ready = self._opening.part(self._choice.options)
             if ready is not None:
-                self._take_over(ready)
+                self._take_over(ready, loading.version)
         except UserError as error:
             self.message = str(error)
 
-    def _take_over(self, ready: Ready) -> None:
-        """Put what was opened in the place of what is open. Raises UserError, also where it is open but the solver that has been
-        chosen since cannot be had."""
+    def _take_over(self, ready: Ready, version: Version | None = None) -> None:
+        """Put what was opened, or a version of what is open, in its place. Raises UserError, also where it is open but the solver
+        that has been chosen since cannot be had."""
         loaded, lightmap, solver = ready.loaded, ready.lightmap, ready.solver
         scene, chosen = loaded.pool.scene, self.chosen_solver
         try:
@@ -159,10 +182,13 @@ class Session:
             solver.release()
             lightmap.release()
             raise
-        same_scene = self._opened and scene is self.unedited
+        version = version if self._opened and version is not None and version.of is self.unedited else None
+        same_scene = self._opened and (scene is self.unedited or version is not None)
         flickers = same_scene and self.flickers
+        if not same_scene or (version is not None and not version.keeps_materials):
+            self.edited = object()
         if same_scene and self.scene is not scene:
-            lightmap.set_materials(self.materials)
+            lightmap.set_materials(self.materials if version is None else version.materials(scene, self.materials))
             lightmap.set_sky(self.scene.sky)
             lightmap.set_lights(self.scene.lights)
             solver.reset()
@@ -172,7 +198,7 @@ class Session:
         self.atlas, self.light = loaded.atlas, lightmap.options
         self.load_seconds = loaded.seconds | {"upload": time.perf_counter() - ready.began}
         self.source = self.scene.source or self.scene.name
-        self.message = None if self.scene.emits else f"{self.scene.name} has no light: try --light for a ceiling light"
+        self.message = None
         self._opened = True
         reference_gone = self.compared.begin(lightmap, scene)
         self._begin()
@@ -394,19 +420,23 @@ class Session:
 
     def set_sky(self, sky: Sky | None) -> None:
         """Another sky, or none. Raises UserError where the solver cannot light by one."""
+        before = self.edited_scene
         self.run.set_sky(sky)
         if self._steady is not None:
             self._steady = self._steady.with_sky(sky)
         if self.solver.issued == 0:
             self._light_begins()
+        self._open_to_the_sky(before)
 
     def set_lights(self, lights: tuple[Light, ...]) -> None:
         """Other lamps without area. Raises UserError where the solver cannot light by them."""
+        before = self.edited_scene
         self.run.set_lights(lights)
         if self._steady is not None:
             self._steady = self._steady.with_lights(lights)
         if self.solver.issued == 0:
             self._light_begins()
+        self._open_to_the_sky(before)
 
     @property
     def flickers(self) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 from app.gpu import Framebuffer, Texture
 from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
-from app.render.exposure import exposure_of, is_trapped
+from app.render.exposure import exposure_of, first_exposure, is_trapped
 from app.render.false_colour import Scale, false_colour_scale
 from app.render.frame import FrameRenderer
 from app.render.layers import LAYER_SHADERS, SEAMS, layers_with
@@ -128,11 +128,18 @@ class View:
             exposure=exposure_of(self.session.lightmap, self._seen(width / height), mean_residual)
         )
 
+    def expose_for_light_to_come(self) -> None:
+        """Set the exposure by a forecast of the light that the scene's lamps will give, as they are now."""
+        width, height = self._size
+        exposure = first_exposure(self.session.lightmap.pool, self._seen(width / height), self.session.edited_scene)
+        self.display = self.display.replace(exposure=exposure)
+
     def look_for_light(self) -> str | None:
         """What to say where all light has been distributed and none of it is where the camera sees anything. Looked up once for a
         solution; it becomes the session's message, too."""
         session = self.session
         if not session.opened or not session.run.converged:
+            self._say_no_longer()
             return None
         state = session.lightmap, session.solver.issued
         if state == self._looked_at:
@@ -142,9 +149,15 @@ class View:
         even = float(np.mean(balance.emitted)) / max(balance.area, 1e-300)
         width, height = self._size
         if not is_trapped(session.lightmap, self._seen(width / height), even):
+            self._say_no_longer()
             return None
         session.message = TRAPPED
         return TRAPPED
+
+    def _say_no_longer(self) -> None:
+        """That light is trapped."""
+        if self.session.message == TRAPPED:
+            self.session.message = None
 
     def _seen(self, aspect: float) -> Texels:
         return seen_texels(self.session.lightmap.pool, self.camera.world_from_camera, self.camera.yfov, aspect)

@@ -23,6 +23,8 @@ from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.records import BATCH
 from app.solvers.shooting.solver import PICTURES, Shooting
 
+LAMPS = ("points", "beyond")
+
 
 @dataclass(frozen=True)
 class Family:
@@ -41,6 +43,8 @@ class Family:
     rays: whether it looks along rays, and so needs a tree of the scene's triangles (visibility/rays.py) before it is made.
     everywhere: whether it lights all surfaces alike, wherever they are seen from; else what is far is known roughly.
     quadratic: whether its work grows with the square of the texels.
+    lamps: what lights a scene besides surfaces that emit: "points", point and spot lights, and what is "beyond" all surfaces, sky
+    and directional lights; leaf_lamps: those of them that quadtrees follow.
     """
 
     title: str
@@ -62,6 +66,8 @@ class Family:
     relights: bool = False
     rays: bool = False
     everywhere: bool = True
+    lamps: tuple[str, ...] = LAMPS
+    leaf_lamps: tuple[str, ...] = LAMPS
 
 
 SOLVERS: dict[str, Family] = {
@@ -77,6 +83,7 @@ SOLVERS: dict[str, Family] = {
         pictures=PICTURES,
         shows=("ambient",),
         layers=("residual",),
+        leaf_lamps=("points",),
     ),
     "gathering": Family(
         title="Gathering",
@@ -122,6 +129,8 @@ SOLVERS: dict[str, Family] = {
         threshold="change",
         quadratic=True,
         rays=True,
+        lamps=(),
+        leaf_lamps=(),
     ),
 }
 DEFAULT_SOLVER = "shooting"

@@ -90,7 +90,7 @@ class Ui:
         state.stats = view.session.stats if view.session.opened else None
         state.fps = FPS_MEMORY * state.fps + (1 - FPS_MEMORY) / io.delta_time if state.fps else 1 / io.delta_time
         if view.session.opened:
-            state.remember(view.session.unedited, view.session.lightmap)
+            state.remember(view.session.edited, view.session.lightmap)
         imgui.new_frame()
         self._build(view, io.delta_time)
         imgui.render()
@@ -160,6 +160,7 @@ class Ui:
         if view.session.opened:
             navigation.navigate(view, state, seconds)
         overlays.invitation(view, state)
+        overlays.no_lamps(view, state)
         self._open_files(view)
         overlays.legend_overlay(state.legend, state)
         overlays.loading_overlay(view.session.on_its_way)

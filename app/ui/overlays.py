@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
 
-from app.ui import edits, theme, widgets
+from app.ui import edits, new_lamps, theme, widgets
 from app.ui.keys import POINTER, SHORTCUTS, flip_pace
 from app.ui.layout import PANELS
 from app.ui.navigation import look_through
@@ -29,6 +29,8 @@ FLOATING = int(
     | imgui.WindowFlags_.always_auto_resize
 )
 LOADING_EM = 24.0
+NO_LAMPS_EM = 22.0
+NO_LAMPS = "Nothing shines in this scene: add a lamp"
 TOAST_EM = 34.0
 LEGEND_EM = (1.2, 13.0)  # width and height of the colour bar
 LEGEND_MARGIN_EM = 1.0
@@ -108,7 +110,9 @@ def _status(view: View, state: State) -> list[tuple[str, theme.RGBA]]:
     if stats is None:
         return [("no scene", theme.DIM)]
     word, colour = (
-        ("converged", theme.GOOD)
+        ("no light", theme.AMBER)
+        if not new_lamps.is_lit(view, state)
+        else ("converged", theme.GOOD)
         if stats.converged
         else ("running", theme.AMBER)
         if view.session.run.running
@@ -164,6 +168,22 @@ def invitation(view: View, state: State) -> None:
     size = imgui.calc_text_size(text)
     at = imgui.ImVec2(left + (width - size.x) / 2, top + (height - size.y) / 2)
     imgui.get_background_draw_list().add_text(at, theme.colour_u32(theme.DIM), text)
+
+
+def no_lamps(view: View, state: State) -> None:
+    """What to do where nothing shines: a button for each kind of lamp, in the middle of the view."""
+    session = view.session
+    if not (session.opened and state.show_ui) or session.on_its_way is not None or new_lamps.is_lit(view, state):
+        return
+    left, top, width, height = state.view_px
+    middle = imgui.ImVec2(left + width / 2, top + height / 2)
+    em = imgui.get_font_size()
+    imgui.set_next_window_pos(middle, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
+    imgui.set_next_window_size(imgui.ImVec2(min(NO_LAMPS_EM * em, width), 0))
+    imgui.begin("##no lamps", None, FLOATING & ~int(imgui.WindowFlags_.always_auto_resize))
+    widgets.wrapped(NO_LAMPS)
+    new_lamps.buttons(view, state)
+    imgui.end()
 
 
 def loading_overlay(loading: Any) -> None:

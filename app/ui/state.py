@@ -85,9 +85,9 @@ class State:
     texture_id: makes a texture of the host drawable; legend: the scale of what is shown now; stats: of the session,
     asked once per frame (None without a scene). atlas, adaptive: edited, not yet applied. view_px: the 3-D view (left, top,
     width, height) [display units]. inspected: what the solver showed last, and of which light. draw_rays: those of the
-    picked texel, in the room. draw_lights: lamps without area, in the view. reference: of a solve in the
-    background; layer: to go back to from the error. edits: of the open scene; held: whether a hand was at a control in the last
-    frame.
+    picked texel, in the room. draw_lights: lamps without area, in the view. reference: of a solve in the background; layer: to
+    go back to from the error. edits: of the open scene; held: whether a hand was at a control in the last frame. used: of which
+    scene, the materials that are somewhere.
     """
 
     measured: bool = True
@@ -124,6 +124,8 @@ class State:
     flight: Flight | None = None
     material: int = 0
     light: int = 0
+    area_lamp: int = 0
+    used: tuple[object, tuple[int, ...]] = (None, ())
     light_held: bool = False
     draw_lights: bool = True
     atlas: AtlasOptions | None = None
@@ -163,7 +165,7 @@ class State:
         if lightmap is not self._known[1]:
             self.picked = self.atlas = self.adaptive = None
         if scene is not self._known[0]:
-            self.flight, self.material, self.light = None, 0, 0
+            self.flight, self.material, self.light, self.area_lamp = None, 0, 0, 0
             self.emission_colours.clear()
             self.edits = EditHistory()
         self._known = scene, lightmap

@@ -38,6 +38,14 @@ class FakeSpace:
         return points
 
 
+class FakeScene(SimpleNamespace):
+    """What lights it follows from what is set."""
+
+    lit_by_sky = property(lambda self: self.sky is not None and self.sky.emits)
+    lit_by_lights = property(lambda self: any(light.emits for light in self.lights))
+    emits = property(lambda self: self.lit_by_sky or self.lit_by_lights or any(m.emits for m in self.materials))
+
+
 class FakeHistory:
     """Sixty shots, each of which leaves 93 % of the residual."""
 
@@ -101,11 +109,10 @@ class FakeSession:
         self.expected = ErrorEstimate(0.016, -0.003, 0.006, 240)
         self.estimate = SimpleNamespace(share=1.0)
         cameras = (SimpleNamespace(name="front", world_from_camera=np.eye(4), yfov=0.7),)
-        self.scene = SimpleNamespace(
-            materials=MATERIALS, warnings=("3 degenerate triangles dropped",), cameras=cameras, sky=None, lights=()
-        )
-        self.scene.bounds = np.zeros(3), np.ones(3)
-        self.scene.material_ids = np.arange(len(MATERIALS))
+        warnings = ("3 degenerate triangles dropped",)
+        self.scene = FakeScene(materials=MATERIALS, warnings=warnings, cameras=cameras, sky=None, lights=())
+        self.scene.corners = np.zeros((len(MATERIALS), 3, 3))
+        self.scene.bounds, self.scene.material_ids = (np.zeros(3), np.ones(3)), np.arange(len(MATERIALS))
         self.scene.normals_areas = np.zeros((len(MATERIALS), 3)), np.ones(len(MATERIALS))
         self.unedited = self.scene
         self.charts = SimpleNamespace(density=40.0, tile=16, warnings=(), size=(160, 96))
@@ -146,6 +153,11 @@ class FakeSession:
         self.compared.comparison = SimpleNamespace(
             light=light, error=error, lit=4001, errors=FakeErrors(), notes=lambda lightmap: ["a note"]
         )
+
+    @property
+    def edited(self) -> object:
+        """Edits of another scene are others."""
+        return self.unedited
 
     @property
     def edited_scene(self) -> SimpleNamespace:
@@ -278,6 +290,12 @@ class FakeSession:
         materials[index] = material
         self.set_materials(tuple(materials))
         self.calls.append(("set_material", index, dataclasses.replace(material)))
+
+    def change_surfaces(self, version: object) -> None:
+        self.calls.append(("change_surfaces", version))
+
+    def expose_for_light_to_come(self) -> None:
+        self.calls.append(("expose_for_light_to_come",))
 
     def set_sky(self, sky: Sky | None) -> None:
         self.scene.sky = sky

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from desks import PICKED, SIZE, VIEW, Desk, desk, session, where
-from fake_session import MATERIALS, FakeSession
+from fake_session import FakeScene, FakeSession
 from imgui_bundle import imgui
 
 from app.atlas.options import AtlasOptions
@@ -284,7 +284,7 @@ def test_the_sun_is_moved_and_the_sky_is_another(gpu: Gpu, monkeypatch: pytest.M
     (sky,) = [call[1] for call in desk.session.calls if call[0] == "set_sky"]
     assert (sky.sun, sky.strength, sky.colour) == (Sun(230, 20), 3.0, before.colour)
     for index, kind in enumerate(("none", "uniform", "clear")):
-        desk.session.unedited = SimpleNamespace(sky=before, materials=MATERIALS)
+        desk.session.unedited = FakeScene(**vars(desk.session.scene) | {"sky": before})
         chosen = {"##kind": index}
         monkeypatch.setattr(imgui, "combo", lambda label, now, *_, c=chosen: (label in c, c.get(label, now)))
         desk.frames(1)

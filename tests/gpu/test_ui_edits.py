@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from desks import VIEW, Desk, desk, session, where
+from fake_session import FakeScene
 from imgui_bundle import imgui
 
 from app.scene.lights import Light
@@ -108,7 +109,7 @@ def test_another_scene_has_another_history(desk: Desk) -> None:
     desk.session.set_options(desk.session.options.replace(level=1))
     desk.frames()
     assert desk.ui.state.edits.undoable == "level"
-    desk.session.unedited = SimpleNamespace(**vars(desk.session.unedited))
+    desk.session.unedited = FakeScene(**vars(desk.session.unedited))
     desk.frames()
     assert desk.ui.state.edits.undoable is None
 

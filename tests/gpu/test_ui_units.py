@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from desks import Desk, desk, session
+from fake_session import MATERIALS
 from imgui_bundle import imgui
 
 from app.scene.lights import Light
@@ -111,7 +112,8 @@ def test_a_right_click_puts_a_lamp_back(desk: Desk, monkeypatch: pytest.MonkeyPa
 def test_lights_are_in_candela_lumen_and_lux(
     desk: Desk, sliders: dict[str, tuple[float, str]], light: Light, texts: tuple[str | None, ...]
 ) -> None:
-    desk.session.scene.lights = (light,)
+    scene = desk.session.scene
+    scene.lights, scene.materials = (light,), (MATERIALS[0],) * len(MATERIALS)
     imgui.set_window_focus("Lights")
     for quantities, strength, flux in (("photometric", *texts[:2]), ("radiometric", *texts[2:])):
         desk.session.display = desk.session.display.replace(quantities=quantities)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from desks import PICKED, VIEW, Desk, desk, session, where
-from fake_session import MATERIALS, FakeSession
+from fake_session import FakeScene, FakeSession
 from imgui_bundle import imgui
 
 from app.atlas.options import AtlasOptions
@@ -33,10 +33,7 @@ def test_another_scene_of_the_same_name_is_another_scene(desk: Desk) -> None:
     assert state.picked is None and state.atlas in (None, session.atlas)
     assert state.material == 2 and state.emission_colours
     select()
-    session.unedited, session.lightmap = (
-        SimpleNamespace(sky=None, materials=MATERIALS),
-        SimpleNamespace(space=session.lightmap.space),
-    )
+    session.unedited, session.lightmap = FakeScene(**vars(session.scene)), SimpleNamespace(space=session.lightmap.space)
     desk.frames()
     assert state.picked is None and state.material == 0
     assert 3 not in state.emission_colours

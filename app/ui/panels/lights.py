@@ -1,4 +1,4 @@
-"""Lights: lamps without area, their strength, colour, cone, place and softness, and the sky. Light follows."""
+"""Lights: all lamps, those without area with their strength, colour, cone, place and softness. Light follows."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 
 from app.scene.lights import Light
-from app.ui import lamp, slider, theme, widgets
-from app.ui.panels import sky
+from app.ui import lamp, new_lamps, slider, theme, widgets
+from app.ui.panels import area_lamps, sky
 from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
@@ -25,16 +25,19 @@ WIDEST = 10.0  # degrees across a directional light
 
 def draw(view: View, state: State) -> None:
     """The whole panel."""
-    if view.session.family.relights:
-        _flicker(view, state)
+    widgets.section("Add a lamp")
+    new_lamps.buttons(view, state)
+    area_lamps.draw(view, state)
     _lamps(view, state)
     sky.draw(view, state)
+    if view.session.family.relights:
+        _flicker(view, state)
 
 
 def _lamps(view: View, state: State) -> None:
     """The section of lamps without area, for a scene that has any."""
     lights = view.session.edited_scene.lights
-    if not lights or not widgets.fold("Without area"):
+    if not lights or not widgets.fold("Lamps without area"):
         return
     state.draw_lights = imgui.checkbox("In the view", state.draw_lights)[1]
     widgets.tooltip("Handles of all lights, to be dragged")
@@ -46,9 +49,15 @@ def _lamps(view: View, state: State) -> None:
     index = min(state.light, len(lights) - 1)
     low, high = view.session.scene.bounds
     imgui.push_id("light")
-    came = _as_read(view, index, lights[index])
-    edited = _editor(lights[index], came, view.display.quantities, float(math.dist(low, high)))
+    size, came = float(math.dist(low, high)), _as_read(view, index, lights[index])
+    edited = _editor(lights[index], came, view.display.quantities, size)
+    duplicate, remove = new_lamps.pair_of_buttons()
     imgui.pop_id()
+    if duplicate:
+        copy = new_lamps.light_beside(view, lights[index], size)
+        state.act(lambda: new_lamps.add_light(view, copy, state))
+    if remove:
+        state.act(lambda: view.session.set_lights((*lights[:index], *lights[index + 1 :])))
     if edited != lights[index]:
         state.act(lambda: view.session.set_lights((*lights[:index], edited, *lights[index + 1 :])))
 

@@ -1,0 +1,147 @@
+"""Lamps are added, copied and taken away while a session is open: the light follows, and edits stay."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from solver_scenes import grey, quads_scene, room
+
+from app.atlas.options import AtlasOptions
+from app.gpu import Gpu
+from app.lightmap.options import LightmapOptions
+from app.scene.model import Camera
+from app.session.session import Session
+from app.session.view import TRAPPED, View
+from app.ui import new_lamps
+from app.ui.new_lamps import KINDS, Kind
+from app.ui.state import State
+
+PATIENCE = 60.0  # s
+CAMERA = Camera("front", np.array([(1, 0, 0, 0.5), (0, 1, 0, 0.5), (0, 0, 1, 0.9), (0, 0, 0, 1.0)]), 0.7)
+SURFACES = [kind for kind in KINDS if not kind.lamps]
+OPEN = [kind for kind in KINDS if kind.lamps]
+
+
+class Dark:
+    """A view of a room without any lamp, and without its front wall."""
+
+    def __init__(self, gpu: Gpu, solver: str = "gathering", *, adaptive: bool = False) -> None:
+        walls = np.delete(room(), 5, axis=0)
+        scene = quads_scene(walls, [grey(0.5), grey(0.2, double_sided=True)], [0, 0, 0, 0, 1])
+        scene = dataclasses.replace(scene, cameras=(CAMERA,))
+        light = LightmapOptions(adaptive=adaptive)
+        self.session = Session(gpu, solver=solver, atlas=AtlasOptions(texels=800), light=light, expose_on_open=True)
+        self.view, self.state = View(self.session), State(view_px=(0, 0, 64, 64))
+        self.session.open_now(scene)
+
+    def add(self, kind: Kind) -> None:
+        kind.add(self.view, self.state)
+        self.wait()
+
+    def wait(self) -> None:
+        end = time.monotonic() + PATIENCE
+        while self.session.on_its_way is not None:
+            assert time.monotonic() < end
+            self.session.poll()
+        self.session.work(32)
+        self.session.run.settle()
+
+    def release(self) -> None:
+        self.view.release()
+        self.session.release()
+
+
+@pytest.fixture
+def dark(gpu: Gpu) -> Iterator[Dark]:
+    dark = Dark(gpu)
+    yield dark
+    dark.release()
+
+
+def mean_light(dark: Dark) -> float:
+    return float(dark.session.lightmap.irradiance().mean())
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.label)
+@pytest.mark.parametrize("solver", ["shooting", "gathering", "local"])
+def test_each_lamp_lights_a_dark_room(gpu: Gpu, solver: str, kind: Kind) -> None:
+    dark = Dark(gpu, solver)
+    camera, exposure = dark.view.camera.world_from_camera.copy(), dark.view.display.exposure
+    assert not new_lamps.is_lit(dark.view, dark.state) and dark.session.message is None
+    assert new_lamps.why_not(dark.view, kind) is None
+    dark.add(kind)
+    assert new_lamps.is_lit(dark.view, dark.state) and mean_light(dark) > 0
+    assert (dark.view.camera.world_from_camera == camera).all(), "the eye stays"
+    assert dark.view.display.exposure != exposure, "exposed for it"
+    dark.release()
+
+
+@pytest.mark.parametrize("kind", SURFACES, ids=lambda kind: kind.label)
+def test_surfaces_come_and_go_and_edits_stay(dark: Dark, kind: Kind) -> None:
+    session = dark.session
+    red = dataclasses.replace(session.materials[1], albedo=(0.6, 0.1, 0.1))
+    session.set_material(1, red)
+    before = session.unedited
+    dark.add(kind)
+    lamp = len(session.materials) - 1
+    assert session.materials[1] is red and session.materials[lamp].emits and session.unedited is not before
+    session.set_material(lamp, dataclasses.replace(session.materials[lamp], emission=(3.0, 2.0, 1.0)))
+    new_lamps.duplicate_surfaces(dark.view, lamp)
+    dark.wait()
+    assert [session.materials[i].emission for i in (-2, -1)] == [(3.0, 2.0, 1.0)] * 2
+    session.set_material(lamp + 1, dataclasses.replace(session.materials[-1], emission=(1.0, 1.0, 1.0)))
+    new_lamps.remove_surfaces(dark.view, lamp)
+    dark.wait()
+    assert len(session.materials) == lamp + 1 and session.materials[1] is red
+    assert session.materials[lamp].emission == (1.0, 1.0, 1.0), "the other one stays, as it was edited"
+    assert mean_light(dark) > 0
+
+
+def test_a_lamp_is_not_added_while_another_comes(dark: Dark) -> None:
+    SURFACES[0].add(dark.view, dark.state)
+    assert new_lamps.why_not(dark.view, SURFACES[1]) == new_lamps.LOADING
+    assert new_lamps.why_not(dark.view, OPEN[0]) is None
+    OPEN[0].add(dark.view, dark.state)
+    dark.wait()
+    assert len(dark.session.edited_scene.lights) == 1 and dark.session.materials[-1].emits, "both are there"
+
+
+def test_sides_that_faced_nothing_are_lit_by_a_sky(dark: Dark) -> None:
+    """The back of a wall that is seen from both sides: light reaches it only from beyond all surfaces."""
+    session = dark.session
+    assert session.charts.dark_faces > 0
+    texels, edited = session.lightmap.texel_count, session.edited
+    dark.add(next(kind for kind in KINDS if kind.label == "Sky"))
+    assert session.charts.dark_faces == 0 and session.lightmap.texel_count > texels
+    assert session.edited is edited, "it can be undone"
+    session.set_sky(None)
+    dark.wait()
+    assert not new_lamps.is_lit(dark.view, dark.state)
+
+
+@pytest.mark.parametrize(
+    ("solver", "adaptive", "known"),
+    [
+        ("shooting", True, {"Point", "Spot"}),
+        ("pairs", False, set()),
+        ("gathering", True, {"Point", "Spot", "Sun", "Sky"}),
+    ],
+)
+def test_what_a_solver_does_not_know_is_not_offered(gpu: Gpu, solver: str, adaptive: bool, known: set[str]) -> None:
+    """And what is offered is taken."""
+    dark = Dark(gpu, solver, adaptive=adaptive)
+    offered = [kind for kind in OPEN if new_lamps.why_not(dark.view, kind) is None]
+    assert {kind.label for kind in offered} == known
+    for kind in offered:
+        dark.add(kind)
+    dark.release()
+
+
+def test_trapped_light_is_said_no_longer_when_it_is_not(dark: Dark) -> None:
+    dark.session.message = TRAPPED
+    dark.view.look_for_light()
+    assert dark.session.message is None

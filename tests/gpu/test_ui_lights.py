@@ -1,0 +1,93 @@
+"""The Lights panel, and what stands over the view of a scene that nothing lights."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from desks import VIEW, Desk, desk, session, where
+from fake_session import FakeScene
+from imgui_bundle import imgui
+
+from app.scene.lights import Light
+from app.solvers import SOLVERS
+from app.ui.new_lamps import KINDS
+
+__all__ = ["desk", "session", "where"]
+
+LABELS = [kind.label for kind in KINDS]
+
+
+def put_out(desk: Desk) -> None:
+    scene = desk.session.scene
+    scene.materials = tuple(replace(material, emission=(0.0, 0.0, 0.0)) for material in scene.materials)
+    desk.frames(3)
+
+
+def test_a_dark_scene_offers_lamps_in_the_view(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
+    desk.frames()
+    assert not set(LABELS) & where.keys(), "there is light"
+    put_out(desk)
+    left, top, width, height = desk.ui.state.view_px
+    for label in LABELS:
+        x, y = where[label]
+        assert left < x < left + width and top < y < top + height, label
+    desk.session.picked = None
+    desk.click(*where["Sky"])
+    assert desk.session.scene.sky.kind == "clear"
+    where.clear()
+    desk.frames(2)
+    assert not set(LABELS) & where.keys(), "what was asked for is there"
+    assert not any("--" in toast.text for toast in desk.ui.state.toasts)
+
+
+def test_lamps_are_added_in_the_panel_too(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
+    desk.front("Lights")
+    desk.click(*where["Sun"])
+    (sun,) = desk.session.scene.lights
+    assert sun.from_afar and sun.emits and desk.ui.state.light == 0
+    desk.click(*where["Point"])
+    assert [light.kind for light in desk.session.scene.lights] == ["directional", "point"] and desk.ui.state.light == 1
+    desk.click(*where["Ceiling"])
+    assert desk.session.calls[-1][0] == "change_surfaces"
+
+
+def test_a_light_is_duplicated_and_removed(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
+    lamps = desk.session.scene = desk.session.unedited = FakeScene(**vars(desk.session.scene))
+    lamps.materials = tuple(replace(material, emission=(0.0, 0.0, 0.0)) for material in lamps.materials)
+    lamps.lights = (Light("a", intensity=(3.0, 2.0, 1.0)), Light("b", "spot"))
+    desk.front("Lights")
+    desk.click(*where["Duplicate"])
+    assert [light.name for light in lamps.lights] == ["a", "b", "point 1"]
+    assert lamps.lights[2].intensity == (3.0, 2.0, 1.0) and lamps.lights[2].position != lamps.lights[0].position
+    desk.ui.state.light = 1
+    desk.frames(2)
+    desk.click(*where["Remove"])
+    assert [light.name for light in lamps.lights] == ["a", "point 1"]
+
+
+def test_lamps_with_area_are_duplicated_and_removed(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
+    desk.front("Lights")
+    for button in ("Duplicate", "Remove"):
+        desk.session.calls.clear()
+        desk.click(*where[button])
+        assert [call[0] for call in desk.session.calls] == ["change_surfaces"], button
+
+
+@pytest.mark.parametrize("solver", list(SOLVERS))
+def test_what_cannot_be_lit_is_grey(desk: Desk, where: dict[str, tuple[float, float]], solver: str) -> None:
+    desk.session.family = SOLVERS[solver]
+    desk.front("Lights")
+    desk.click(*where["Sun"])
+    assert len(desk.session.scene.lights) == (solver != "pairs")
+
+
+def test_the_view_is_free_behind_the_offer(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
+    put_out(desk)
+    before = desk.session.camera.eye.copy()
+    desk.drag((VIEW[0], VIEW[1] + 200), (VIEW[0] + 60, VIEW[1] + 200))
+    assert (desk.session.camera.eye != before).any()
+    desk.key(imgui.Key.f2)
+    where.clear()
+    desk.frames(2)
+    assert not set(LABELS) & where.keys(), "a picture alone"
