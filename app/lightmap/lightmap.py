@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from app.atlas.charts import Charts
-from app.gpu import Gpu, Texture, glsl_constant, keep, take_over
+from app.gpu import Gpu, Texture, keep, take_over
 from app.lightmap.options import STORAGE, LightmapOptions
 from app.lightmap.refinement import Refinement
 from app.lightmap.textures import LightTextures
@@ -16,7 +16,6 @@ from app.lightmap.tile_pool import TilePool
 from app.scene.model import F32, F64, Material, Scene
 from app.util.state import State, StateError
 
-SHARES = np.float32(glsl_constant("common/ambient.glsl", "SHARES"))  # of what is still to come, that a texel may have
 KEPT = ("t_irradiance", "t_residual", "t_ambient")  # of the textures, what is light
 DEFAULT = LightmapOptions()
 _DTYPES = {"f4": np.float32, "f2": np.float16, "f1": np.uint8}
@@ -119,7 +118,7 @@ class Lightmap(LightTextures):
     def with_ambient(self, H: F32) -> F32:
         """H + a of irradiance (…, 3) [W/m²]. Waits for the GPU."""
         *a, share = np.frombuffer(self._textures["t_ambient"].read(), np.float32)
-        most = np.minimum(1, SHARES * share) * np.abs(H)
+        most = share * np.abs(H)
         return np.asarray(H + np.clip(np.array(a) * np.float32(self.unit), -most, most))
 
     def residual(self) -> F32:

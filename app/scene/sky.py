@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from app.scene.clear_sky import clear_sky, sun_irradiance
+from app.scene.lights import Light
 
 F32 = np.ndarray[tuple[int, ...], np.dtype[np.float32]]
 F64 = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
@@ -112,6 +113,15 @@ class Sky:
     def sun_irradiance(self) -> F64:
         """(3,) on a surface that faces the sun, of the sun alone [W/m²]; 0 without one."""
         return np.zeros(3) if self.sun is None else self.scale * sun_irradiance(self.sun.height, self.turbidity)
+
+    @property
+    def sun_light(self) -> Light | None:
+        """The sun as a directional light; none without one, or where it is dark."""
+        if self.sun is None or not self.sun_irradiance.any():
+            return None
+        r, g, b = self.sun_irradiance.tolist()
+        x, y, z = (-self.sun.direction).tolist()
+        return Light("sun", "directional", (r, g, b), direction=(x, y, z), angle=SUN_ANGLE)
 
     @property
     def most_irradiance(self) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.scene.lights import Light
 from app.scene.model import F64
-from app.scene.sky import SUN_ANGLE, Sky, solid_angles
+from app.scene.sky import Sky, solid_angles
 
 COUNTS = (64, 128, 256, 512, 1024)
 ERROR = (
@@ -34,31 +34,33 @@ class Directions(NamedTuple):
 def directions_of(sky: Sky | None, lights: Sequence[Light] = (), error: float = ERROR) -> Directions:
     """Of directional lights and the sun first, then of the sky, such that some of the first are spread over all of it. error: as
     ERROR."""
-    parts = [_disc(-np.array(s.direction), s.angle, np.array(s.intensity)) for s in lights if s.from_afar and s.emits]
-    if sky is not None and sky.sun is not None:
-        parts.append(_disc(sky.sun.direction, SUN_ANGLE, sky.sun_irradiance))
+    sun = None if sky is None else sky.sun_light
+    parts = [
+        disc_directions(light) for light in (*lights, sun) if light is not None and light.from_afar and light.emits
+    ]
     if sky is not None:
-        parts.append(_sky(sky, error))
+        parts.append(sky_directions(sky, error))
     towards, irradiance = (np.concatenate([np.empty((0, 3)), *(part[i] for part in parts)]) for i in (0, 1))
-    lit = irradiance.any(1)
-    return Directions(towards[lit], irradiance[lit])
+    return Directions(towards, irradiance)
 
 
-def _disc(towards: F64, angle: float, irradiance: F64) -> Directions:
-    """Evenly over a disc so far across [Vogel79]; one direction where it is a point."""
-    if angle == 0:
+def disc_directions(light: Light) -> Directions:
+    """Of a directional light or the sun: evenly over the disc that it is seen as [Vogel79]; one direction where it is a point."""
+    towards, irradiance = -np.array(light.direction), np.array(light.intensity)
+    if light.angle == 0:
         return Directions(towards[None], irradiance[None])
     nth = np.arange(SUN_SHOTS)
-    radius, turn = np.sin(angle / 2) * np.sqrt((nth + 0.5) / SUN_SHOTS), 2 * np.pi * GOLDEN * nth
+    radius, turn = np.sin(light.angle / 2) * np.sqrt((nth + 0.5) / SUN_SHOTS), 2 * np.pi * GOLDEN * nth
     x, y = axes_of(towards)
     around = towards + (radius * np.cos(turn))[:, None] * x + (radius * np.sin(turn))[:, None] * y
     around /= np.linalg.norm(around, axis=1, keepdims=True)
     return Directions(around, np.tile(irradiance / SUN_SHOTS, (SUN_SHOTS, 1)))
 
 
-def _sky(sky: Sky, error: float) -> Directions:
-    """As few as are right to that, or the most."""
-    if not sky.shines:
+def sky_directions(sky: Sky, error: float = ERROR) -> Directions:
+    """Of a sky without its sun: as few as are right to that, or the most; some of the first are spread over all of it. error: as
+    ERROR."""
+    if not sky.shines or not sky.scale.any():
         return Directions(np.empty((0, 3)), np.empty((0, 3)))
     normals = NORMALS / np.linalg.norm(NORMALS, axis=1, keepdims=True)
     right = sky.scale * sky.shape_irradiance(normals)
@@ -66,16 +68,20 @@ def _sky(sky: Sky, error: float) -> Directions:
         found = _stratified(sky, count)
         if np.abs(found.on(normals) - right).max() <= error * right.max():
             break
-    return found
+    lit = found.irradiance.any(1)
+    return Directions(found.towards[lit], found.irradiance[lit])
 
 
 def _stratified(sky: Sky, count: int) -> Directions:
-    """So many of equal power: rows of the map by the steps of a count, places in them by the golden ratio."""
+    """So many of equal power, a power of 2: rows of the map by the steps of a count, places in them by the golden ratio. The
+    count goes with its bits reversed, so that the first few are spread over all of the sky, too."""
     light = sky.shape.astype(np.float64)
     height, width, _ = light.shape
     weight = light * solid_angles(width, height)[..., None]
     power = weight.mean(2)
-    nth = np.argsort(np.arange(count) * GOLDEN % 1)  # neighbours in the sky far apart in order
+    nth = np.zeros(1, np.int64)
+    while len(nth) < count:
+        nth = np.concatenate([2 * nth, 2 * nth + 1])
     down, row = _place(np.cumsum(power.sum(1)), (nth + 0.5) / count)
     edges = np.cos(np.linspace(0, np.pi, height + 1))
     up = edges[row] + down * (edges[row + 1] - edges[row])
@@ -107,4 +113,4 @@ def axes_of(towards: F64) -> tuple[F64, F64]:
     return x, np.cross(towards, x)
 
 
-__all__ = ["Directions", "axes_of", "directions_of"]
+__all__ = ["Directions", "axes_of", "directions_of", "disc_directions", "sky_directions"]

@@ -15,7 +15,7 @@ from app.reference.dense import irradiance_at, solve_dense
 from app.scene.lights import Light
 from app.scene.model import Scene
 
-SOLVERS = ("shooting", "gathering", "local")
+SOLVERS = ("shooting", "quadtrees", "gathering", "local")  # quadtrees: shooting on them
 EVERY_SOLVER = pytest.mark.parametrize("solver", SOLVERS)
 FLOOR = [[0, 0, 2], [2, 0, 2], [2, 0, 0], [0, 0, 0]]  # faces up
 POINT = Light("point", intensity=(1.0, 2.0, 3.0), position=(0.8, 1.3, 0.9))
@@ -27,10 +27,12 @@ SPOT = Light("spot", "spot", (5.0, 5.0, 5.0), (1.0, 1.5, 1.0), DOWN, 0.2, 0.7)
 def solved(gpu: Gpu, scene: Scene, solver: str) -> Solution:
     known: dict[str, object] = {
         "shooting": {"density": 8},
+        "quadtrees": {"density": 4, "adaptive": True},
         "gathering": {"density": 8, "smooth": False},
         "local": {"density": 8, "shadow_rays": 64},
     }
-    lit = begin(gpu, scene, solver=solver, **known[solver])  # type: ignore[arg-type]
+    method = "shooting" if solver == "quadtrees" else solver
+    lit = begin(gpu, scene, solver=method, **known[solver])  # type: ignore[arg-type]
     if solver == "gathering":
         lit.gather(64)
     else:

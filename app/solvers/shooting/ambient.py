@@ -1,7 +1,7 @@
 """The ambient term is the irradiance that all unshot light will make on average [Cohen88, section 5].
 
-It is shown and baked with H, and where the storage can hold a residual below zero it is overshot [Feda92]: a patch shoots, with
-its residual, what it will reflect of the ambient light.
+It is shown and baked with H, with the light that is still to come from outside. Where the storage can hold a residual below zero
+that of patches is overshot [Feda92]: a patch shoots, with its residual, what it will reflect of the ambient light.
 """
 
 from __future__ import annotations
@@ -23,20 +23,29 @@ class Ambient:
         self.overshoot_target = gpu.target(self.overshoot)
         self._estimate = Pass(gpu, "solvers/shooting/ambient", slots=RECORDS)
 
-    def update(self, bins: Bins, shots: int = 0, *, shown: bool) -> None:
+    def update(self, bins: Bins, shots: int = 0, *, shown: bool, to_each_given: float) -> None:
         """Estimate it from what is unshot in the bins, and from so many shots of a batch since. shown: also in pictures and
-        bakes."""
-        targets = [self._lightmap.ambient_target] * shown
-        targets += [self.overshoot_target] * (self._lightmap.storage != "fixed8")
-        for target in targets:
+        bakes. to_each_given: see Outside."""
+        ledger = self._ledger
+        outside = tuple((ledger.to_come / ledger.watt).tolist())
+        both = [(False, self._lightmap.ambient_target, outside, to_each_given)] * shown
+        both += [(True, self.overshoot_target, (0.0, 0.0, 0.0), 0.0)] * (self._lightmap.storage != "fixed8")
+        for overshoots, target, to_come, ratio in both:
             self._estimate.draw(
                 target,
                 textures={
                     "t_unshot": bins.unshot,
-                    "t_ledger": self._ledger.texture,
+                    "t_ledger": ledger.texture,
                     "t_shooters": self._shooters.texture,
                 },
-                uniforms={"u_shots": shots, "u_albedo": self._ledger.albedo, "u_area": self._ledger.area},
+                uniforms={
+                    "u_shots": shots,
+                    "u_albedo": ledger.albedo,
+                    "u_area": ledger.area,
+                    "u_overshoots": int(overshoots),
+                    "u_outside": to_come,
+                    "u_to_each_given": ratio,
+                },
             )
 
     def hide(self) -> None:

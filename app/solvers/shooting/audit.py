@@ -22,6 +22,7 @@ from app.solvers.shooting.receive import Receive
 from app.solvers.shooting.records import Shot, powers_of, sizes_of
 from app.solvers.shooting.see import See
 from app.solvers.shooting.shooters import ShooterBatch
+from app.util.state import State
 
 # Shots of so large a share of the emitted power are audited; where one would make or lose more than this share of its own, its
 # patch is divided: a hall under skylights in coffers gains 5.8 % without. A patch of two texels along its edge sees what its
@@ -75,6 +76,17 @@ class Found:
         self._off.clear()
         self._unmended.clear()
 
+    def state(self) -> State:
+        off = [[*patch, off] for patch, off in self._off.items()]
+        unmended = [[chart, left] for chart, left in self._unmended.items()]
+        return State(arrays={"off": np.array(off).reshape(-1, 4), "unmended": np.array(unmended).reshape(-1, 2)})
+
+    def restore(self, state: State) -> None:
+        """Know what is in a ``state``. Raises StateError."""
+        patches = state.array("off", np.float64, -1, 4).tolist()
+        self._off = {(int(x), int(y), int(edge)): off for x, y, edge, off in patches}
+        self._unmended = {int(chart): left for chart, left in state.array("unmended", np.float64, -1, 2).tolist()}
+
     def enter(self, shooter: np.void, off: float) -> None:
         """A patch, SHOOTER, makes that share of its power, or loses it."""
         self._off[_patch_of(shooter)] = off
@@ -107,15 +119,6 @@ class Auditor:
     def begin(self) -> None:
         """Audit batches again: they may be strong again."""
         self.wanted = self._enabled
-
-    @property
-    def sound(self) -> NDArray[np.int64]:
-        """(n, 3) column, row and edge of the patches that passed."""
-        return np.array(sorted(self._sound), np.int64).reshape(-1, 3)
-
-    @sound.setter
-    def sound(self, patches: NDArray[np.int64]) -> None:
-        self._sound = {(x, y, edge) for x, y, edge in patches.tolist()}
 
     def forget(self) -> None:
         """Patches may be others now."""

@@ -32,8 +32,8 @@ from app.solvers.shooting.emitter_groups import EmitterGroups
 from app.solvers.shooting.ledger import Ledger
 from app.solvers.shooting.material_edits import MaterialEdits
 from app.solvers.shooting.options import ShootingOptions
+from app.solvers.shooting.outside import Outside
 from app.solvers.shooting.patch_marks import PatchMarks
-from app.solvers.shooting.point_shots import PointShots
 from app.solvers.shooting.receive import Receive
 from app.solvers.shooting.receivers import Receivers
 from app.solvers.shooting.records import BATCH, Shot, powers_of, shot_of
@@ -57,6 +57,7 @@ class Batch:
         self.occluders, self.receivers = occluders_of(gpu, lightmap), Receivers(gpu, lightmap.pool)
         self.ledger = Ledger(gpu, lightmap, self.shooters)
         self.ambient = Ambient(gpu, lightmap, self.shooters, self.ledger)
+        self.outside = Outside(gpu, lightmap, self.occluders, self.receivers, self.shooters, self.ledger)
         self.marks = PatchMarks(gpu, lightmap)
         self.groups = EmitterGroups(lightmap, self.ledger, self.marks)
         self.auditor = Auditor(gpu, lightmap, self.shooters, self.ledger, enabled=audits)
@@ -69,12 +70,7 @@ class Batch:
         resolution = options.resolution or fitting_resolution(lightmap, ROOT_LEVEL if lightmap.pool.adaptive else 0)
         self.see = See(self._gpu, self.occluders, self.shooters, options, resolution)
         self.receive = Receive(self._gpu, lightmap, self.receivers, self.shooters, self.see, options)
-
-    def point_shots(self) -> PointShots:
-        """What shoots for point and spot lights."""
-        points = PointShots(self._gpu, self._lightmap, self.occluders, self.receivers, self.shooters, self.ledger)
-        points.set_options(self.options, self.see.resolution)
-        return points
+        self.outside.set_options(options, resolution)
 
     # -- the batch -----------------------------------------------------------------------------------------------------
 
@@ -95,6 +91,20 @@ class Batch:
         self.enter(shots)
         return shots
 
+    def shoot_outside(self, shots: int, bands: int) -> Generator[None, None, int]:
+        """The next shots of light from outside, in parts, and see what that leaves to come. How many."""
+        made = yield from self.outside.shoot(shots, bands)
+        for band in range(bands):
+            self.phases.now.sum_blocks(self.marks.texture, self.ambient.overshoot, band, bands)
+            yield
+        self.phases.now.reduce(self.bins)
+        self.update_ambient()
+        return made
+
+    def update_ambient(self, shots: int = 0) -> None:
+        """Estimate what is to come from the bins, and from so many shots of the batch since."""
+        self.ambient.update(self.bins, shots, shown=self.options.ambient, to_each_given=self.outside.to_each_given)
+
     def choose(self, choice: Choice, shots: int, bands: int) -> Iterator[None]:
         """The strongest patches; those that fail their audit are divided, and others chosen. [Coombe03, 3.4]"""
         yield from self.choose_once(choice, shots, bands)
@@ -103,7 +113,7 @@ class Batch:
             failed = [shooter for shooter in failed if self.auditor.found.fails(shooter)]
             self.marks.divide_patches(self._patch_of(shot_of(self._lightmap, shooter)) for shooter in failed)
             yield from self.choose_once(choice, shots, bands)
-        if self.replay is not None:
+        if self.replay is not None and not self.outside.left:
             self.replay.keep_strong()
 
     def _try_quarters(self, shooter: np.void) -> Generator[None, None, None]:
@@ -137,16 +147,18 @@ class Batch:
 
     def enter(self, shots: int) -> None:
         """Enter in the ledger what the batch shot, and see what that leaves to come."""
-        self.ledger.enter(self.see.maps, shots)
-        self.ambient.update(self.bins, shots, shown=self.options.ambient)
+        self.ledger.enter(self.see.maps.escaped, shots)
+        self.update_ambient(shots)
         if self.replay is not None:
             self.replay.log.add(shots)
 
     def unshot(self) -> float:
-        """Σ |Σ r A| over tiles now [stored units · solver area]. Waits for the GPU."""
+        """What is still to be shot: Σ |Σ r A| over tiles now, and from outside [stored units · solver area]. Waits for the
+        GPU."""
         self.phases.now.sum_blocks(self.marks.texture, self.ambient.overshoot)
         self.phases.now.reduce(self.bins)
-        return float(np.frombuffer(self.bins.unshot.read(), np.float32).reshape(-1, 4)[:, 3].astype(np.float64).sum())
+        tiles = np.frombuffer(self.bins.unshot.read(), np.float32).reshape(-1, 4)[:, 3].astype(np.float64)
+        return float(tiles.sum()) + self.outside.power_to_come() / self.ledger.watt
 
     def _patch_of(self, shot: Shot) -> tuple[int, int, int, int]:
         """Its patch, and the finest level of patches there."""
@@ -159,6 +171,7 @@ class Batch:
         if self.replay is not None:
             self.replay.begin()
         self.ledger.clear()
+        self.outside.begin()
         self.ambient.clear()
         self.marks.clear()
         self.auditor.forget()
@@ -237,9 +250,11 @@ class Batch:
         phases, auditor = self.phases, self.auditor
         state = State({"phase": phases.index, "even": phases.even, "audits": auditor.wanted})
         state.values["settled"] = self.groups.settled
-        state.arrays |= {"marks": self.marks.levels.copy(), "sound": auditor.sound}
+        state.arrays["marks"] = self.marks.levels.copy()
         keep(state, overshoot=self.ambient.overshoot)
         state.put("ledger", self.ledger.state())
+        state.put("outside", self.outside.state())
+        state.put("found", auditor.found.state())
         if self.replay is not None:
             state.put("replay", self.replay.state())
         return state
@@ -249,11 +264,13 @@ class Batch:
         self.receivers.follow()
         self.phases.begin(int(state.values["phase"]))
         self.phases.even = bool(state.values["even"])
-        self.auditor.wanted, self.auditor.sound = bool(state.values["audits"]), state.array("sound", np.int64, -1, 3)
+        self.auditor.wanted = bool(state.values["audits"])
+        self.auditor.found.restore(state.part("found"))
         self.groups.settled = float(state.values["settled"])
         self.marks.levels[:] = state.array("marks", np.float32, *self.marks.levels.shape)
         self.marks.upload()
         take_over(state, overshoot=self.ambient.overshoot)
+        self.outside.restore(state.part("outside"))
         self.ledger.restore(state.part("ledger"))
         if self.replay is not None:
             self.replay.restore(state.part("replay"))
@@ -291,6 +308,6 @@ class Batch:
         return passes
 
     def release(self) -> None:
-        parts = self.phases, self.see, self.marks, self.ambient, self.ledger, self.bins, self.receivers
+        parts = self.phases, self.see, self.marks, self.ambient, self.ledger, self.bins, self.receivers, self.outside
         for part in (*parts, *self.occluders, self.shooters, *(() if self.replay is None else (self.replay,))):
             part.release()

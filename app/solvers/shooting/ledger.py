@@ -3,10 +3,14 @@
     emitted = absorbed + escaped + unshot + imbalance
 
 Before a batch shoots, what it is about to shoot is taken from the residual of its patches; the ledger then adds up how much of
-that left the scene, or was lost on black sides without texels. What texels absorbed and still hold is summed tile by tile.
+that left the scene, or was lost on black sides without texels. What texels absorbed and still hold is summed tile by tile. A
+direction of the sky sends out what texels receive of it: all that misses them is none of the scene's.
 """
 
 from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -15,17 +19,19 @@ from app.lightmap.lightmap import Lightmap
 from app.scene.model import F64
 from app.solvers.base import EnergyBalance
 from app.solvers.shooting.records import BATCH, LEDGER, RECORDS
-from app.solvers.shooting.see import Maps
 from app.solvers.shooting.shooters import ShooterBatch
 from app.util.state import State
+
+KNOWN = "lamps", "directions", "points", "to_come"  # RGB [W]
 
 
 class Ledger:
     """The ledger of one lightmap. Whoever makes it releases it.
 
-    emitted: by all lamps and the sky, RGB [W], from_sky: what of that texels got from the sky and directional lights,
-    from_points: what point and spot lights have sent out; albedo: mean of all texels, RGB; area: of all texels, solver space: see
-    ``weigh``. watt: watts in one stored unit of power, the lightmap's unit [W/m²] times solver area.
+    emitted: by all lamps, and from outside, RGB [W]; of that lamps: by those with an area; directions: what has come from the sky
+    and directional lights, as far as it is known; points: what point and spot lights have sent out; to_come: about what of either
+    is still to come. albedo: mean of all texels, RGB; area: of all texels, solver space: see ``weigh``. watt: watts in one stored
+    unit of power, the lightmap's unit [W/m²] times solver area.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch) -> None:
@@ -39,25 +45,38 @@ class Ledger:
             for keeps in (False, True)
         }
         self._add_tiles = Pass(gpu, "solvers/shooting/tile_energy", defines=lightmap.defines("TILE") | reads)
-        self.emitted, self.albedo, self.area = np.zeros(3), (0.0, 0.0, 0.0), 0.0
-        self.from_sky, self.from_points = np.zeros(3), np.zeros(3)
+        self._sum_received = Pass(gpu, "solvers/shooting/tile_received", defines=lightmap.defines("TILE"))
+        self._enter_directions = Pass(gpu, "solvers/shooting/ledger_directions", slots=RECORDS)
+        self.lamps, self.albedo, self.area = np.zeros(3), (0.0, 0.0, 0.0), 0.0
+        self.directions = self.points = self.to_come = np.zeros(3)
         self._fit()
 
     def _fit(self) -> None:
         size = self._lightmap.columns, self._lightmap.rows
         self._tiles = [self._gpu.texture(size, 4, "f4") for _ in range(3)]
         self._tile_target = self._gpu.target(*self._tiles)
+        self._received = self._gpu.texture(size, 4, "f4")
+        self._received_target = self._gpu.target(self._received)
 
     @property
     def watt(self) -> float:
         return self._lightmap.unit * self._lightmap.space.scale**2
 
+    @property
+    def emitted(self) -> F64:
+        return np.asarray(self.lamps + self.directions + self.points + self.to_come)
+
+    def share(self, power: float) -> float:
+        """Power [stored units · solver area] as a share of what is emitted; 0 where nothing is."""
+        emitted = float(self.emitted.sum())
+        return power * self.watt / emitted if emitted > 0 else 0.0
+
     def follow_emission(self) -> None:
-        """See what all that emits sends out now."""
-        self.emitted = self._lightmap.emitted + self.from_sky + self.from_points
+        """See what lamps with an area send out now."""
+        self.lamps = self._lightmap.emitted
 
     def weigh(self) -> None:
-        """See what emitters send out and surfaces reflect. Waits for the GPU."""
+        """See what lamps with an area send out and surfaces reflect. Waits for the GPU."""
         self.follow_emission()
         sums, _, reflectance = self.tile_sums()
         self.area = float(sums[3]) / self.watt
@@ -78,14 +97,32 @@ class Ledger:
             strip=True,
         )
 
-    def enter(self, maps: Maps, shots: int) -> None:
-        """Add to the ledger what the batch shot, and what of it left the scene."""
+    def enter(self, escaped: Texture, shots: int) -> None:
+        """Add to the ledger what the batch shot. escaped: pieces of what of it left the scene, of each shot as many rows."""
         self._enter.draw(
             self.target,
-            textures={"t_escaped": maps.escaped, "t_shooters": self._shooters.texture},
-            uniforms={"u_blocks": maps.escaped_size[1]},
+            textures={"t_escaped": escaped, "t_shooters": self._shooters.texture},
+            uniforms={"u_blocks": escaped.height // BATCH},
             blend="add",
             viewport=(0, 0, shots, LEDGER.rows),
+        )
+
+    @contextlib.contextmanager
+    def directions_shoot(self, shots: int) -> Iterator[None]:
+        """Add to the ledger what texels receive meanwhile, as what so many directions send out."""
+        self._enter_received(-1.0, 0)
+        yield
+        self._enter_received(1.0, shots)
+
+    def _enter_received(self, sign: float, shots: int) -> None:
+        reads = self._lightmap.textures("t_position_area", "t_irradiance")
+        self._sum_received.draw(self._received_target, textures=reads)
+        self._enter_directions.draw(
+            self.target,
+            textures={"t_received": self._received},
+            uniforms={"u_sign": sign, "u_shots": float(shots)},
+            blend="add",
+            viewport=(0, 0, 1, LEDGER.rows),
         )
 
     def tile_sums(self) -> tuple[F64, F64, F64]:
@@ -100,12 +137,13 @@ class Ledger:
         absorbed, unshot, reflectance = self.tile_sums()
         rows = np.frombuffer(self.texture.read(), np.float32).reshape(LEDGER.rows, BATCH, 4).swapaxes(0, 1)
         entries = LEDGER.read(np.ascontiguousarray(rows))
-        escaped, blackened = (entries[name].astype(np.float64).sum(0) * self.watt for name in ("escaped", "blackened"))
+        names = "escaped", "blackened", "directions"
+        escaped, blackened, self.directions = (entries[name].astype(np.float64).sum(0) * self.watt for name in names)
         return EnergyBalance(
             self.emitted,
             absorbed[:3] + blackened,
             escaped,
-            unshot[:3],
+            unshot[:3] + self.to_come,
             reflectance[:3] / max(absorbed[3], 1e-300),
             float(absorbed[3] / self._lightmap.unit),
         )
@@ -113,10 +151,11 @@ class Ledger:
     def clear(self) -> None:
         """Nothing has been shot."""
         self.target.clear()
+        self.directions = self.points = self.to_come = np.zeros(3)
 
     def state(self) -> State:
         """All that was entered and weighed."""
-        known = {"emitted": self.emitted, "from_sky": self.from_sky, "from_points": self.from_points}
+        known = {name: getattr(self, name) for name in KNOWN}
         state = State({"albedo": list(self.albedo), "area": self.area})
         state.arrays.update({name: np.array(power, np.float64) for name, power in known.items()})
         keep(state, entries=self.texture)
@@ -125,16 +164,19 @@ class Ledger:
     def restore(self, state: State) -> None:
         """Have entered what was entered in a ``state``. Raises StateError."""
         take_over(state, entries=self.texture)
-        self.emitted, self.from_sky, self.from_points = (
-            state.array(name, np.float64, 3) for name in ("emitted", "from_sky", "from_points")
-        )
+        for name in KNOWN:
+            setattr(self, name, state.array(name, np.float64, 3))
         red, green, blue = state.values["albedo"]
         self.albedo, self.area = (red, green, blue), float(state.values["area"])
 
     def resize(self) -> None:
         """For a lightmap that has got another number of slots. The ledger stays."""
-        self._gpu.release_all(self._tile_target, *self._tiles)
+        self._release_tiles()
         self._fit()
 
     def release(self) -> None:
-        self._gpu.release_all(self._tile_target, *self._tiles, self.target, self.texture)
+        self._release_tiles()
+        self._gpu.release_all(self.target, self.texture)
+
+    def _release_tiles(self) -> None:
+        self._gpu.release_all(self._tile_target, *self._tiles, self._received_target, self._received)

@@ -34,12 +34,17 @@ SHOOTER = Struct(
     "vec3 edge_v, int patch_y",
     "vec3 exitance, int signed_size",
 )
-# Of one column of shots: power that left the scene, how many shots; power that black sides took; all that was shot [stored units
-# · area].
-LEDGER = Struct("Ledger", "vec3 escaped, float shots", "vec3 blackened", "vec3 shot")
-# unshot: power before the batch, Σ |Σ r A| over tiles; to_shoot: of all patches, with the overshoot; strongest: of one patch.
-# escaped and shots: of the ledger so far.
-REPORT = Struct("Report", "float unshot, float to_shoot, float strongest", "vec3 escaped, float shots")
+# Of one column of shots: power that left the scene, how many shots; power that black sides took; all that was shot; and
+# what came from directions, all of which texels received [stored units · area].
+LEDGER = Struct("Ledger", "vec3 escaped, float shots", "vec3 blackened", "vec3 shot", "vec3 directions")
+# Of the lightmap as it was: unshot: power, Σ |Σ r A| over tiles; to_shoot: of all patches, with the overshoot; strongest: of one
+# patch. escaped, shots and directions: of the ledger so far.
+REPORT = Struct(
+    "Report",
+    "float unshot, float to_shoot, float strongest",
+    "vec3 escaped, float shots",
+    "vec3 directions",
+)
 
 RECORDS: dict[str, str | Glsl] = {s.name.lower(): s.glsl for s in (SHOOTER, LEDGER, REPORT)}  # slots of a Pass
 IN_BLOCKS = {"BATCH": BATCH, "BLOCK_ROWS": BLOCK_ROWS}  # defines of what reads shooters as uniforms

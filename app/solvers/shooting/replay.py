@@ -24,9 +24,11 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
 from app.lightmap.textures import QUAD_FORMAT, quads
 from app.lightmap.tile_pool import Moves
+from app.scene.lights import Light
 from app.scene.model import F64
 from app.solvers.shooting.material_edits import MaterialEdits
-from app.solvers.shooting.point_shots import PointShots
+from app.solvers.shooting.outside import Outside
+from app.solvers.shooting.outside_sources import OutsideShot
 from app.solvers.shooting.receive import Receive
 from app.solvers.shooting.receivers import receiver_meshes
 from app.solvers.shooting.records import BLOCK_ROWS
@@ -98,7 +100,8 @@ class Replay:
         if self._strong is not None:
             keep(state, strong=self._strong[0])
         if (pending := self.under_way) is not None:
-            state.values["pending"] = [pending.next, pending.end, pending.weak, pending.points_done]
+            state.values["pending"] = [pending.next, pending.end, pending.weak, pending.from_outside]
+            state.values["pending_outside"] = [shot.values for shot in pending.outside]
             state.arrays["pending"] = pending.slots
             keep(state, correction=self._correction)
         return state
@@ -116,10 +119,12 @@ class Replay:
             self._strong = self._texels()
             take_over(state, strong=self._strong[0])
         if "pending" in state.values:
-            following, end, weak, points_done = state.values["pending"]
-            self.under_way = Pending(self._gpu, self._lightmap, self._slots(state, "pending"), min(end, self.log.count))
-            self.under_way.next, self.under_way.weak = int(following), bool(weak)
-            self.under_way.points_done = bool(points_done)
+            following, end, weak, from_outside = state.values["pending"]
+            known: dict[Light, Light] = {}
+            outside = [OutsideShot.of(values, known) for values in state.values["pending_outside"]]
+            slots, end = self._slots(state, "pending"), min(end, self.log.count)
+            pending = self.under_way = Pending(self._gpu, self._lightmap, slots, end, outside)
+            pending.next, pending.weak, pending.from_outside = int(following), bool(weak), int(from_outside)
             take_over(state, correction=self._correction)
 
     def _slots(self, state: State, name: str) -> NDArray[np.int64]:
@@ -143,7 +148,7 @@ class Replay:
         self._weak = self._weak or (strongest < STRONG and unshot < MOSTLY_SHOT)
 
     def keep_strong(self) -> None:
-        """Keep H as S once only weak shots are left, before the first of them."""
+        """Keep H as S once only weak shots of patches are left, before the first of them."""
         if self._weak and self._strong is None and self._lightmap.storage != "fixed8":
             self._strong, self._strong_shots = self._texels(), self.log.count
             H = self._lightmap.texture("t_irradiance")
@@ -188,22 +193,24 @@ class Replay:
         """Whether so many shots were made since the last time that it costs little beside them."""
         return self.log.count >= self._replayed_at + REPLAY_AFTER * self._replayed
 
-    def start(self) -> None:
+    def start(self, outside: Outside) -> None:
         """Begin the replay into all fresh leaves."""
         slots = np.array(sorted(self.fresh), np.int64)
         end = self.log.count if self._strong is None else self._strong_shots
-        self.under_way = Pending(self._gpu, self._lightmap, slots, end)
+        self.under_way = Pending(self._gpu, self._lightmap, slots, end, outside.given())
         self._subtract_inherited(self.under_way)
 
-    def work(self, see: See, receive: Receive, points: PointShots | None, bands: int) -> Generator[None, None, int]:
-        """What point and spot lights gave, or one batch of the log once more, for fresh leaves only, in parts; after the last,
-        its sum takes the place of what was inherited, and nothing is under way. How many shots."""
+    def work(self, see: See, receive: Receive, outside: Outside, bands: int) -> Generator[None, None, int]:
+        """A batch of what came from outside, or of the log, once more, for fresh leaves only, in parts; after the last, its sum
+        takes the place of what was inherited, and nothing is under way. How many shots."""
         pending = self.under_way
         assert pending is not None
-        if points is not None and not pending.points_done:
-            yield from points.replay(self._correction_target, pending.receivers, bands)
-            pending.points_done = True
-            return 0
+        if pending.outside:
+            made = yield from outside.replay(
+                pending.outside, self._correction_target, pending.receivers, pending.quads, bands
+            )
+            pending.outside = pending.outside[made:]
+            return made
         if pending.next < pending.end:
             shots = min(self.log.recall(pending.next), pending.end - pending.next)
             for first, some in see.groups(shots):
@@ -220,13 +227,13 @@ class Replay:
             self._subtract_inherited(pending)
             return 0
         self.fresh.difference_update(pending.slots.tolist())
-        self._replayed_at, self._replayed = self.log.count, pending.end
+        self._replayed_at, self._replayed = self.log.count, pending.cost
         self.stop()
         return 0
 
     def once(self, receive: Receive) -> None:
         """The shot that was chosen last once more, into all leaves."""
-        pending = Pending(self._gpu, self._lightmap, np.flatnonzero(self._lightmap.pool.used), 1)
+        pending = Pending(self._gpu, self._lightmap, np.flatnonzero(self._lightmap.pool.used), 1, [])
         self._subtract_inherited(pending)
         receive.draw_into(self._correction_target, 0, 1, meshes=pending.receivers)
         self._apply_correction(pending)
@@ -264,14 +271,21 @@ class Replay:
 
 class Pending:
     """A replay that is under way: the slots of its leaves, their quads and receivers, and which shots are still to be made into
-    them: strong ones, or all where S is not kept yet, and then weak ones."""
+    them: what came from outside, strong ones, or all where S is not kept yet, and then weak ones."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, slots: NDArray[np.int64], shots: int) -> None:
+    def __init__(
+        self, gpu: Gpu, lightmap: Lightmap, slots: NDArray[np.int64], shots: int, outside: list[OutsideShot]
+    ) -> None:
         self._gpu, self.slots, self.next, self.end, self.weak = gpu, slots, 0, shots, False
-        self.points_done = False  # whether it has what point and spot lights gave
+        self.outside, self.from_outside = outside, len(outside)
         place = lightmap.pool.corners(slots)
         self.quads = Mesh(gpu, quads(place, lightmap.pool.tile, place).tobytes(), QUAD_FORMAT, per_instance=True)
         self.receivers = receiver_meshes(gpu, lightmap.pool, slots)
+
+    @property
+    def cost(self) -> int:
+        """Shots that are made again in all."""
+        return self.end + self.from_outside
 
     def release(self) -> None:
         self._gpu.release_all(self.quads, *self.receivers.values())

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change
@@ -23,22 +22,18 @@ from app.scene.sky import Sky
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.shooting.audit import Audit
 from app.solvers.shooting.batch import Batch
-from app.solvers.shooting.choose import Choice
 from app.solvers.shooting.material_edits import MaterialEdits, needs_restart
 from app.solvers.shooting.options import ShootingOptions
-from app.solvers.shooting.point_shots import PointShots
+from app.solvers.shooting.outside import Sent
 from app.solvers.shooting.records import BATCH, Shot, powers_of, shot_of, sizes_of
-from app.solvers.shooting.reports import Reports
-from app.solvers.shooting.sky_shots import SkyShots
+from app.solvers.shooting.reports import Report, Reports
 from app.util.parts import UnderWay, run_to_end
-from app.util.state import State, StateError
+from app.util.state import State
 from app.visibility.item_image import ItemImage
 
 LOOK_AFTER = 32  # shots, or a quarter of all, between two looks at leaves that did not change at the last
 SIGHT = "What the last shooter saw"
 PICTURES = {SIGHT: "All that the patch that shot last sees, one colour per surface"}
-NO_SKY = "--solver shooting: quadtrees do not follow the light of the sky; uniform texels do, and --solver gathering"
-NO_LIGHTS = "--solver shooting: quadtrees do not follow directional lights; uniform texels do, and --solver gathering"
 CHANGES_PER_SHOT = 8  # leaves that split or merge, for each shot of a piece of work: bounded work for a frame
 
 
@@ -51,8 +46,6 @@ class Shooting:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool = True) -> None:
         """audits: whether strong shots are tried before they are made."""
-        _check_sky(lightmap, lightmap.scene.sky)
-        _check_lights(lightmap, lightmap.scene.lights)
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
         self.batch = Batch(gpu, lightmap, options, audits=audits)
         if lightmap.refinement is not None:
@@ -60,12 +53,10 @@ class Shooting:
         self._reports, self._edits, self._picture = Reports(gpu), MaterialEdits(gpu, lightmap), ItemImage(gpu)
         self._under_way = UnderWay()
         self._progress = Progress(0, 1.0, np.zeros(3))  # but for what follows from now
-        self._look_at = 0  # shots in the log at which leaves are looked at again
+        self._look_at = 0  # shots at which leaves are looked at again
         self.issued = 0
         self.last_shot: Shot | None = None
-        self._points: PointShots | None = None  # where there have been point or spot lights
-        self._sky: SkyShots | None = None  # where there has been a sky, or a directional light
-        self._before_sky = np.zeros(3)  # what texels had received when it began to shoot, RGB [W]
+        self._strongest = 0.0  # power of the strongest patch, as far as it is known [W]
         self.reset()
 
     # -- work ----------------------------------------------------------------------------------------------------------
@@ -75,124 +66,53 @@ class Shooting:
         batch, those too weak beside its best are left for later, and not counted once ``poll`` has the report of it."""
         self._under_way.finish()
         shots = min(amount, BATCH)
-        if self._points is not None and self._points.left:
-            return self._under_way.begin(self._shoot_points(self._points, shots, bands))
-        if self._sky_left:
-            return self._under_way.begin(self._shoot_sky(shots, bands))
         parts = self._shoot(shots, bands) if self.batch.replay is None else self._follow_leaves(shots, bands)
         return self._under_way.begin(parts)
 
     def _shoot(self, shots: int, bands: int) -> Generator[None, None, int]:
-        """A batch, and the report of it."""
-        choice = self.batch.phases.now
-        made = yield from self.batch.shoot(choice, shots, bands)
+        """A batch of patches, or of light from outside where that is stronger, and the report of it."""
+        batch, outside = self.batch, self.batch.outside
+        from_outside = outside.left > 0 and (outside.next_power >= self._strongest or batch.phases.even)
+        if from_outside:
+            choice, made = None, (yield from batch.shoot_outside(shots, bands))
+        else:
+            choice = batch.phases.now
+            made = yield from batch.shoot(choice, shots, bands)
         self.issued += made
-        self._reports.send(choice, self.batch.bins, self.batch.ledger, self.batch.shooters)
+        sent = outside.sent if from_outside else Sent(outside.sent.to_come)
+        self._reports.send(choice, batch.bins, batch.ledger, batch.shooters, sent)
         return made
-
-    # -- lamps without area and the sky, see point_shots.py and sky_shots.py --------------------------------------------
-
-    @property
-    def _points_left(self) -> bool:
-        """Whether light of point and spot lights is still to be shot."""
-        return self._points is not None and self._points.left > 0
-
-    @property
-    def _sky_left(self) -> bool:
-        """Whether light of the sky, or of directional lights, is still to be shot."""
-        return self._sky is not None and self._sky.left > 0
-
-    @property
-    def _sky_shoots(self) -> bool:
-        """Whether it shoots now: points go first."""
-        return self._sky_left and not self._points_left
-
-    def _shoot_points(self, points: PointShots, shots: int, bands: int) -> Generator[None, None, int]:
-        """The next point and spot lights; after the last the sky or patches go on."""
-        made = yield from points.shoot(shots, bands)
-        self.issued += made
-        self.batch.ledger.from_points = points.flux
-        self.batch.ledger.follow_emission()
-        self._progress = replace(self._progress, done=self.issued)  # what surfaces reflect of it is all to come
-        if not points.left:
-            self._patches_go_on()
-        return made
-
-    def _patches_go_on(self) -> None:
-        """All lamps without area have shot what they had to: see what that leaves to patches, or to the sky."""
-        self.batch.weigh()
-        if self._sky is not None and self._sky_left:
-            self._before_sky = self._received()
-            self._progress = replace(self._progress, remaining=self._sky.share_left)
-            return
-        self._progress = replace(self._progress, remaining=self._share(self.batch.unshot()))
-        self.batch.ambient.update(self.batch.bins, shown=self.options.ambient)
-
-    def _shoot_sky(self, shots: int, bands: int) -> Generator[None, None, int]:
-        """The next directions of the sky; after the last, what it gave is known, and patches go on."""
-        assert self._sky is not None
-        made = yield from self._sky.shoot(shots, bands)
-        self.issued += made
-        self._progress = replace(self._progress, done=self.issued, remaining=self._sky.share_left)
-        if not self._sky.left:
-            self._enter_sky()
-            self._patches_go_on()
-        return made
-
-    def _enter_sky(self) -> None:
-        """Enter in the ledger what texels have got from the sky since it began to shoot, and begin anew with that."""
-        received = self._received()
-        ledger = self.batch.ledger
-        ledger.from_sky = ledger.from_sky + received - self._before_sky
-        ledger.follow_emission()
-        self._before_sky = received
-
-    def _received(self) -> F64:
-        """What texels have received so far, with the emission of lamps, RGB [W]: it does not follow albedos. Waits for the
-        GPU."""
-        absorbed, unshot, _ = self.batch.ledger.tile_sums()
-        return absorbed[:3] + unshot[:3]
 
     def set_sky(self, sky: Sky | None) -> None:
         """Another sky: the difference is shot. Begins again where nothing is left to emit, and where the storage holds no
-        negative light. Raises UserError."""
-        _check_sky(self.lightmap, sky)
+        negative light."""
         self._under_way.finish()
         self.lightmap.set_sky(sky)
-        self._follow_edit(points=False)
+        self._follow_outside()
 
     def set_lights(self, lights: tuple[Light, ...]) -> None:
-        """Other lamps without area, as of another sky. Raises UserError."""
-        _check_lights(self.lightmap, lights)
+        """Other lamps without area, as of another sky."""
         self._under_way.finish()
         self.lightmap.set_lights(lights)
-        self._follow_edit(points=True)
+        self._follow_outside()
 
-    def _follow_edit(self, *, points: bool) -> None:
-        """Let the difference that another sky, or other lights make be shot. points: whether point and spot lights are others."""
-        scene = self.lightmap.scene
-        missing = self._points is None if any(not light.from_afar for light in scene.lights) else False
-        missing |= self._sky is None if scene.lit_by_sky or any(light.from_afar for light in scene.lights) else False
-        if missing or not self.issued or not scene.emits or self.lightmap.storage != "rgba32f":
+    def _follow_outside(self) -> None:
+        """Let the difference that another sky, or other lights make be shot."""
+        batch = self.batch
+        if not self.issued or not self.lightmap.scene.emits or self.lightmap.storage != "rgba32f":
             self.reset()
             return
         self.poll(wait=True)
-        if self._sky_shoots:
-            self._enter_sky()
-        if self.lightmap.refinement is not None and self.batch.replay is not None:
+        if self.lightmap.refinement is not None and batch.replay is not None:
             self.lightmap.refinement.begin_again()
-            self.batch.replay.stop()
-            self.batch.replay.forget_strong()
+            batch.replay.stop()
+            batch.replay.forget_strong()
             self._look_at = 0
-        if self._points is not None and points:
-            self._points.change(scene.lights)
-        if self._sky is not None:
-            self._sky.change(scene.sky, scene.lights)
-            self._before_sky = self._received()
-        self.batch.phases.begin()
-        self.batch.auditor.begin()
-        to_come = self._points_left or self._sky_left
-        self._progress = replace(self._progress, remaining=1.0 if to_come else self._unshot_share())
+        batch.outside.change()
+        batch.weigh()
+        batch.phases.begin()
+        batch.auditor.begin()
+        self._progress = replace(self._progress, remaining=self._unshot_share())
 
     # -- leaves of quadtrees -------------------------------------------------------------------------------------------
 
@@ -201,16 +121,16 @@ class Shooting:
         left; not until the leaves have followed options that were changed. Then, now and then, a look at the leaves."""
         refinement, replay = self.lightmap.refinement, self.batch.replay
         assert refinement is not None and replay is not None
-        made, done = 0, bool(replay.log.count) and self._all_shot
+        made, done = 0, bool(self._clock) and self._all_shot
         if replay.under_way is not None:
-            made = yield from replay.work(self.batch.see, self.batch.receive, self._points, bands)
+            made = yield from replay.work(self.batch.see, self.batch.receive, self.batch.outside, bands)
             if replay.under_way is None:
                 self._corrected()
         elif replay.fresh and (refinement.stable if done or replay.all_again else replay.is_cheap):
-            replay.start()
+            replay.start(self.batch.outside)
         elif not done and (refinement.stable or not replay.all_again):
             made = yield from self._shoot(shots, bands)
-        clock = replay.log.count
+        clock = self._clock
         if replay.under_way is None and (not refinement.stable or done or clock >= self._look_at):
             yield
             yield from refinement.look(CHANGES_PER_SHOT * shots, bands, clock)
@@ -218,6 +138,12 @@ class Shooting:
                 self._look_at = clock + max(LOOK_AFTER, clock // 4)
         replay.all_again &= self._refining
         return made or shots
+
+    @property
+    def _clock(self) -> int:
+        """Shots that leaves have followed, or are to follow."""
+        replay = self.batch.replay
+        return self.batch.outside.made + (0 if replay is None else replay.log.count)
 
     def _corrected(self) -> None:
         """Fresh leaves have got their light: less or more is unshot now, and what was judged is gone."""
@@ -234,8 +160,8 @@ class Shooting:
         """The newest progress that has arrived: the state before the work that sent it; with ``wait`` that of the last."""
         if wait:
             self._under_way.finish()
-        for choice, report, shooter in self._reports.arrived(wait=wait):
-            self._follow_report(choice, report, shooter)
+        for report in self._reports.arrived(wait=wait):
+            self._follow_report(report)
         if self._reports.all_arrived:
             self.issued = self._progress.done
         refinement = self.lightmap.refinement
@@ -243,39 +169,41 @@ class Shooting:
         converged = bool(self._all_shot) and not refining
         return replace(self._progress, converged=converged, refining=refining, note=note)
 
-    def _follow_report(self, choice: Choice | None, report: np.void, shooter: np.void) -> None:
-        """Take in the REPORT of a batch of this choice, and its first SHOOTER."""
-        unshot, options = self._share(float(report["unshot"])), self.options
-        if choice is not None and choice is self.batch.phases.now:
+    def _follow_report(self, report: Report) -> None:
+        """Take in what became of a batch."""
+        batch, values, choice = self.batch, report.values, report.choice
+        ledger, outside = batch.ledger, batch.outside
+        outside.follow(values["directions"].astype(np.float64) * ledger.watt, report.sent)
+        to_come = ledger.share(outside.power_to_come(report.sent) / ledger.watt)
+        unshot = ledger.share(float(values["unshot"])) + to_come
+        if choice is batch.phases.now:
             if choice.settles:
-                finer = float(report["strongest"]) <= self.batch.groups.settled
+                finer = float(values["strongest"]) <= batch.groups.settled
             else:
-                finer = self.batch.phases.follow(unshot, self._share(float(report["to_shoot"])), options.residual)
+                to_shoot = ledger.share(float(values["to_shoot"])) + to_come
+                finer = batch.phases.follow(unshot, to_shoot, self.options.residual)
             if finer:
-                self.batch.shoot_finer()
-        escaped = report["escaped"].astype(np.float64) * self.batch.ledger.watt
-        from_sky = 0 if self._sky is None else self._sky.made
-        self._progress = Progress(int(report["shots"]) + from_sky, unshot, escaped)
-        if sizes_of(shooter):
-            self.last_shot = shot_of(self.lightmap, shooter)
-        if self.batch.replay is not None and choice is self.batch.phases.now:
-            self.batch.replay.follow_power(self._share(float(powers_of(shooter))), unshot)
-
-    def _share(self, power: float) -> float:
-        """Power [stored units · solver area] as a share of what is emitted; 0 where nothing is."""
-        emitted = float(self.batch.ledger.emitted.sum())
-        return power * self.batch.ledger.watt / emitted if emitted > 0 else 0.0
+                batch.shoot_finer()
+        self._strongest = float(values["strongest"]) * ledger.watt
+        self._progress = Progress(int(values["shots"]), unshot, values["escaped"].astype(np.float64) * ledger.watt)
+        if choice is None:
+            return
+        if sizes_of(report.shooter):
+            self.last_shot = shot_of(self.lightmap, report.shooter)
+        if batch.replay is not None and choice is batch.phases.now:
+            batch.replay.follow_power(ledger.share(float(powers_of(report.shooter))), unshot)
 
     def _unshot_share(self) -> float:
-        """The residual now, Σ |Σ r A| over tiles, as a share of the emitted power. Waits for the GPU."""
+        """What is unshot now, as a share of the emitted power. Waits for the GPU."""
         self._under_way.finish()
-        return self._share(self.batch.unshot())
+        return self.batch.ledger.share(self.batch.unshot())
 
     @property
     def _all_shot(self) -> bool:
         """Whether the finest patches have shot, and no more is unshot than asked for."""
-        even = self.batch.phases.even and not self._sky_left and not self._points_left
-        return even and self._progress.remaining <= self.options.residual
+        return (
+            self.batch.phases.even and not self.batch.outside.left and self._progress.remaining <= self.options.residual
+        )
 
     @property
     def _refining(self) -> bool:
@@ -283,25 +211,18 @@ class Shooting:
         more."""
         refinement, replay = self.lightmap.refinement, self.batch.replay
         assert refinement is not None and replay is not None
-        judged = refinement.stable and not (self._all_shot and refinement.looked_at < replay.log.count)
+        judged = refinement.stable and not (self._all_shot and refinement.looked_at < self._clock)
         return not judged or bool(replay.fresh) or replay.under_way is not None
 
     def settle(self) -> Progress:
         """End the work under way, and measure what is unshot."""
         self.poll(wait=True)
-        to_come = float(self._points_left)
-        if self._sky is not None and self._sky_left:
-            to_come = max(to_come, self._sky.share_left)
-        if self._sky_shoots:
-            self._enter_sky()
-        self._progress = replace(self._progress, remaining=max(self._unshot_share(), to_come))
+        self._progress = replace(self._progress, remaining=self._unshot_share())
         return self.poll()
 
     def energy(self) -> EnergyBalance:
         """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
-        self._under_way.finish()
-        if self._sky_shoots:
-            self._enter_sky()
+        self.poll(wait=True)
         return self.batch.ledger.balance()
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
@@ -314,21 +235,9 @@ class Shooting:
         self._look_at = 0
         self._reports.drop()
         self.lightmap.clear()
-        self.batch.ledger.from_sky = self.batch.ledger.from_points = np.zeros(3)
         self.batch.begin()
-        self.issued, self.last_shot = 0, None
-        scene, batch = self.lightmap.scene, self.batch
-        if self._points is None and any(not light.from_afar for light in scene.lights):
-            self._points = batch.point_shots()
-        if self._points is not None:
-            self._points.begin(scene.lights)
-        if self._sky is None and (scene.lit_by_sky or any(light.from_afar for light in scene.lights)):
-            self._sky = SkyShots(self.gpu, self.lightmap, batch.occluders)
-        if self._sky is not None:
-            self._sky.begin(scene.sky, scene.lights)
-            self._before_sky = self._received()
-        lit = self._points_left or self._sky_left or batch.ledger.emitted.sum() > 0
-        self._progress = Progress(0, 1.0 if lit else 0.0, np.zeros(3))
+        self.issued, self.last_shot, self._strongest = 0, None, 0.0
+        self._progress = Progress(0, 1.0 if self.batch.ledger.emitted.sum() > 0 else 0.0, np.zeros(3))
 
     def set_options(self, options: ShootingOptions) -> None:
         """Use other knobs from the next shot on."""
@@ -341,12 +250,10 @@ class Shooting:
             self.batch.replay.stop()
         self.options = options
         self.batch.set_options(options)
-        if self._points is not None:
-            self._points.set_options(options, self.batch.see.resolution)
         self.batch.ambient.hide()
         if self.issued:
             self.batch.unshot()
-            self.batch.ambient.update(self.batch.bins, shown=options.ambient)
+            self.batch.update_ambient()
 
     def set_observer(self, position: F64) -> None:
         """The light is the same wherever it is seen from."""
@@ -364,20 +271,16 @@ class Shooting:
         if self.lightmap.refinement is not None:
             self.lightmap.refinement.begin_again()
             self._look_at = 0
-        if self._sky_shoots:
-            self._enter_sky()
-        lit = self._sky is not None or self._points is not None
-        scaled = np.ones(3) if lit else self.lightmap.common_factor(materials)  # not of their light
-        factor, before = scaled, self.lightmap.scene.materials
+        lit = batch.outside.left or batch.outside.made
+        factor = np.ones(3) if lit else self.lightmap.common_factor(materials)  # not of light from outside
+        before = self.lightmap.scene.materials
         batch.scale(self._edits, factor)
         self._edits.enter(materials, factor)
         batch.weigh(at_least=batch.groups.settled * float(factor.max()))
         if not np.allclose([m.emission for m in materials], [m.emission * factor for m in before]):
             batch.groups.divide(batch.phases)
         self._progress = replace(self._progress, remaining=self._unshot_share())
-        batch.ambient.update(batch.bins, shown=self.options.ambient)
-        if self._sky_shoots:
-            self._before_sky = self._received()
+        batch.update_ambient()
 
     # -- leaves that come and go, see app/lightmap/refinement.py -------------------------------------------------------
 
@@ -404,27 +307,18 @@ class Shooting:
         """Besides the batch's own, the reports on their way: they decide later what shoots next."""
         self._under_way.finish()
         state = State({"progress": self._progress.measured, "issued": self.issued, "look_at": self._look_at})
-        state.values["before_sky"] = self._before_sky.tolist()
+        state.values["strongest"] = self._strongest
         state.put("batch", self.batch.state())
         state.put("reports", self._reports.state(self.batch.phases.choices))
-        for name, shots in (("points", self._points), ("sky", self._sky)):
-            if shots is not None:
-                state.put(name, shots.state())
         return state
 
     def restore(self, state: State) -> None:
         """The last shot is not known until the next is."""
-        for name, shots in (("points", self._points), ("sky", self._sky)):
-            kept = state.part(name)
-            if shots is not None and kept.values:
-                shots.restore(kept)
-            elif shots is not None or kept.values:
-                raise StateError(f"it has other {name} to shoot")
         self.batch.restore(state.part("batch"))
         self._reports.restore(state.part("reports"), self.batch.phases.choices)
         self._progress, self.issued = Progress.of(state.values["progress"]), int(state.values["issued"])
         self._look_at = int(state.values["look_at"])
-        self._before_sky = np.array(state.values["before_sky"], np.float64).reshape(3)
+        self._strongest = float(state.values["strongest"])
 
     # -- what there is to see ------------------------------------------------------------------------------------------
 
@@ -486,10 +380,7 @@ class Shooting:
             run()
             self.gpu.ctx.finish()
             yield
-        for others in (self._points, self._sky):
-            if others is not None and others.left:
-                run_to_end(others.shoot(1, 1))
-                yield
+        yield from self.batch.outside.warm_up()
         for choice in self.batch.phases.choices[1:]:
             run_to_end(self.batch.choose_once(choice, 1))
             self.gpu.ctx.finish()
@@ -499,21 +390,8 @@ class Shooting:
         refinement = self.lightmap.refinement
         if refinement is not None and refinement.follower is self:
             refinement.follower = None
-        others = [one for one in (self._points, self._sky) if one is not None]
-        for part in (self._reports, self._picture, self.batch, *others):
+        for part in (self._reports, self._picture, self.batch):
             part.release()
-
-
-def _check_sky(lightmap: Lightmap, sky: Sky | None) -> None:
-    """Raise UserError for a sky whose light cannot be shot."""
-    if lightmap.refinement is not None and sky is not None and sky.emits:
-        raise UserError(NO_SKY)
-
-
-def _check_lights(lightmap: Lightmap, lights: tuple[Light, ...]) -> None:
-    """Raise UserError for lamps without area whose light cannot be shot."""
-    if lightmap.refinement is not None and any(light.emits and light.from_afar for light in lights):
-        raise UserError(NO_LIGHTS)
 
 
 __all__ = ["Shooting"]

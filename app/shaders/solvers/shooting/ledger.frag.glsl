@@ -16,5 +16,5 @@ void main() {
     for (int y = shot * u_blocks; row < 2 && y < (shot + 1) * u_blocks; ++y)
         for (int x = 0; x < textureSize(t_escaped, 0).x; ++x) share += texelFetch(t_escaped, ivec2(x, y), 0).rg;
     vec3 power = s.exitance * s.area;
-    out_ledger = size_px(s) == 0 ? vec4(0.0) : ledger_row(Ledger(power * share.r, 1.0, power * share.g, power), row);
+    out_ledger = size_px(s) == 0 ? vec4(0.0) : ledger_row(Ledger(power * share.r, 1.0, power * share.g, power, vec3(0.0)), row);
 }

@@ -15,7 +15,7 @@ void main() {
         out_row = texelFetch(t_shooters, ivec2(row - REPORT_ROWS, 0), 0);
         return;
     }
-    Report report = Report(0.0, 0.0, 0.0, vec3(0.0), 0.0);
+    Report report = Report(0.0, 0.0, 0.0, vec3(0.0), 0.0, vec3(0.0));
     for (int i = 0; i < textureSize(t_bins, 0).x; ++i) {
         report.unshot += texelFetch(t_unshot, ivec2(i, 0), 0).a;
         vec4 bin = texelFetch(t_bins, ivec2(i, 0), 0);
@@ -26,6 +26,7 @@ void main() {
         Ledger entry = load_ledger(t_ledger, shot);
         report.escaped += entry.escaped;
         report.shots += entry.shots;
+        report.directions += entry.directions;
     }
     out_row = report_row(report, row);
 }

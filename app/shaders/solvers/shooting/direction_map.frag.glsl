@@ -1,6 +1,6 @@
-// What is seen from a direction of the sky: items, and depths.
+// What is seen from a direction: items, and depths.
 #define OPACITY 0
-#include "solvers/shooting/sky_shot.glsl"
+#include "solvers/shooting/direction_shot.glsl"
 #if OPACITY
 #include "visibility/opacity.glsl"
 uniform int u_sheer;  // rows of t_sheer
@@ -15,7 +15,7 @@ layout(location = 0) out float out_item;
 void main() {
 #if OPACITY
     int row = gl_PrimitiveID % u_sheer;
-    if (chance_in_map(load_sky_shot(v_map).axes[2], ivec2(gl_FragCoord.xy), row) >= opacity_at(row, v_place)) discard;
+    if (chance_in_map(shooter_of(v_map).normal, ivec2(gl_FragCoord.xy), row) >= opacity_at(row, v_place)) discard;
 #endif
     out_item = gl_FrontFacing ? v_sides.r : v_sides.g;
 }

@@ -1,29 +1,31 @@
-// The light of some directions of the sky is blended into H and r of every texel. A sample of a map sees the receiver if it shows
-// its facet, or nothing that lies nearer to the sky than the receiver's own plane there: the four around it, weighted bilinearly.
+// The light of some directions is blended into H and r of every texel. A sample of a map sees the receiver if it shows its facet,
+// or nothing that lies nearer to the light than the receiver's own plane there: the four around it, weighted bilinearly. What it
+// shows below the sphere around the scene is the background.
 #include "common/atlas.glsl"
 #include "common/albedo.glsl"
 #include "common/item.glsl"
-#include "solvers/shooting/sky_shot.glsl"
+#include "solvers/shooting/direction_shot.glsl"
 
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
 uniform sampler2D t_materials;
 uniform sampler2D t_items;
 uniform sampler2D t_depth;
-uniform int u_shots;
+uniform int u_shots;  // from u_first on
+uniform int u_maps;   // that t_items has room for
 
-layout(location = 0) out vec4 out_irradiance;
+layout(location = 0) out vec4 out_irradiance;  // a: as in receive.frag.glsl
 layout(location = 1) out vec4 out_residual;
 
 const float SLACK = 1.0 / 8192.0;  // of the scene's radius: rounding of depths, as in visibility/visible.glsl
 
 float visible(vec3 local, vec3 normal, float facet, int shot) {
     vec2 at = px_of(local) - 0.5, base = floor(at), f = at - base;
-    vec2 uv = (base + 1.0 + vec2(0.0, MAP * float(shot))) / vec2(textureSize(t_items, 0));
+    vec2 uv = (base + 1.0 + vec2(0.0, MAP * float(shot))) / vec2(MAP, MAP * float(u_maps));
     vec4 x = vec4(0.0, 1.0, 1.0, 0.0) - f.x, y = vec4(1.0, 1.0, 0.0, 0.0) - f.y;  // [px] from the receiver, as textureGather has them
     vec4 plane = local.z - (normal.x * x + normal.y * y) / normal.z * (2.0 / (WIDTH * MAP));
     vec4 shown = (0.5 - textureGather(t_depth, uv)) / DEPTH;
-    bvec4 same = equal(textureGather(t_items, uv), vec4(facet)), open = lessThanEqual(shown, plane + SLACK);
+    bvec4 same = equal(textureGather(t_items, uv), vec4(facet)), open = lessThanEqual(shown, max(plane + SLACK, -1.0));
     vec4 seen = vec4(same.x || open.x, same.y || open.y, same.z || open.z, same.w || open.w);
     return dot(seen, vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)));
 }
@@ -34,9 +36,13 @@ void main() {
     out_irradiance = out_residual = vec4(0.0);
     if (texel.area <= 0.0) return;
     for (int shot = 0; shot < u_shots; ++shot) {
-        SkyShot s = load_sky_shot(shot);
-        vec3 normal = texel.normal * s.axes;
-        if (normal.z > 0.0) out_irradiance.rgb += s.irradiance * normal.z * visible(texel.position * s.axes, normal, float(texel.facet), shot);
+        Shooter s = shooter_of(shot);
+        mat3 axes = axes_of(s);
+        vec3 normal = texel.normal * axes;
+        if (normal.z <= 0.0) continue;
+        vec4 light = normal.z * vec4(s.exitance, dot(abs(s.exitance), vec3(1.0)));
+        out_irradiance += light * visible(texel.position * axes, normal, float(texel.facet), shot);
+        out_residual.a += light.a;
     }
     out_residual.rgb = albedo_of(t_materials, texel.material, px) * out_irradiance.rgb;
 }
