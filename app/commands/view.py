@@ -12,10 +12,12 @@ from app.commands.steps import check_display, session_options
 from app.errors import UserError
 from app.options import from_flags
 from app.render.options import DisplayOptions
+from app.render.units import UNITS
 from app.scene.options import FileOptions
 from app.session.session import Session
 from app.session.view import View
 from app.util.console import Console
+from app.util.kept import keep, kept
 
 __all__ = ["view", "view_or_shot"]
 
@@ -45,9 +47,13 @@ def view(flags: argparse.Namespace) -> int:
     from app.scene.load import LOADERS
     from app.viewer.window import run_window
 
+    folder = _folder()
+    views: list[View] = []
+
     def make_view(gpu: Any) -> View:
         session = Session(gpu, **session_options(flags), expose_on_open=flags.exposure is None)
-        view = View(session, from_flags(DisplayOptions, flags))
+        view = View(session, _display(flags, folder))
+        views.append(view)
         session.open(flags.scene, from_flags(FileOptions, flags), reference=flags.reference)
         return view
 
@@ -56,14 +62,24 @@ def view(flags: argparse.Namespace) -> int:
         size=flags.size,
         scenes=scene_names(),
         suffixes=tuple(LOADERS),
-        layout_file=_layout_file(),
+        layout_file=None if folder is None else folder / "layout.ini",
         frames=flags.frames,
     )
+    if folder is not None:
+        for made in views:
+            keep(folder, quantities=made.display.quantities)
     return 0
 
 
-def _layout_file() -> Path | None:
-    """Where the window keeps the places of its panels; None, and a note, where nothing can be kept."""
+def _display(flags: argparse.Namespace, folder: Path | None) -> DisplayOptions:
+    """As the flags say; light is counted as in the last run, where they say nothing."""
+    display = from_flags(DisplayOptions, flags)
+    last = None if folder is None else kept(folder).get("quantities")
+    return display.replace(quantities=last) if flags.quantities is None and last in UNITS else display
+
+
+def _folder() -> Path | None:
+    """Where the window keeps the places of its panels and what was chosen; None, and a note, where nothing can be kept."""
     from platformdirs import user_config_path
 
     folder = user_config_path("glowtree")
@@ -72,4 +88,4 @@ def _layout_file() -> Path | None:
     except UserError as error:
         Console().warn(f"the layout of the panels is not kept: {error}")
         return None
-    return folder / "layout.ini"
+    return folder

@@ -210,6 +210,10 @@ class View:
         hit = self._renderer.pick(x_px, y_px)
         return None if hit is None else picked_from_hit(self.session.lightmap, hit, self.session.solver)
 
+    def under(self, x_px: int, y_px: int) -> Picked | None:
+        """What is under the pointer at that pixel of the last frame, as ``pick``."""
+        return View.pick(self, x_px, y_px)
+
     def read_again(self, picked: Picked) -> Picked:
         """The same point with its texel and light as they are now."""
         lightmap = self.session.lightmap

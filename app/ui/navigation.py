@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from imgui_bundle import imgui
 
-from app.ui import theme
+from app.ui import pointer, theme
 from app.ui.divider import divider
 from app.ui.light_gizmos import light_gizmos
 from app.ui.on_screen import on_screen
@@ -50,6 +50,8 @@ def navigate(view: View, state: State, seconds: float) -> None:
     state.flying = not io.want_text_input and _fly(view, state, io, seconds)
     _advance_flight(view, state, seconds)
     _refresh(view, state, seconds)
+    pointer.follow(view, state, seconds)
+    pointer.beside(view, state)
     _marker(view, state)
 
 
@@ -112,12 +114,14 @@ def _advance_flight(view: View, state: State, seconds: float) -> None:
 
 
 def _pick(view: View, state: State, x: float, y: float) -> None:
-    """Inspect what is seen at (x, y) [display units from the view's top left]."""
+    """Inspect what is seen at (x, y) [display units from the view's top left], and select its material."""
     pixel = int(x * state.ratio), int(y * state.ratio)
     state.picked_age = 0.0
 
     def look() -> None:
         state.picked = view.pick(*pixel)
+        if state.picked is not None:
+            state.material, state.reveal_material = state.picked.material, True
 
     state.act(look)
 

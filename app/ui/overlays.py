@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
 
-from app.ui import edits, new_lamps, theme, widgets
+from app.render.units import QUANTITIES, UNITS
+from app.ui import edits, new_lamps, pointer, theme, widgets
 from app.ui.keys import POINTER, SHORTCUTS, flip_pace
 from app.ui.layout import PANELS
 from app.ui.navigation import look_through
+from app.ui.panels.display import counted
 from app.ui.state import TOAST_SECONDS, Legend, Request, State
 
 if TYPE_CHECKING:
@@ -78,6 +80,12 @@ def _view_menu(view: View, state: State) -> None:
             if imgui.menu_item(camera.name, "", False)[0]:
                 look_through(view, state, camera)
         imgui.end_menu()
+    if imgui.begin_menu("Quantities", view.session.opened):
+        for quantities in UNITS:
+            units = ", ".join(dict.fromkeys(unit for _, unit in QUANTITIES[quantities].values()))
+            if imgui.menu_item(f"{quantities.capitalize()}: {units}", "", view.display.quantities == quantities)[0]:
+                view.display = counted(view.display, quantities)
+        imgui.end_menu()
     if imgui.menu_item("Reset layout", "", False)[0]:
         state.hidden_panels.clear()
         state.rebuild_layout = True
@@ -96,13 +104,25 @@ def status_bar(view: View, state: State) -> None:
     ):
         for text, colour in _status(view, state):
             imgui.text_colored(imgui.ImVec4(*colour), text)
+            widgets.copied_by_click(text)
             imgui.separator()
         if state.stats is not None:
             _pace(view, state)
         if view.session.message:
             imgui.text_unformatted(view.session.message)
+            widgets.copied_by_click(view.session.message)
+        _under_pointer(view, state)
         imgui.end_menu_bar()
     imgui.end()
+
+
+def _under_pointer(view: View, state: State) -> None:
+    """At the right end, where there is room."""
+    text = "   ".join(pointer.in_words(view, state)) if view.session.opened else ""
+    left = imgui.get_window_width() - imgui.calc_text_size(text).x - imgui.get_style().window_padding.x
+    if text and left > imgui.get_cursor_pos_x():
+        imgui.set_cursor_pos_x(left)
+        imgui.text_colored(imgui.ImVec4(*theme.AMBER), text)
 
 
 def _status(view: View, state: State) -> list[tuple[str, theme.RGBA]]:

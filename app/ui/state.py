@@ -80,14 +80,14 @@ class Flight:
 class State:
     """Everything that belongs to the interface and not to the session.
 
-    measured: whether numbers that depend on the machine's speed are shown (off for pictures that are compared).
-    live: whether frames follow each other, so that there is a rate of them.
-    texture_id: makes a texture of the host drawable; legend: the scale of what is shown now; stats: of the session,
-    asked once per frame (None without a scene). atlas, adaptive: edited, not yet applied. view_px: the 3-D view (left, top,
-    width, height) [display units]. inspected: what the solver showed last, and of which light. draw_rays: those of the
-    picked texel, in the room. draw_lights: lamps without area, in the view. reference: of a solve in the background; layer: to
-    go back to from the error. edits: of the open scene; held: whether a hand was at a control in the last frame. used: of which
-    scene, the materials that are somewhere.
+    measured: whether numbers that depend on the machine's speed are shown (off for pictures that are compared). live: whether
+    frames follow each other, so that there is a rate of them. texture_id: makes a texture of the host drawable; legend: the
+    scale of what is shown now; stats: of the session, asked once per frame (None without a scene). atlas, adaptive: edited,
+    not yet applied. view_px: the 3-D view (left, top, width, height) [display units]. inspected: what the solver showed last,
+    and of which light. draw_rays: those of the picked texel, in the room. pointed: under the pointer, at which pixel.
+    reveal_material: the list scrolls to the selected one. draw_lights: lamps without area, in the view. reference: of a solve
+    in the background; layer: to go back to from the error. edits: of the open scene; held: whether a hand was at a control in
+    the last frame. used: of which scene, the materials that are somewhere.
     """
 
     measured: bool = True
@@ -112,6 +112,10 @@ class State:
     fps: float = 0.0
     picked: Picked | None = None
     picked_age: float = 0.0
+    pointed: Picked | None = None
+    pointed_at: tuple[int, int] | None = None
+    pointed_age: float = 0.0
+    reveal_material: bool = False
     draw_rays: bool = True
     inspected: tuple[object, Any] | None = None
     inspected_age: float = 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -17,6 +18,8 @@ OptionsT = TypeVar("OptionsT", bound=Options)
 
 LABEL_SHARE = 0.44  # of the panel's width
 TOOLTIP_EM = 22.0
+COPIED_SECONDS = 1.0  # that it is said
+GROUPED = re.compile(r"(?<=\d),(?=\d{3})")
 AS_READ = "Right-click: as in the file"
 TOOLTIP = int(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)
 
@@ -169,7 +172,24 @@ def facts(name: str, rows: Sequence[tuple[str, str]]) -> None:
         imgui.push_text_wrap_pos(0.0)
         imgui.text_unformatted(value)
         imgui.pop_text_wrap_pos()
+        copied_by_click(value)
     imgui.end_table()
+
+
+def copied_by_click(text: str) -> None:
+    """The last item is a text that a click copies: numbers without what groups their digits."""
+    if not imgui.is_item_hovered():
+        return
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    line = imgui.ImVec2(low.x, high.y), imgui.ImVec2(high.x, high.y)
+    imgui.get_window_draw_list().add_line(*line, theme.colour_u32(theme.DIM))
+    imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
+    key, storage = imgui.get_id(f"copied {low.x:.0f} {low.y:.0f}"), imgui.get_state_storage()
+    if imgui.is_mouse_clicked(0):
+        imgui.set_clipboard_text(GROUPED.sub("", text))
+        storage.set_float(key, imgui.get_time() + COPIED_SECONDS)
+    if imgui.get_time() < storage.get_float(key, -1.0):
+        imgui.set_tooltip("copied")
 
 
 def dim(text: str) -> None:
@@ -184,6 +204,7 @@ def right(text: str, colour: theme.RGBA = theme.TEXT) -> None:
         imgui.get_cursor_pos_x() + max(0.0, imgui.get_content_region_avail().x - imgui.calc_text_size(text).x)
     )
     imgui.text_colored(imgui.ImVec4(*colour), text)
+    copied_by_click(text)
 
 
 def steady_width() -> float:

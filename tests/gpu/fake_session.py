@@ -206,6 +206,11 @@ class FakeSession:
         rates |= {"edit_work": None, "fresh_work": None}
         return SimpleNamespace(**energies, **counts, **rates)
 
+    @property
+    def energy(self) -> SimpleNamespace:
+        names = "emitted", "absorbed", "escaped", "unshot"
+        return SimpleNamespace(**{name: np.full(3, getattr(self.stats, name) / 3) for name in names})
+
     def share_done(self, stop: object) -> float:
         return 0.25
 
@@ -233,6 +238,9 @@ class FakeSession:
 
     def inspect(self, texel: tuple[int, int] | None = None) -> Inspection:
         return self.solver.inspect(texel, images=True)
+
+    def under(self, x_px: int, y_px: int):
+        return self.picked
 
     def read_again(self, picked: object) -> object:
         self.calls.append(("read_again",))

@@ -64,6 +64,7 @@ def test_a_reference_brings_its_panel_to_the_front(desk: Desk) -> None:
 
 def test_a_picked_texel_has_its_reference(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     desk.ui.state.picked = PICKED  # type: ignore[assignment]
+    desk.session.display = desk.session.display.replace(quantities="radiometric")
     told: list[float] = []
     real = widgets.number
     monkeypatch.setattr(widgets, "number", lambda value, *more: told.append(value) or real(value, *more))

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from imgui_bundle import imgui
 
 from app.render.ray_picture import LINES
+from app.render.units import QUANTITIES, measure
 from app.solvers import HEMISPHERE
 from app.ui import theme, widgets
+from app.ui.colour import rgb
 from app.ui.panels import atlas
-from app.ui.state import State
+from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
     from app.session.picking import Picked
@@ -30,7 +33,7 @@ def draw(view: View, state: State) -> None:
         _hemisphere(view, state)
         if widgets.fold("Surface"):
             _surface(view, state.picked)
-        if widgets.fold("Light [W/m²]"):
+        if widgets.fold("Light [W/m²]" if view.display.quantities == "radiometric" else "Light"):
             _light(view, state.picked)
     _solver(view, state)
     if widgets.fold("Atlas"):
@@ -108,28 +111,80 @@ def _surface(view: View, picked: Picked) -> None:
 def _light(view: View, picked: Picked) -> None:
     right = view.session.compared.irradiance_at(picked.texel) if picked.area > 0 else None
     rows = (
-        ("B", picked.B, "radiosity: all light that leaves"),
-        ("E", picked.E, "exitance of its own"),
-        ("H", picked.H, "irradiance: light received"),
-        *((f"H{name[0]}", part, f"the {name} part of it") for name, part in picked.parts.items()),
-        *([] if right is None else [("R", right, "irradiance of the reference")]),
-        *([("r", picked.r, "residual: not yet shot")] if "residual" in view.session.family.layers else []),
-        ("ρ", picked.albedo, "albedo"),
+        Row("B", "leaves", picked.B, "All light that leaves"),
+        Row("E", "leaves", picked.E, "Light of its own"),
+        Row("H", "arrives", picked.H, "Light received"),
+        *(
+            Row(f"H{name[0]}", "arrives", part, f"The {name} part of light received")
+            for name, part in picked.parts.items()
+        ),
+        *([] if right is None else [Row("R", "arrives", right, "Light received by the reference")]),
+        *([Row("r", "leaves", picked.r, "Not yet shot")] if "residual" in view.session.family.layers else []),
+        Row("ρ", "", picked.albedo, "Albedo: the share of light that it reflects"),
     )
-    if not imgui.begin_table("light", 4, imgui.TableFlags_.sizing_stretch_prop):
+    if view.display.quantities == "radiometric":
+        _channels(rows, wide=bool(picked.parts))
+    else:
+        _amounts(
+            (Row("L", "seen", rgb(b / math.pi for b in picked.B), "How bright it looks"), *rows),
+            wide=bool(picked.parts),
+        )
+
+
+class Row(NamedTuple):
+    """Of light: symbol, which of QUANTITIES it is, value in W, and meaning."""
+
+    symbol: str
+    what: str
+    value: RGB
+    meaning: str
+
+
+def _channels(rows: tuple[Row, ...], *, wide: bool) -> None:
+    """Red, green and blue of each, in W/m². wide: symbols have indices."""
+    if not _table(("red", "green", "blue"), wide=wide):
         return
-    imgui.table_setup_column(
-        "", imgui.TableColumnFlags_.width_fixed, imgui.get_font_size() * SYMBOL_EM[bool(picked.parts)]
-    )
-    for channel in ("red", "green", "blue"):
-        imgui.table_setup_column(channel)
     imgui.table_headers_row()
-    for symbol, values, meaning in rows:
-        imgui.table_next_row()
-        imgui.table_next_column()
-        imgui.text_colored(imgui.ImVec4(*theme.AMBER), symbol)
-        widgets.tooltip(meaning)
-        for value in values:
+    for row in rows:
+        _symbol(row)
+        for value in row.value:
             imgui.table_next_column()
-            imgui.text_unformatted(widgets.number(float(value)))
+            _value(widgets.number(float(value)))
     imgui.end_table()
+
+
+def _amounts(rows: tuple[Row, ...], *, wide: bool) -> None:
+    """One number of each, and its unit; of an albedo the share of white light."""
+    if not _table(("value", "unit"), wide=wide):
+        return
+    for row in rows:
+        _symbol(row)
+        imgui.table_next_column()
+        text, unit = widgets.percent(measure(row.value, "radiometric")), ""
+        if row.what:
+            text, unit = widgets.number(measure(row.value, "photometric")), QUANTITIES["photometric"][row.what].unit
+        _value(text, f"{text} {unit}".strip())
+        imgui.table_next_column()
+        widgets.dim(unit)
+    imgui.end_table()
+
+
+def _table(columns: tuple[str, ...], *, wide: bool) -> bool:
+    if not imgui.begin_table("light", 1 + len(columns), imgui.TableFlags_.sizing_stretch_prop):
+        return False
+    imgui.table_setup_column("", imgui.TableColumnFlags_.width_fixed, imgui.get_font_size() * SYMBOL_EM[wide])
+    for column in columns:
+        imgui.table_setup_column(column)
+    return True
+
+
+def _symbol(row: Row) -> None:
+    imgui.table_next_row()
+    imgui.table_next_column()
+    imgui.text_colored(imgui.ImVec4(*theme.AMBER), row.symbol)
+    widgets.tooltip(row.meaning)
+
+
+def _value(text: str, copied: str = "") -> None:
+    imgui.text_unformatted(text)
+    widgets.copied_by_click(copied or text)

@@ -29,6 +29,9 @@ def _list(view: View, state: State) -> None:
     materials = view.session.materials
     height = min(len(materials), ROWS_SHOWN) * imgui.get_text_line_height_with_spacing()
     imgui.begin_child("materials", imgui.ImVec2(0, height))
+    if state.reveal_material:
+        state.reveal_material = False
+        imgui.set_scroll_y((state.material + 0.5) * imgui.get_text_line_height_with_spacing() - height / 2)
     clipper = imgui.ListClipper()
     clipper.begin(len(materials))
     while clipper.step():

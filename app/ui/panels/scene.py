@@ -53,4 +53,5 @@ def _counts(view: View, state: State) -> None:
         widgets.tooltip(f"{label}: {meaning}")
         imgui.table_next_column()
         widgets.wrapped(value)
+        widgets.copied_by_click(value)
     imgui.end_table()

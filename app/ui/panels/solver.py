@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
+from app.render.units import QUANTITIES, measure
 from app.session.run import Stop
 from app.solvers import SOLVERS
 from app.ui import theme, widgets
@@ -13,6 +14,7 @@ from app.ui.panels import detail
 from app.ui.state import State
 
 if TYPE_CHECKING:
+    from app.scene.model import F64
     from app.session.view import View
 
 ICONS = theme.ICONS
@@ -30,8 +32,8 @@ def draw(view: View, state: State) -> None:
     _progress(view, state)
     _figures(state)
     detail.draw(view, state)
-    widgets.section("Energy [W]")
-    _energy(state, unshot=session.family.distributes)
+    widgets.section(f"Energy [{QUANTITIES[view.display.quantities]['flows'].unit}]")
+    _energy(view, state)
     widgets.section(session.family.title)
     options = widgets.edit_options(session.options, starts=stats.resolved)
     if options is not session.options:
@@ -112,29 +114,35 @@ def _figures(state: State) -> None:
     widgets.facts("figures", rows)
 
 
-def _energy(state: State, *, unshot: bool) -> None:
-    stats = state.stats
+def _energy(view: View, state: State) -> None:
+    stats, balance, unshot = state.stats, view.session.run.energy, view.session.family.distributes
     assert stats is not None
     rows = [
-        ("Emitted", stats.emitted, theme.TEXT),
-        ("Absorbed", stats.absorbed, theme.ABSORBED),
-        ("Escaped", stats.escaped, theme.ESCAPED),
-        *([("Residual", stats.unshot, theme.UNSHOT)] if unshot else []),
+        ("Emitted", stats.emitted, balance.emitted, theme.TEXT),
+        ("Absorbed", stats.absorbed, balance.absorbed, theme.ABSORBED),
+        ("Escaped", stats.escaped, balance.escaped, theme.ESCAPED),
+        *([("Residual", stats.unshot, balance.unshot, theme.UNSHOT)] if unshot else []),
     ]
-    _bar([(power, colour) for _, power, colour in rows[1:]], stats.emitted)
+    _bar([(power, colour) for _, power, _, colour in rows[1:]], stats.emitted)
     if imgui.begin_table("energy", 3, imgui.TableFlags_.sizing_stretch_prop):
-        for label, power, colour in rows:
+        for label, power, light, colour in rows:
             imgui.table_next_row()
             imgui.table_next_column()
             imgui.text_colored(imgui.ImVec4(*colour), label)
             imgui.table_next_column()
-            widgets.right(widgets.number(power))
+            widgets.right(widgets.number(_flux(light, view)))
             imgui.table_next_column()
             widgets.right(widgets.percent(power / stats.emitted if stats.emitted > 0 else 0.0))
         imgui.end_table()
     widgets.dim(f"energy imbalance {widgets.percent(abs(stats.imbalance))}")
     parts = "absorbed + escaped + residual" if unshot else "absorbed + escaped"
     widgets.tooltip(f"Emitted must equal {parts}; the difference, of the power emitted")
+
+
+def _flux(power: F64, view: View) -> float:
+    """Of power (3,) [W], in what light is counted in: watts of all channels, or lumen."""
+    radiometric = view.display.quantities == "radiometric"
+    return float(power.sum()) if radiometric else measure(power.tolist(), "photometric")
 
 
 def _bar(shares: list[tuple[float, theme.RGBA]], total: float) -> None:
