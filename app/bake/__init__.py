@@ -21,20 +21,32 @@ from app.bake.gltf_edit import edited_glb_bytes, is_of_gltf
 from app.bake.gltf_writer import glb_bytes
 from app.bake.options import BakeOptions
 from app.bake.rgbe import write_hdr, write_rgbe_png
+from app.bake.sky_file import write_sky
 from app.bake.staged import Staged
+from app.bake.web_page import find_three, web_page
 from app.errors import SceneError, UserError
 from app.lightmap.seams import finished
 from app.scene.model import F32, Scene
 from app.util.json_text import json_text
 
-__all__ = ["IRRADIANCE_NAME", "REPORT_NAME", "SCENE_NAME", "BakeFiles", "prepare_directory", "write_bake"]
+__all__ = [
+    "IRRADIANCE_NAME",
+    "REPORT_NAME",
+    "SCENE_NAME",
+    "BakeFiles",
+    "check_options",
+    "prepare_directory",
+    "write_bake",
+]
 
 IRRADIANCE_NAME = "irradiance.exr"
 SCENE_NAME = "scene.glb"
 REPORT_NAME = "report.json"
 HDR_NAME = "irradiance.hdr"
 RGBE_NAME = "irradiance.rgbe.png"
-OPTIONAL = (HDR_NAME, RGBE_NAME)
+SKY_NAME = "sky.exr"
+PAGE_NAME = "index.html"
+OPTIONAL = (HDR_NAME, RGBE_NAME, SKY_NAME, PAGE_NAME)
 
 
 @dataclass(frozen=True)
@@ -62,6 +74,12 @@ def prepare_directory(directory: Path) -> Path:
     except OSError as error:
         raise UserError(f"{directory}: cannot write here ({error.strerror or error})") from error
     return directory
+
+
+def check_options(options: BakeOptions) -> None:
+    """Raise UserError now, rather than after the work, for what cannot be written here."""
+    if options.web:
+        find_three(options.three)
 
 
 def write_bake(
@@ -94,6 +112,12 @@ def write_bake(
             glb, more = _scene_bytes(scene, unedited, charts, options)
             notes += more
             staged(SCENE_NAME).write_bytes(glb)
+            if scene.sky is not None and scene.sky.emits:
+                write_sky(staged(SKY_NAME), scene.sky)
+            if options.web:
+                shown = staged.read(SCENE_NAME, IRRADIANCE_NAME, SKY_NAME)
+                page = web_page(scene.name, shown, report, find_three(options.three))
+                staged(PAGE_NAME).write_text(page, encoding="utf-8")
             staged(REPORT_NAME).write_text(json_text(_with_notes(report, notes)), encoding="utf-8")
         for name in set(OPTIONAL) - {path.name for path in staged.paths}:  # of another bake
             (directory / name).unlink(missing_ok=True)

@@ -14,6 +14,12 @@ class BakeOptions(Options):
     )
     hdr: bool = option(False, "write the lightmap as irradiance.hdr, too (Radiance RGBE, right to 0.4 %)")
     rgbe_png: bool = option(False, "write the lightmap as irradiance.rgbe.png, too: RGBE in the channels of a PNG")
+    web: bool = option(
+        False, "write index.html, too: a page that shows the bake without a network (needs the npm package three)"
+    )
+    three: str | None = option(
+        None, "folder of the npm package three; unset: node_modules/three, here or in a folder above"
+    )
     moz_lightmap: bool = option(
         False, "name the lightmap in scene.glb by MOZ_lightmap, too, which readers that parse all images may refuse"
     )

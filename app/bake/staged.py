@@ -20,6 +20,11 @@ class Staged:
         self._written[path] = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
         return self._written[path]
 
+    def read(self, *names: str) -> dict[str, bytes]:
+        """What was written so far of files of these names, by name."""
+        found = {path.name: written for path, written in self._written.items() if path.name in names}
+        return {name: written.read_bytes() for name, written in found.items()}
+
     @property
     def paths(self) -> list[Path]:
         """The final names, in the order in which they were asked for."""

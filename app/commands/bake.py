@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from app.bake import check_options
 from app.bake.options import BakeOptions
 from app.commands.steps import estimate, open_scene, session_options, solve
 from app.errors import UserError
@@ -25,6 +26,7 @@ def bake(flags: argparse.Namespace) -> int:
             f"--solver {flags.solver}: it lights what is around an observer, and a bake is seen from everywhere"
         )
     console, how = Console(quiet=flags.json), from_flags(BakeOptions, flags)
+    check_options(how)
     with bake_folder(flags.output), gpu_context() as gpu:
         session = Session(gpu, **session_options(flags))
         open_scene(session, flags, console)

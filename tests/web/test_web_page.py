@@ -1,0 +1,60 @@
+"""The page that a bake brings along, opened from the disk, beside the viewer's own picture."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from browser import SIZE, apart, picture_of_page
+from npm import npm_package
+from PIL import Image
+
+from app.bake.web_page import find_three
+from app.cli import run
+from app.errors import UserError
+
+THREE = "three@0.187.0"
+LOGGIA = """
+material = [{ name = "plaster", albedo = [0.7, 0.6, 0.5] }]
+box = [
+  { material = "plaster", center = [0, 1.5, 0], size = [4, 3, 4], inside = true, without = ["right", "back"] },
+  { material = "plaster", center = [0.8, 0.5, -0.5], size = [0.6, 1, 0.6], without = ["bottom"] },
+]
+
+[[camera]]
+name = "out"
+position = [-1.6, 1.7, 1.6]
+target = [0.8, 1.3, -0.8]
+yfov_deg = 70
+"""
+
+
+@pytest.mark.parametrize("scene", ["cornell-box", "loggia.toml --sky clear --sun 60,15"])
+def test_the_page_shows_what_the_viewer_shows(tmp_path, monkeypatch, scene):
+    packages = npm_package(THREE)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "loggia.toml").write_text(LOGGIA)
+    solve = [*scene.split(), "--solver", "gathering", "--texels", "4000", "--rays", "32"]
+    web = ["--web", "--three", str(packages / "three")]
+    assert run(["bake", *solve, "-o", str(tmp_path / "baked"), *web]) == 0
+    assert run(["shot", *solve, "-o", str(tmp_path / "viewer.png"), "--size", "{}x{}".format(*SIZE)]) == 0
+    (tmp_path / "alone").mkdir()
+    shutil.copy(tmp_path / "baked" / "index.html", tmp_path / "alone")  # it needs no file beside it
+    shown = picture_of_page(tmp_path / "alone" / "index.html", from_disk=True)
+    assert apart(shown, np.asarray(Image.open(tmp_path / "viewer.png").convert("RGB"))) < 0.02
+
+
+def test_without_three_one_line_says_so_before_any_work(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(["bake", "cornell-box", "-o", "out", "--web"]) == 2
+    assert "npm install three" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("package", ["", "{", json.dumps({"version": 3}), json.dumps({"version": "0.140.1"})])
+def test_what_is_no_three_or_too_old_is_refused(tmp_path, package):
+    (tmp_path / "package.json").write_text(package)
+    with pytest.raises(UserError, match="--web: "):
+        find_three(str(tmp_path))
