@@ -46,7 +46,7 @@ def charts_of(
     """The scene, cut where its surfaces meet, and its charts; see ``cut_at_contacts`` and ``parametrize``."""
     if len(scene.triangles) < FEWEST:
         return _made(scene, atlas, roots, progress)
-    file = cache.entry("charts", cache.digest(_maker(), _given(scene, atlas, roots)))
+    file = cache.entry("charts", cache.digest(program(), _given(scene, atlas, roots)))
     found = _read(scene, cache.read(file))
     if found is None:
         found = _made(scene, atlas, roots, progress)
@@ -73,9 +73,9 @@ def _made(
     return cut.scene, charts
 
 
-def _maker() -> bytes:
-    """This program as far as it makes charts, and what it makes them with."""
-    modules = [file.read_bytes() for file in sorted(Path(__file__).parent.glob("*.py"))]
+def program(*more: Path) -> bytes:
+    """This program as far as it makes charts, more of its files, and what it makes them with."""
+    modules = [file.read_bytes() for file in (*sorted(Path(__file__).parent.glob("*.py")), *more)]
     return b"".join([*modules, *(version(library).encode() for library in LIBRARIES)])
 
 

@@ -1,10 +1,5 @@
-"""The surface that every texel really covers: each triangle cut by the texel grid, exactly.
+"""The surface that every texel really covers: each triangle cut by the texel grid, exactly, see unit_square.py.
 
-For a triangle counter-clockwise in the atlas and a texel S = [0, 1]², slices along v give, by Green's theorem,
-
-    area = -∮ c(v) du,   ∫u = -∮ u c(v) du,   ∫v = -∮ c(v)²/2 du,   c(v) = clamp(v, 0, 1),
-
-over the triangle's edges with u inside S: closed forms, since c(v) along an edge is a chain of three straight pieces.
 Area and centroid go to the world by the triangle's affine map; the fragments of a texel are summed.
 """
 
@@ -19,12 +14,13 @@ from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
 from app.atlas.contacts import inside_triangles
+from app.atlas.unit_square import SLIVER, area_and_centroid, edge_distances
 from app.scene.model import F32, F64, I32, Scene
+from app.util.ahead import ahead
 
 BLOCK = 1 << 16  # candidate texels in work at a time
-# Fragments below this share of the texel, or of a smaller triangle, are rounding where an edge runs along a texel's.
-SLIVER = 1e-9
 LEAST_SEEN = 1e-3  # of a texel, that is not hidden: less is no place to look from
+PIECES = 1.5  # of triangles in a texel, about
 PLACES = 8  # along the edge of a texel: where else to look from, when something lies on its middle
 
 I64 = NDArray[np.int64]
@@ -100,8 +96,12 @@ def texel_count(charts: Charts) -> int:
     return len(np.unique(np.concatenate(used)))
 
 
-def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurfaces:
-    """Where each texel of the leaves lies in the world, how much surface it covers, and which way that faces."""
+def texel_surfaces(
+    scene: Scene, charts: Charts, leaves: Leaves, report: Callable[[float], None] | None = None
+) -> TexelSurfaces:
+    """Where each texel of the leaves lies in the world, how much surface it covers, and which way that faces. report(share) is
+    called from time to time and may raise to cancel."""
+    done = 0
     shape = (len(leaves), charts.tile, charts.tile)
     texels = math.prod(shape)
     area, best = np.zeros(texels), np.zeros(texels)
@@ -124,6 +124,9 @@ def texel_surfaces(scene: Scene, charts: Charts, leaves: Leaves) -> TexelSurface
         hidden = _hidden(charts, pieces, over.slot, over)
         cut[hidden.key % hidden.cells] = True
         for part in _fragments(uv, windows):
+            done += len(part.pair)
+            if report is not None:
+                report(min(1.0, done / (PIECES * texels)))
             kept, share, u, v = hidden.take_from(part, windows.face[part.pair], windows.slot(part))
             f, slot = windows.face[part.pair][kept], windows.slot(part)[kept]
             covered = share * per_texel[f] * size**2
@@ -313,9 +316,12 @@ def _fragments(uv: F64, windows: _Windows | None = None) -> Iterator[_Fragments]
     for pairs in _blocks(np.flatnonzero(full), across * up):
         pair, x, y = _cells(pairs, low, across, up)
         yield _Fragments(pair, x, y, np.ones(len(pair)), x.astype(np.float64) + 0.5, y.astype(np.float64) + 0.5)
-    for pairs in _blocks(np.flatnonzero(~full), across * up):
+
+    def cut(pairs: I64) -> _Fragments:
         pair, x, y = _cells(pairs, low, across, up)
-        yield _cut_block(planes, face, pair, x, y, single[pair])
+        return _cut_block(planes, face, pair, x, y, single[pair])
+
+    yield from ahead(cut, _blocks(np.flatnonzero(~full), across * up))
 
 
 def _blocks(pairs: I64, cells: I64) -> list[I64]:
@@ -340,59 +346,20 @@ def _cut_block(planes: F64, face: I64, pair: I64, x: I64, y: I64, single: NDArra
     """
     f = face[pair]
     # (3, n): each cell is [0, 1]². np.take keeps rows together in memory, where u[:, some] would not: three times as fast
-    u, v = (np.take(plane, f, axis=1) - cell for plane, cell in zip(planes, (x, y), strict=True))
+    u, v = (
+        np.asarray(np.take(plane, f, axis=1) - cell, np.float64) for plane, cell in zip(planes, (x, y), strict=True)
+    )
     doubled = (u[1] - u[0]) * (v[2] - v[0]) - (v[1] - v[0]) * (u[2] - u[0])
-    least, most = _edge_distances(u, v, np.sign(doubled))
+    least, most = edge_distances(u, v, np.sign(doubled))
     whole = ~single & (least >= 0)
     cut = ~single & ~whole & (most > 0)
     share, u_mean, v_mean = np.zeros(len(pair)), np.full(len(pair), 0.5), np.full(len(pair), 0.5)
     share[whole] = 1.0
     share[single] = np.abs(doubled[single]) / 2
     u_mean[single], v_mean[single] = ((side[0] + side[1] + side[2])[single] / 3 for side in (u, v))
-    share[cut], u_mean[cut], v_mean[cut] = _cut(*(np.compress(cut, side, axis=1) for side in (u, v)))
+    share[cut], u_mean[cut], v_mean[cut] = area_and_centroid(*(np.compress(cut, side, axis=1) for side in (u, v)))
     keep = share > SLIVER * np.minimum(np.abs(doubled) / 2, 1.0)
     return _Fragments(pair[keep], x[keep], y[keep], share[keep], (x + u_mean)[keep], (y + v_mean)[keep])
-
-
-def _edge_distances(u: F64, v: F64, winding: F64) -> tuple[F64, F64]:
-    """How far inside the edges of triangles u, v (3, n) the unit square lies at least, and at most.
-
-    Each the least over the edges, times the edge's length. Within rounding of an edge, the square counts as inside for
-    the first and as outside for the second.
-    """
-    du, dv = (np.roll(u, -1, axis=0) - u) * winding, (np.roll(v, -1, axis=0) - v) * winding
-    at_corner = dv * u - du * v
-    length = np.abs(du) + np.abs(dv)
-    slack = 0.1 * SLIVER * length * np.minimum(length.max(axis=0), 1.0)
-    least = at_corner + np.minimum(du, 0) - np.maximum(dv, 0) + slack
-    most = at_corner + np.maximum(du, 0) - np.minimum(dv, 0) - slack
-    return least.min(axis=0), most.min(axis=0)
-
-
-def _cut(pu: F64, pv: F64) -> tuple[F64, F64, F64]:
-    """Area and centroid (u, v) of triangles u, v (3, n) inside the unit square, by the formulas above."""
-    qu, qv = np.roll(pu, -1, axis=0), np.roll(pv, -1, axis=0)
-    ua, ub = np.clip(pu, 0, 1), np.clip(qu, 0, 1)
-    upright = np.abs(qu - pu) < np.finfo(float).eps  # covers no u: adds nothing to any of the integrals
-    ub = np.where(upright, ua, ub)
-    slope = (qv - pv) / np.where(upright, 1.0, qu - pu)
-    va, vb = pv + (ua - pu) * slope, qv + (ub - qu) * slope
-    rise = np.where(va == vb, 1.0, vb - va)
-    t0, t1 = np.clip(-va / rise, 0, 1), np.clip((1 - va) / rise, 0, 1)
-    area, first_u, first_v = (np.zeros(pu.shape[1]) for _ in range(3))
-    u, c = ua, np.clip(va, 0, 1)
-    for t in (np.minimum(t0, t1), np.maximum(t0, t1), np.ones_like(t0)):
-        un, cn = ua + t * (ub - ua), np.clip(va + t * (vb - va), 0, 1)
-        du = un - u
-        area -= (du * (c + cn) / 2).sum(axis=0)
-        first_u -= (du * (u * (2 * c + cn) + un * (c + 2 * cn)) / 6).sum(axis=0)
-        first_v -= (du * (c * c + c * cn + cn * cn) / 6).sum(axis=0)
-        u, c = un, cn
-    some = np.abs(area) > 0
-    whole = np.where(some, area, 1.0)
-    # a sliver's centroid is rounding, but it lies in the square
-    u_mean, v_mean = np.clip(first_u / whole, 0, 1), np.clip(first_v / whole, 0, 1)
-    return np.abs(area), np.where(some, u_mean, 0.5), np.where(some, v_mean, 0.5)
 
 
 def _uv_edges(uv: F64) -> tuple[F64, F64]:

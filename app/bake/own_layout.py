@@ -22,7 +22,7 @@ from app.atlas.sides import totals
 from app.atlas.texels import texel_surfaces, uniform_leaves
 from app.lightmap.at_points import light_at
 from app.lightmap.seams import finished
-from app.lightmap.tiles import on_their_faces
+from app.lightmap.surfaces import on_their_faces
 from app.scene.model import F32, F64, Scene
 from app.scene.validate import counted
 

@@ -7,7 +7,7 @@ share a chart and an edge differ by one level at most, so that interpolation acr
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -254,10 +254,12 @@ class Quadtree:
             self._below[above] = self._below.get(above, 0) + change
 
 
-def quadtree_pool(scene: Scene, charts: Charts) -> TilePool:
-    """The tile pool to begin with: few leaves, and room for as many again."""
+def quadtree_pool(scene: Scene, charts: Charts, report: Callable[[float], None] | None = None) -> TilePool:
+    """The tile pool to begin with: few leaves, and room for as many again. report: as of ``texel_surfaces``."""
     leaves = first_leaves(scene, charts, MAX_DEPTH)
-    pool = TilePool(scene, charts, leaves, adaptive=True, slots=max(FIRST_ROOM // charts.tile**2, 2 * len(leaves)))
+    pool = TilePool(
+        scene, charts, leaves, adaptive=True, slots=max(FIRST_ROOM // charts.tile**2, 2 * len(leaves)), report=report
+    )
     tree = Quadtree(pool)
     while slots := tree.uneven():
         if tree.room < 4 * len(slots):

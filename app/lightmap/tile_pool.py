@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -75,9 +75,16 @@ class TilePool:
     """
 
     def __init__(
-        self, scene: Scene, charts: Charts, leaves: Leaves | None = None, *, adaptive: bool = False, slots: int = 0
+        self,
+        scene: Scene,
+        charts: Charts,
+        leaves: Leaves | None = None,
+        *,
+        adaptive: bool = False,
+        slots: int = 0,
+        report: Callable[[float], None] | None = None,
     ) -> None:
-        """leaves: by default all of level 0; slots: room for so many, at least."""
+        """leaves: by default all of level 0; slots: room for so many, at least. report: as of ``texel_surfaces``."""
         self.scene, self.charts, self.adaptive, self.tile = scene, charts, adaptive, charts.tile
         self.space = SolverSpace.of(scene)
         self.material_bits = max(1, (len(scene.materials) - 1).bit_length())
@@ -86,7 +93,7 @@ class TilePool:
         self.dpdu, self.dpdv = self._facet_tangents()
         self._facet_material = np.zeros(charts.facet_count, np.int32)
         self._facet_material[charts.face_facet] = scene.material_ids[charts.face_triangle]
-        cut = Tiles.cut(scene, charts, uniform_leaves(charts) if leaves is None else leaves)
+        cut = Tiles.cut(scene, charts, uniform_leaves(charts) if leaves is None else leaves, report=report)
         self._make_room(cut, max(len(cut), slots))
         self.put(np.arange(len(cut)), cut)
 

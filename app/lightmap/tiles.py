@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +11,13 @@ from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
 from app.atlas.materials import texel_colours, texel_opacity
-from app.atlas.texels import Leaves, TexelSurfaces, texel_surfaces
+from app.atlas.texels import Leaves, TexelSurfaces
+from app.lightmap.surfaces import surfaces_of
 from app.scene.model import F32, Scene
 
 # Of a texel that is a hole all over, the share that counts as there: it holds light for pictures, which interpolate between
 # texels, and none that counts in any sum.
 LEAST_THERE = 1e-4
-FOLD = 1e-4  # of a texel's width: further off the plane of its leading face, a mean of faces is off the surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +34,16 @@ class Tiles:
         return len(self.leaves)
 
     @staticmethod
-    def cut(scene: Scene, charts: Charts, leaves: Leaves, faces: NDArray[np.int64] | None = None) -> Tiles:
-        """The texels of ``leaves``; faces: those that may meet them, else all are tried."""
+    def cut(
+        scene: Scene,
+        charts: Charts,
+        leaves: Leaves,
+        faces: NDArray[np.int64] | None = None,
+        report: Callable[[float], None] | None = None,
+    ) -> Tiles:
+        """The texels of ``leaves``; faces: those that may meet them, else all are tried. report: as of ``texel_surfaces``."""
         some = charts if faces is None else charts.with_faces(faces)
-        surfaces = on_their_faces(scene, some, texel_surfaces(scene, some, leaves))
+        surfaces = surfaces_of(scene, some, leaves, report)
         albedo, emission = texel_colours(scene, some, leaves, surfaces)
         opacity = texel_opacity(scene, some, leaves, surfaces)
         if opacity is not None:
@@ -54,19 +61,3 @@ class Tiles:
             None if self.albedo is None else self.albedo[which],
             None if self.emission is None else self.emission[which],
         )
-
-
-def on_their_faces(scene: Scene, charts: Charts, surfaces: TexelSurfaces) -> TexelSurfaces:
-    """Texels that fold over several faces, put onto the one that they show most of, with its normal. Their mean lies inside or
-    outside of the surface, where the surface itself would hide it."""
-    covered = surfaces.face >= 0
-    face = surfaces.face[covered]
-    triangle = charts.face_triangle[face]
-    normal = scene.normals_areas[0][triangle] * np.where(charts.face_back[face], -1.0, 1.0)[:, None]
-    position = surfaces.position[covered]
-    height = np.abs(((position - scene.corners[triangle, 0]) * normal).sum(-1))
-    folded = height > FOLD * np.sqrt(surfaces.area[covered])
-    positions, normals = surfaces.position.copy(), surfaces.normal.copy()
-    positions[covered] = np.where(folded[:, None], surfaces.leading[covered], position)
-    normals[covered] = normal
-    return dataclasses.replace(surfaces, position=positions, normal=normals)

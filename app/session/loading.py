@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -86,13 +87,22 @@ def load(
         source, atlas, default_light, tell, file=file, sky=sky, roots=options.adaptive
     )
     start = time.perf_counter()
-    tell("cutting into texels", 0.6)
-    pool = quadtree_pool(scene, charts) if options.adaptive else TilePool(scene, charts)
-    exposure, arrays = None, pool.arrays
-    if expose:
-        camera = scene.cameras[0]
-        exposure = first_exposure(pool, seen_texels(pool, camera.world_from_camera, camera.yfov))
-    _ = pool.emission_weights, pool.visible_mesh  # cached here: the window, which reads them next, does not wait
+
+    def cutting(share: float) -> None:
+        tell("cutting into texels", 0.6 + 0.2 * share)
+
+    cutting(0.0)
+    pool = quadtree_pool(scene, charts, cutting) if options.adaptive else TilePool(scene, charts, report=cutting)
+    tell("exposing", 0.8)
+    exposure = None
+    with ThreadPoolExecutor(1) as beside:
+        # cached in the pool: the window, which reads them next, does not wait
+        mesh = beside.submit(lambda: (pool.visible_mesh, pool.emission_weights))
+        arrays = pool.arrays
+        if expose:
+            camera = scene.cameras[0]
+            exposure = first_exposure(pool, seen_texels(pool, camera.world_from_camera, camera.yfov))
+        mesh.result()
     seconds["texels"] = time.perf_counter() - start
     if rays:
         start = time.perf_counter()

@@ -1,0 +1,89 @@
+"""The surfaces of texels as solvers take them: each on the face that it shows most of. Where there are many, they are kept on
+disk: reading takes a tenth of cutting them.
+
+A file holds what the scene and its charts do not say: of each texel its face, and whether something lies on it; of those that
+cover any, area, position and leading place. Normals are those of faces.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from app.atlas.charts import Charts
+from app.atlas.charts_cache import program
+from app.atlas.texels import Leaves, TexelSurfaces, texel_surfaces
+from app.scene.model import F32, F64, I32, Scene
+from app.util import cache
+
+FOLD = 1e-4  # of a texel's width: further off the plane of its leading face, a mean of faces is off the surface
+FEWEST = 1 << 18  # texels that a file is worth: they take half a second
+CACHE_FILES = 4  # kept, newest first: of two million texels a file takes 120 MB
+
+
+def surfaces_of(
+    scene: Scene, charts: Charts, leaves: Leaves, report: Callable[[float], None] | None = None
+) -> TexelSurfaces:
+    """Those of leaves, from the cache or as ``texel_surfaces`` and ``on_their_faces`` make them."""
+    if len(leaves) * charts.tile**2 < FEWEST:
+        return on_their_faces(scene, charts, texel_surfaces(scene, charts, leaves, report))
+    file = cache.entry("texels", cache.digest(program(Path(__file__)), _given(scene, charts, leaves)))
+    found = _read(scene, charts, cache.read(file))
+    if found is None:
+        found = on_their_faces(scene, charts, texel_surfaces(scene, charts, leaves, report))
+        cache.store(cache.content(_content(found)), file, CACHE_FILES)
+    return found
+
+
+def on_their_faces(scene: Scene, charts: Charts, surfaces: TexelSurfaces) -> TexelSurfaces:
+    """Texels that fold over several faces, put onto the one that they show most of, with its normal. Their mean lies inside or
+    outside of the surface, where the surface itself would hide it."""
+    covered = surfaces.face >= 0
+    face = surfaces.face[covered]
+    normal = _face_normals(scene, charts)[face]
+    position = surfaces.position[covered]
+    origin = scene.corners[charts.face_triangle[face], 0]
+    height = np.abs(np.einsum("nk,nk->n", position - origin, normal))
+    folded = height > FOLD * np.sqrt(surfaces.area[covered])
+    position[folded] = surfaces.leading[covered][folded]
+    positions, normals = surfaces.position.copy(), surfaces.normal.copy()
+    positions[covered], normals[covered] = position, normal
+    return dataclasses.replace(surfaces, position=positions, normal=normals)
+
+
+def _face_normals(scene: Scene, charts: Charts) -> F64:
+    """(f, 3) unit, towards the lit side."""
+    return np.asarray(scene.normals_areas[0][charts.face_triangle] * np.where(charts.face_back, -1.0, 1.0)[:, None])
+
+
+def _given(scene: Scene, charts: Charts, leaves: Leaves) -> cache.Arrays:
+    """All that the surfaces follow from."""
+    own = ("face_triangle", "face_back", "face_uv", "hidden_uv", "hidden_face")
+    cut = {name: getattr(charts, name) for name in own}
+    return {"positions": scene.positions, "triangles": scene.triangles, **cut, **vars(leaves)} | {
+        "tile": np.array(charts.tile)
+    }
+
+
+def _content(surfaces: TexelSurfaces) -> cache.Arrays:
+    covered = surfaces.face >= 0
+    some = {name: getattr(surfaces, name)[covered] for name in ("area", "position", "leading")}
+    return {"face": surfaces.face, "cut": surfaces.cut, **some}
+
+
+def _read(scene: Scene, charts: Charts, data: cache.Arrays | None) -> TexelSurfaces | None:
+    """The surfaces that a file holds; None where it holds none."""
+    if data is None or not {"face", "area", "position", "leading", "cut"} <= data.keys():
+        return None
+    face: I32 = data["face"]
+    covered = face >= 0
+    normal: F32 = np.zeros((*face.shape, 3), np.float32)
+    normal[covered] = _face_normals(scene, charts)[face[covered]]
+    position, leading = np.zeros((2, *face.shape, 3))
+    area = np.zeros(face.shape)
+    for whole, name in ((position, "position"), (leading, "leading"), (area, "area")):
+        whole[covered] = data[name]
+    return TexelSurfaces(position, area, normal, face, leading, data["cut"])
