@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from app import __version__
-from app.options import specs
 from app.render.exposure import exposure_of
 from app.render.options import DisplayOptions
 from app.render.seen import seen_texels
+from app.session.balance import verdict_of
 from app.session.session import Session
-
-UNBALANCED = 0.02  # of the emitted power: more is worth a word
 
 __all__ = ["notes", "picture", "report", "summary"]
 
@@ -42,6 +40,7 @@ def report(session: Session) -> dict[str, Any]:
             for name in ("emitted", "absorbed", "escaped", "unshot", "imbalance")
         },
         "imbalance": stats.imbalance,
+        "balance": ("fine", "fair", "bad")[verdict_of(stats.imbalance, session.family).level],
         **_error(session),
         **({} if session.expected is None else {"expected_error": session.expected._asdict()}),
         "warnings": [*session.scene.warnings, *session.charts.warnings, *notes(session)],
@@ -73,26 +72,11 @@ def _error(session: Session) -> dict[str, Any]:
 
 def notes(session: Session) -> list[str]:
     """What the solver has to say of the solution, and what its energy balance says of it."""
-    note, share = session.run.progress.note, session.stats.imbalance
+    note, verdict = session.run.progress.note, verdict_of(session.stats.imbalance, session.family)
     found = [] if note is None else [note]
-    if abs(share) > UNBALANCED:
-        what = "is lost" if share > 0 else "comes from nothing"
-        found.append(f"{abs(share):.1%} of the light {what}: {_remedy(session)}")
+    if verdict.text is not None and verdict.level > 1:
+        found.append(verdict.text)
     return found
-
-
-def _remedy(session: Session) -> str:
-    """Why light is lost or comes from nothing, and what would do."""
-    family = session.family
-    if not family.everywhere:
-        return "what is far from the observer is known coarsely, or as a mean; --solver gathering lights all of it"
-    why, smaller = "texels are", "--density"
-    if not family.distributes:
-        why = f"it is {family.remains}, or {why}"
-    elif "level" in {spec.name for spec in specs(family.options)}:
-        why, smaller = f"patches and {why}", "--density, --level"
-    other = " or --solver gathering" if family.distributes else ""
-    return f"{why} large beside what stands between them; smaller ones ({smaller}){other} would do"
 
 
 def summary(session: Session, result: dict[str, Any]) -> str:

@@ -63,12 +63,17 @@ class Keeper(Protocol):
         """The solve is about to be stopped."""
 
 
+NEVER = Stop()
+
+
 class Run:
     """The solve of the open scene. ``begin`` gives it a solver; it releases nothing.
 
     running: whether ``advance`` works. seconds: of solving; earlier: of these, before the light was kept that it goes on from.
     interrupted: whether Ctrl-C ended the last ``solve``.
-    settled: whether progress, energy and history are those of the last piece of work.
+    furthest: share of the way down to what may remain, that the solve has come since it began or was edited. What remains grows
+    for a while where light overshoots or leaves of quadtrees come; this does not. settled: whether progress, energy and history
+    are those of the last piece of work.
     """
 
     def __init__(self, gpu: Gpu) -> None:
@@ -99,7 +104,7 @@ class Run:
         self._start_clock()
 
     def _start_clock(self) -> None:
-        self.seconds = self.earlier = 0.0
+        self.seconds = self.earlier = self.furthest = 0.0
         self.settled = True
         self.effort.begin()
         self._pace.begin()
@@ -129,7 +134,7 @@ class Run:
     def options_changed(self) -> None:
         """Other options of the solver, or of the leaves of its lightmap: what is left to do may be another."""
         self.effort.options_changed()
-        self.progress = self.solver.poll()
+        self.progress, self.furthest = self.solver.poll(), 0.0
 
     def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Other albedos and emissions: the light that is there stays where the solver can solve for the difference."""
@@ -146,7 +151,7 @@ class Run:
     def _edit(self, edit: Callable[[], None]) -> None:
         converged, counts = self.converged, self.solver.inspect().counts
         edit()
-        self.progress = self.solver.poll()
+        self.progress, self.furthest = self.solver.poll(), 0.0
         if self.solver.issued == 0:
             self._begin_again()
         else:
@@ -229,6 +234,7 @@ class Run:
         elif wanted and self._energy.due:
             slow = True
             self._energy.measure(self.solver)
+        self.furthest = max(self.furthest, self.share_done(NEVER))
         if self.converged:
             self.effort.converged(self.progress.done)
         if self.progress.done != before and not self.settled:
@@ -239,6 +245,7 @@ class Run:
         """Wait for the GPU and bring progress, energy and history up to the last piece of work. Raises NotFiniteError, once."""
         known = np.isfinite(self.progress.remaining)
         self.progress = self.solver.settle()
+        self.furthest = max(self.furthest, self.share_done(NEVER))
         self._energy.measure(self.solver)
         self.settled = True
         if self.energy.emitted.sum() > 0:

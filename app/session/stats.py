@@ -21,6 +21,7 @@ class Stats:
     done: int
     seconds: float
     remaining: float
+    progress: float  # 0 to 1, see Run.furthest
     emitted: float
     absorbed: float
     escaped: float
@@ -53,6 +54,7 @@ def stats_of(run: Run, lightmap: Lightmap) -> Stats:
         done=progress.done,
         seconds=run.seconds,
         remaining=progress.remaining,
+        progress=run.furthest,
         emitted=float(balance.emitted.sum()),
         absorbed=float(balance.absorbed.sum()),
         escaped=float(balance.escaped.sum()),

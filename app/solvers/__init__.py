@@ -44,7 +44,7 @@ class Family:
     everywhere: whether it lights all surfaces alike, wherever they are seen from; else what is far is known roughly.
     quadratic: whether its work grows with the square of the texels.
     lamps: what lights a scene besides surfaces that emit: "points", point and spot lights, and what is "beyond" all surfaces, sky
-    and directional lights; leaf_lamps: those of them that quadtrees follow.
+    and directional lights.
     """
 
     title: str
@@ -67,7 +67,6 @@ class Family:
     rays: bool = False
     everywhere: bool = True
     lamps: tuple[str, ...] = LAMPS
-    leaf_lamps: tuple[str, ...] = LAMPS
 
 
 SOLVERS: dict[str, Family] = {
@@ -83,7 +82,6 @@ SOLVERS: dict[str, Family] = {
         pictures=PICTURES,
         shows=("ambient",),
         layers=("residual",),
-        leaf_lamps=("points",),
     ),
     "gathering": Family(
         title="Gathering",
@@ -130,7 +128,6 @@ SOLVERS: dict[str, Family] = {
         quadratic=True,
         rays=True,
         lamps=(),
-        leaf_lamps=(),
     ),
 }
 DEFAULT_SOLVER = "shooting"

@@ -76,13 +76,11 @@ def is_lit(view: View, state: State) -> bool:
 def why_not(view: View, kind: Kind) -> str | None:
     """Why a lamp of that kind cannot be added now."""
     session = view.session
-    family, light = session.family, session.light
+    family = session.family
     if not kind.lamps:
         return LOADING if session.loading is not None else None
     if kind.lamps not in family.lamps:
         return f"{family.title} knows emitting surfaces alone; other solvers know all lamps"
-    if light.adaptive and kind.lamps not in family.leaf_lamps:
-        return f"{family.title} does not follow it with quadtrees: turn Adaptive off, or take Gathering"
     return "there is a sky, see below" if kind.label == "Sky" and session.edited_scene.sky is not None else None
 
 

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 from imgui_bundle import imgui
 
 from app.render.units import QUANTITIES, UNITS
+from app.session.balance import verdict_of
 from app.ui import edits, new_lamps, pointer, theme, widgets
 from app.ui.keys import POINTER, SHORTCUTS, flip_pace
 from app.ui.layout import PANELS
 from app.ui.navigation import look_through
 from app.ui.panels.display import counted
 from app.ui.state import TOAST_SECONDS, Legend, Request, State
+from app.ui.words import plain
 
 if TYPE_CHECKING:
     from app.session.view import View
@@ -109,8 +111,9 @@ def status_bar(view: View, state: State) -> None:
         if state.stats is not None:
             _pace(view, state)
         if view.session.message:
-            imgui.text_unformatted(view.session.message)
-            widgets.copied_by_click(view.session.message)
+            message = plain(view.session.message)
+            imgui.text_unformatted(message)
+            widgets.copied_by_click(message)
         _under_pointer(view, state)
         imgui.end_menu_bar()
     imgui.end()
@@ -143,7 +146,12 @@ def _status(view: View, state: State) -> list[tuple[str, theme.RGBA]]:
         parts += [f"{widgets.number(stats.per_second, 3)} {stats.unit}/s"]
     if state.measured and state.live:
         parts += [f"{state.fps:.0f} fps"]
-    return [(view.session.name, theme.TEXT), (word, colour), *((part, theme.DIM) for part in parts)]
+    wrong = verdict_of(stats.imbalance, view.session.family).level > 1
+    imbalance = f"{ICONS.ICON_FA_CIRCLE_EXCLAMATION} imbalance {widgets.percent(abs(stats.imbalance))}"
+    return [
+        *((view.session.name, theme.TEXT), (word, colour), *((part, theme.DIM) for part in parts)),
+        *([(imbalance, theme.BAD)] if wrong else []),
+    ]
 
 
 def _pace(view: View, state: State) -> None:
@@ -239,7 +247,7 @@ def toasts(view: View, state: State, seconds: float) -> None:
         imgui.same_line()
         wrap = min(width - 4 * imgui.get_font_size(), imgui.get_font_size() * TOAST_EM)
         imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + max(wrap, imgui.get_font_size()))
-        imgui.text_unformatted(toast.text)
+        imgui.text_unformatted(plain(toast.text))
         imgui.pop_text_wrap_pos()
         if imgui.is_window_hovered() and imgui.is_mouse_clicked(0):
             toast.seconds = TOAST_SECONDS

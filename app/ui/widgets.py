@@ -13,6 +13,7 @@ from imgui_bundle import imgui
 
 from app.options import Options, Spec, specs
 from app.ui import slider, theme
+from app.ui.words import title
 
 OptionsT = TypeVar("OptionsT", bound=Options)
 
@@ -86,12 +87,6 @@ def put_back(value: Any, default: Any) -> Any:
         imgui.internal.clear_active_id()
         return default
     return value
-
-
-def title(name: str) -> str:
-    """``shots_per_frame`` as a label: ``Shots per frame``."""
-    words = name.replace("_", " ")
-    return words[:1].upper() + words[1:]
 
 
 def shown(value: Any) -> str:

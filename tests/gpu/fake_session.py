@@ -18,7 +18,7 @@ from app.render.options import LAYERS, DisplayOptions
 from app.scene.lights import Light
 from app.scene.model import Material
 from app.scene.sky import Sky
-from app.solvers import DEFAULT_SOLVER, SOLVERS, Inspection, ShootingOptions
+from app.solvers import DEFAULT_SOLVER, SOLVERS, EnergyBalance, Inspection, ShootingOptions
 
 EMITTED = 34.6  # W
 MATERIALS = (
@@ -127,7 +127,7 @@ class FakeSession:
             "render/surface": 3.2,
             "imgui": 1.4,
         }
-        self.image = None
+        self.image, self.imbalance = None, 0.0002
         self.flickers = False
         self.picked = None
         self.scale: tuple[float, float] | None = None
@@ -184,7 +184,7 @@ class FakeSession:
 
     @property
     def stats(self) -> SimpleNamespace:
-        energies = {"emitted": EMITTED, "absorbed": 30.1, "escaped": 3.4, "unshot": 1.1, "imbalance": 0.0002}
+        energies = {"emitted": EMITTED, "absorbed": 30.1, "escaped": 3.4, "unshot": 1.1, "imbalance": self.imbalance}
         counts = {
             "texels": 31204,
             "tiles": 160,
@@ -202,17 +202,15 @@ class FakeSession:
             "counts_in_edit": {},
             "resolved": {"level": 2, "resolution": 256},
         }
-        rates = {"remaining": 0.0318, "seconds": 0.3, "per_second": 212.0, "converged": False}
+        rates = {"progress": 0.25, "remaining": 0.0318, "seconds": 0.3, "per_second": 212.0, "converged": False}
         rates |= {"edit_work": None, "fresh_work": None}
         return SimpleNamespace(**energies, **counts, **rates)
 
     @property
-    def energy(self) -> SimpleNamespace:
-        names = "emitted", "absorbed", "escaped", "unshot"
-        return SimpleNamespace(**{name: np.full(3, getattr(self.stats, name) / 3) for name in names})
-
-    def share_done(self, stop: object) -> float:
-        return 0.25
+    def energy(self) -> EnergyBalance:
+        stats = self.stats
+        powers = (np.full(3, getattr(stats, name) / 3) for name in ("emitted", "absorbed", "escaped", "unshot"))
+        return EnergyBalance(*powers, np.full(3, 0.5), 1.0)
 
     def poll(self) -> None:
         pass

@@ -126,7 +126,7 @@ def test_sides_that_faced_nothing_are_lit_by_a_sky(dark: Dark) -> None:
 @pytest.mark.parametrize(
     ("solver", "adaptive", "known"),
     [
-        ("shooting", True, {"Point", "Spot"}),
+        ("shooting", True, {"Point", "Spot", "Sun", "Sky"}),
         ("pairs", False, set()),
         ("gathering", True, {"Point", "Spot", "Sun", "Sky"}),
     ],

@@ -11,7 +11,7 @@ from desks import PICKED, VIEW, Desk, desk, session
 from imgui_bundle import imgui
 
 from app.ui import pointer, widgets
-from app.ui.panels import solver
+from app.ui.panels import energy
 
 __all__ = ["desk", "session"]
 
@@ -136,6 +136,6 @@ def test_energy_is_in_the_same_units(desk: Desk, monkeypatch: pytest.MonkeyPatch
     desk.frames(3)
     assert "Energy [lm]" in sections
     power = np.array([3.0, 2.0, 1.0])
-    assert solver._flux(power, desk.session) == pytest.approx(179 * power @ [0.2126, 0.7152, 0.0722])
+    assert energy._flux(power, desk.session) == pytest.approx(179 * power @ [0.2126, 0.7152, 0.0722])
     desk.session.display = desk.session.display.replace(quantities="radiometric")
-    assert solver._flux(power, desk.session) == 6.0
+    assert energy._flux(power, desk.session) == 6.0

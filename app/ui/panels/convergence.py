@@ -1,4 +1,4 @@
-"""Convergence: residual, error and energy over shots or seconds, and the time of each pass."""
+"""Convergence: what is unshot, error and energy over shots or seconds, and the time of each pass."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _shares(
     if not _begin("residual", size, label):
         return
     family = view.session.family
-    name, of = ("residual", "emitted") if family.distributes else (family.remains, family.part_of)
+    name, of = family.remains, "emitted" if family.distributes else family.part_of
     curves: dict[str, Curve] = {f"{name} / {of}": (x, residual, theme.AMBER)}
     if view.session.compared.comparison is not None:
         curves = {name: (x, residual, theme.AMBER)}  # all three names fit above the plot
@@ -124,14 +124,14 @@ def _shares(
 
 
 def _energy(size: imgui.ImVec2, x: np.ndarray, curves: dict[str, np.ndarray], label: str | None) -> None:
-    """Where the emitted power is, stacked: absorbed, escaped, residual [fraction]."""
+    """Where the emitted power is, stacked: absorbed, escaped, unshot [fraction]."""
     if _begin("energy", size, label):
         implot.setup_axis(implot.ImAxis_.y1, None, int(implot.AxisFlags_.no_highlight))
         implot.setup_axis_limits(implot.ImAxis_.y1, 0.0, 1.0, implot.Cond_.always)
-        names = (("absorbed", theme.ABSORBED), ("escaped", theme.ESCAPED), ("remaining", theme.UNSHOT))
+        names = (("absorbed", theme.ABSORBED), ("escaped", theme.ESCAPED), ("unshot", theme.UNSHOT))
         lower = np.zeros_like(x)
         for name, colour in names:
-            upper = lower + curves[name]
+            upper = lower + curves["remaining" if name == "unshot" else name]
             if len(x):
                 implot.plot_shaded(name, x, lower, upper, implot.Spec(fill_color=imgui.ImVec4(*colour), fill_alpha=0.7))
             lower = upper

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from imgui_bundle import imgui
 
+from app.scene.load import NO_LIGHT
 from app.ui import theme, widgets
 from app.ui.state import State
+from app.ui.words import plain
 
 if TYPE_CHECKING:
     from app.session.view import View
@@ -17,11 +19,12 @@ if TYPE_CHECKING:
 def draw(view: View, state: State) -> None:
     """The whole panel."""
     _counts(view, state)
-    warnings = (*view.session.scene.warnings, *view.session.charts.warnings)
+    said = (*view.session.scene.warnings, *view.session.charts.warnings)
+    warnings = [warning for warning in said if warning != NO_LIGHT]  # the view says it, while it is so
     if warnings:
         widgets.section(f"{len(warnings)} warning{'s' * (len(warnings) > 1)}")
     for warning in warnings:
-        widgets.wrapped(warning, theme.AMBER)
+        widgets.wrapped(plain(warning), theme.AMBER)
 
 
 def _counts(view: View, state: State) -> None:
