@@ -14,8 +14,11 @@ from app.options import from_flags
 from app.render.options import DisplayOptions
 from app.render.units import UNITS
 from app.scene.options import FileOptions
+from app.session.keeping import SUFFIX, check_session
 from app.session.session import Session
+from app.session.settings import Settings
 from app.session.view import View
+from app.ui.state import Pace
 from app.util.console import Console
 from app.util.kept import keep, kept
 
@@ -27,9 +30,15 @@ def view_or_shot(flags: argparse.Namespace) -> int:
     from app.scene.load import scene_file
     from app.viewer.window import no_display
 
-    scene_file(flags.scene)
+    session_file = Path(flags.scene).suffix.lower() == SUFFIX
+    if session_file:
+        check_session(Path(flags.scene))
+    else:
+        scene_file(flags.scene)
 
     if reason := no_display():
+        if session_file:
+            raise UserError(f"{flags.scene}: a session opens in a window, and none can be opened here ({reason})")
         if flags.frames is not None:
             raise UserError(f"--frames {flags.frames}: no window can be opened here ({reason}), so there are no frames")
         flags.output = Path(f"{Path(flags.scene).stem}.png")
@@ -43,6 +52,9 @@ def view_or_shot(flags: argparse.Namespace) -> int:
 def view(flags: argparse.Namespace) -> int:
     """Open the window on a scene. Raises UserError."""
     check_display(flags)
+    session_file = Path(flags.scene).suffix.lower() == SUFFIX
+    from platformdirs import user_state_path
+
     from app.scene.library import scene_names
     from app.scene.load import LOADERS
     from app.viewer.window import run_window
@@ -54,7 +66,9 @@ def view(flags: argparse.Namespace) -> int:
         session = Session(gpu, **session_options(flags), expose_on_open=flags.exposure is None)
         view = View(session, _display(flags, folder))
         views.append(view)
-        session.open(flags.scene, from_flags(FileOptions, flags), reference=flags.reference)
+        put_solver_options(session, flags.given)
+        if not session_file:
+            session.open(flags.scene, from_flags(FileOptions, flags), reference=flags.reference)
         return view
 
     run_window(
@@ -63,12 +77,22 @@ def view(flags: argparse.Namespace) -> int:
         scenes=scene_names(),
         suffixes=tuple(LOADERS),
         layout_file=None if folder is None else folder / "layout.ini",
+        state_folder=None if flags.frames is not None else user_state_path("glowtree"),
+        pace=flags.given.of("pace", Pace()),
+        first=Path(flags.scene) if session_file else None,
         frames=flags.frames,
     )
     if folder is not None:
         for made in views:
             keep(folder, quantities=made.display.quantities)
     return 0
+
+
+def put_solver_options(session: Session, settings: Settings) -> None:
+    """Those of the other solvers, too: each can be chosen in the window."""
+    chosen = session.chosen_solver
+    given = {name: settings.of(name, old) for name, old in session.solver_options.items() if name != chosen}
+    session.set_solver_options({**given, chosen: session.options})
 
 
 def _display(flags: argparse.Namespace, folder: Path | None) -> DisplayOptions:

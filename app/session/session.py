@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,25 @@ from app.util.background import BackgroundTask
 from app.util.state import State
 
 
+@dataclass(frozen=True)
+class Reading:
+    """How a scene is read: its file's unit and axes, guessed if None; with a ceiling light where nothing in it emits; with which
+    sky where it has none."""
+
+    file: FileOptions | None = None
+    default_light: bool = False
+    sky: Sky | None = None
+
+
+@dataclass(frozen=True)
+class Cut:
+    """How a scene is cut, held and solved."""
+
+    atlas: AtlasOptions
+    light: LightmapOptions
+    solver: str
+
+
 class Session:
     """The open scene with its lightmap and solver. Raises UserError (SceneError, GpuError) from ``open_now``; ``open`` reports
     through ``message`` instead. Whoever makes it releases it.
@@ -44,7 +64,7 @@ class Session:
     options: of the solver that is at work. atlas, light: how scenes are cut, and how their light is held. expose_on_open:
     whether the exposure is forecast of a scene that opens. unedited: the open scene as it was read, the same through edits and
     however it is cut. edited: what edits are of: another object where those of before are not edits of what is open now.
-    load_seconds: of each stage of opening. message: what the user should know.
+    reading: how it was read. load_seconds: of each stage of opening. message: what the user should know.
     """
 
     def __init__(
@@ -77,6 +97,7 @@ class Session:
         self.edited: object = None
         self._steady: Scene | None = None  # as it was edited, while its lamps flicker
         self._then_reference: Path | None = None
+        self.reading = self._reading = Reading()
 
     def follow(self, prepare: Prepare, opened: Opened) -> None:
         """Call a view to prepare for each lightmap before it is shown, and once it is open."""
@@ -84,13 +105,23 @@ class Session:
 
     # -- opening -------------------------------------------------------------------------------------------------------
 
-    def open(self, source: str | Path, file: FileOptions | None = None, *, reference: Path | None = None) -> None:
+    def open(
+        self,
+        source: str | Path,
+        file: FileOptions | None = None,
+        *,
+        reference: Path | None = None,
+        reading: Reading | None = None,
+        cut: Cut | None = None,
+    ) -> None:
         """Start to load in the background; ``poll`` swaps the scene when it is there. file: its unit and axes,
-        guessed if None. reference: a bake to open then."""
+        guessed if None. reference: a bake to open then. reading, cut: instead of the session's own."""
         self._then_reference = reference
-        more: dict[str, Any] = {"default_light": self.default_light, "expose": self.expose_on_open}
+        self._reading = reading or Reading(file, self.default_light, self.sky)
+        cut = cut or Cut(self.atlas, self.light, self.chosen_solver)
+        more: dict[str, Any] = {"default_light": self._reading.default_light, "expose": self.expose_on_open}
         self._opening.begin(
-            Loading(source, self.atlas, self.light, self.chosen_solver, file=file, sky=self.sky, **more)
+            Loading(source, cut.atlas, cut.light, cut.solver, file=self._reading.file, sky=self._reading.sky, **more)
         )
 
     def open_now(
@@ -100,7 +131,7 @@ class Session:
         file: FileOptions | None = None,
     ) -> None:
         """Load and wait. file: as of ``open``."""
-        solver = self.chosen_solver
+        solver, self._reading = self.chosen_solver, Reading(file, self.default_light, self.sky)
         rays = SOLVERS[solver].rays
         more: dict[str, Any] = {"default_light": self.default_light, "expose": self.expose_on_open, "rays": rays}
         loaded = load(source, self.atlas, self.light, file=file, sky=self.sky, **more, progress=progress)
@@ -136,7 +167,8 @@ class Session:
     @property
     def asked_cut(self) -> tuple[AtlasOptions, bool]:
         """How the open scene is cut, and whether into quadtrees; as it was asked for last, where that is on its way."""
-        cut = self.loading if self.loading is not None and self.loading.source is self.unedited else self
+        cuts = self._opened and self.loading is not None and self.loading.source is self.unedited
+        cut = self.loading if cuts and self.loading is not None else self
         return cut.atlas, cut.light.adaptive
 
     def poll(self, *, interactive: bool = False) -> None:
@@ -193,6 +225,7 @@ class Session:
             lightmap.set_lights(self.scene.lights)
             solver.reset()
         self.close()
+        self.reading = self.reading if same_scene else self._reading
         self.lightmap, self.solver, self.unedited = lightmap, solver, scene
         self._choice.at_work = ready.solver_name
         self.atlas, self.light = loaded.atlas, lightmap.options

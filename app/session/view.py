@@ -38,13 +38,15 @@ RAYS_SECONDS = 0.25  # between two looks at the rays that are drawn, while light
 class View:
     """A camera in the open scene, how its light is displayed, and the renderer. Whoever makes it releases it, before the session.
 
-    It is made before a scene opens: camera is set then. marked: the texel (column, row) of the tile pool whose rays are drawn,
+    It is made before a scene opens: camera is set then. bookmarks: of cameras, by digit.
+    marked: the texel (column, row) of the tile pool whose rays are drawn,
     where the solver has any.
     """
 
     def __init__(self, session: Session, display: DisplayOptions | None = None) -> None:
         self.session, self.display = session, display or DisplayOptions()
         self.camera: CameraView
+        self.bookmarks: dict[int, CameraView] = {}
         self.marked: tuple[int, int] | None = None
         self._size = SIZE
         self._looked_at: object = None
@@ -62,6 +64,7 @@ class View:
         """Another lightmap is open. exposure: that its light will need [EV], where it is known."""
         if not same_scene:
             self.look_through(self.session.scene.cameras[0])
+            self.bookmarks = {}
         if exposure is not None:
             self.display = self.display.replace(exposure=exposure)
         if reference_gone:

@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui, implot
 
+from app.session.keeping import Keeping
 from app.ui import edits, keys, layout, navigation, overlays, theme
-from app.ui.file_dialog import FileDialog
+from app.ui.files import Files, open_file
 from app.ui.quit_dialog import quit_dialog
+from app.ui.recovery import recovery
+from app.ui.settings import KNOWN
 from app.ui.state import Legend, Request, State
+from app.util.recent import Recent
 
 if TYPE_CHECKING:
     from app.session.view import View
 
 SMALLEST_STEP = 1e-4  # s: Dear ImGui wants time to pass between frames
-IRRADIANCE = ".exr"
-AUTHORED = "The scenes that come along are under File > Scenes."
-BAKES = "'glowtree bake' writes an irradiance.exr."
 FPS_MEMORY = 0.9  # share of the last value in the running mean
 
 
@@ -27,8 +28,9 @@ class Ui:
     """Owns the Dear ImGui and ImPlot contexts; whoever makes it releases it, after the renderer of its frames.
 
     scale: size of text and spacing, 1 on an ordinary screen. layout_file: where the places of the panels are kept
-    between runs. scenes: names or files offered in the menu. suffixes: of the files that can be opened; none: all
-    files. measured: whether numbers that depend on the machine's speed are shown. live: whether frames follow each other.
+    between runs. state_folder: where recent files are, and what a crash would lose. scenes: names or files offered in the menu.
+    suffixes: of the files that can be opened; none: all files. measured: whether numbers that depend on the machine's speed are
+    shown. live: whether frames follow each other.
     """
 
     def __init__(
@@ -36,6 +38,7 @@ class Ui:
         *,
         scale: float = 1.0,
         layout_file: Path | None = None,
+        state_folder: Path | None = None,
         scenes: Sequence[str] = (),
         suffixes: Sequence[str] = (),
         native_dialog: bool | None = None,
@@ -51,8 +54,10 @@ class Ui:
         io.set_ini_filename(str(layout_file) if layout_file else None)
         theme.apply(scale)
         self.state = State(measured=measured, live=live, scenes=tuple(scenes))
-        self._dialog = FileDialog("Open a scene", "Scenes", suffixes, AUTHORED, native=native_dialog)
-        self._bakes = FileDialog("Open a bake", "Irradiance", (IRRADIANCE,), BAKES, native=native_dialog)
+        self.state.keeping = Keeping(None if state_folder is None else state_folder / "aside", KNOWN)
+        self.state.recent = Recent(None if state_folder is None else state_folder / "recent.json")
+        self.state.asides = self.state.keeping.asides()
+        self._files = Files(suffixes, native=native_dialog)
 
     def use(self) -> None:
         """Make this interface's contexts the current ones."""
@@ -91,6 +96,7 @@ class Ui:
         state.fps = FPS_MEMORY * state.fps + (1 - FPS_MEMORY) / io.delta_time if state.fps else 1 / io.delta_time
         if view.session.opened:
             state.remember(view.session.edited, view.session.lightmap)
+        self._files.keep(view, state)
         imgui.new_frame()
         self._build(view, io.delta_time)
         imgui.render()
@@ -118,8 +124,7 @@ class Ui:
             or state.flight is not None
             or state.drag_button >= 0
             or state.flying
-            or self._dialog.waiting
-            or self._bakes.waiting
+            or self._files.waiting
         )
 
     @property
@@ -161,30 +166,14 @@ class Ui:
             navigation.navigate(view, state, seconds)
         overlays.invitation(view, state)
         overlays.no_lamps(view, state)
-        self._open_files(view)
+        self._files.frame(view, state)
         overlays.legend_overlay(state.legend, state)
         overlays.loading_overlay(view.session.on_its_way)
         overlays.toasts(view, state, seconds)
         overlays.help_overlay(state)
         quit_dialog(view, state)
-
-    def _open_files(self, view: View) -> None:
-        if self.state.ask_for_file:
-            self.state.ask_for_file = False
-            self._dialog.open()
-        chosen = self._dialog.poll()
-        if chosen is not None:
-            self.state.act(lambda: view.session.open(chosen))
-        if self.state.ask_for_reference:
-            self.state.ask_for_reference = False
-            self._bakes.open()
-        bake = self._bakes.poll()
-        if bake is not None:
-            self.state.act(lambda: view.session.compared.open(bake))
+        recovery(view, state)
 
     def drop(self, view: View, file: Path) -> None:
-        """A file was dropped on the window: a scene, or the light of a bake of the one that is open."""
-        if file.suffix.lower() == IRRADIANCE and view.session.opened:
-            self.state.act(lambda: view.session.compared.open(file))
-        else:
-            self.state.act(lambda: view.session.open(file))
+        """A file was dropped on the window, or is the first to be opened: a scene, a session, or the light of a bake."""
+        open_file(view, self.state, file)

@@ -25,8 +25,7 @@ class FileDialog:
         """kind: of the files, as a plural; hint: what is said in a folder without any."""
         self._title, self._kind, self._hint = title, kind, hint
         self._suffixes = tuple(suffixes)
-        on_linux = sys.platform not in ("win32", "darwin")
-        self._native = any(map(shutil.which, HELPERS)) if native is None and on_linux else native is not False
+        self._native = system_dialog(native)
         self._pending: Any = None
         self._folder = Path.cwd()
         self._opening = False
@@ -95,6 +94,12 @@ class FileDialog:
                 else:
                     chosen = entry
         return chosen
+
+
+def system_dialog(asked: bool | None) -> bool:
+    """Whether the system's own dialogs are used: as asked for, else where there are any."""
+    on_linux = sys.platform not in ("win32", "darwin")
+    return any(map(shutil.which, HELPERS)) if asked is None and on_linux else asked is not False
 
 
 def readable(folder: Path, suffixes: Sequence[str]) -> list[Path]:

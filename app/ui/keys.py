@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 
 from app.ui.edits import let_go, redo, undo
+from app.ui.files import save, save_as
 from app.ui.navigation import focus
 from app.ui.panels.compare import show, shown
 from app.ui.panels.solver import toggle
@@ -117,10 +118,14 @@ SHORTCUTS = (
     Shortcut("C", "flip between solution and reference", Key.c, _flip, needs_scene=True),
     Shortcut("V", "split view: solution and reference", Key.v, _split, needs_scene=True),
     Shortcut("X", "error heat map on and off", Key.x, _error, needs_scene=True),
-    Shortcut("Ctrl+O", "open a scene", Key.o, _open, control=True),
+    Shortcut("Ctrl+O", "open a scene or session", Key.o, _open, control=True),
+    Shortcut("Ctrl+S", "save the session", Key.s, save, control=True, needs_scene=True),
+    Shortcut("Ctrl+Shift+S", "save it to another file", Key.s, save_as, control=True, shift=True, needs_scene=True),
     Shortcut("Ctrl+Z", "undo the last edit, or move of the camera", Key.z, undo, control=True, needs_scene=True),
     Shortcut("Ctrl+Shift+Z", "redo what was undone", Key.z, redo, control=True, shift=True, needs_scene=True),
-    Shortcut("Ctrl+Q", "quit; asks where a long solve would be lost", Key.q, _quit, control=True, while_typing=True),
+    Shortcut(
+        "Ctrl+Q", "quit; asks where edits or a long solve would be lost", Key.q, _quit, control=True, while_typing=True
+    ),
     Shortcut("Esc", "let go, close what is open, stop loading, drop what is picked", Key.escape, _escape),
 )
 
@@ -132,7 +137,7 @@ POINTER = (
     ("W A S D Q E", "fly; Shift is faster, Alt slower"),
     ("Drag a number", "change it; with Shift a tenth as far"),
     ("Double click, Ctrl+click", "type a number"),
-    ("Drop a file", "open it; an .exr as a reference"),
+    ("Drop a file", "open it: a scene, a session, an .exr as a reference"),
 )
 
 

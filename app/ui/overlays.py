@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
 
 from app.render.units import QUANTITIES, UNITS
 from app.session.balance import verdict_of
-from app.ui import edits, new_lamps, pointer, theme, widgets
+from app.ui import edits, files, new_lamps, pointer, theme, widgets
 from app.ui.keys import POINTER, SHORTCUTS, flip_pace
 from app.ui.layout import PANELS
 from app.ui.navigation import look_through
@@ -45,13 +43,7 @@ def menu_bar(view: View, state: State) -> None:
     if not imgui.begin_main_menu_bar():
         return
     if imgui.begin_menu("File"):
-        if imgui.menu_item(f"{ICONS.ICON_FA_FOLDER_OPEN}  Open ...", "Ctrl+O", False)[0]:
-            state.ask_for_file = True
-        if imgui.begin_menu(f"{ICONS.ICON_FA_CUBES}  Scenes", bool(state.scenes)):
-            for source in state.scenes:
-                if imgui.menu_item(Path(source).stem, "", False)[0]:
-                    state.act(partial(view.session.open, source))
-            imgui.end_menu()
+        files.menu(view, state)
         if imgui.menu_item(f"{ICONS.ICON_FA_CAMERA}  Screenshot", "F12", False)[0]:
             state.requests.append(Request.SCREENSHOT)
         imgui.separator()

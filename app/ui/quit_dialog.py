@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 
 from app.ui import widgets
+from app.ui.files import save
 from app.ui.state import Request, State
 
 if TYPE_CHECKING:
     from app.session.view import View
 
 TITLE = "Quit?"
-WORTH_SECONDS = 20.0  # of solving, from which on light is worth a question
 BUTTON_EM = 7.0
 TEXT_EM = 26.0
 
@@ -22,7 +22,7 @@ def quit_dialog(view: View, state: State) -> None:
     """Answer the wish to quit, once per frame: the host is asked to, or the user whether that is meant."""
     if state.ask_to_quit:
         state.ask_to_quit = False
-        if not worth_keeping(view):
+        if not state.keeping.unsaved(view):
             state.requests.append(Request.QUIT)
             return
         imgui.open_popup(TITLE)
@@ -32,9 +32,17 @@ def quit_dialog(view: View, state: State) -> None:
         return
     em = imgui.get_font_size()
     imgui.dummy(imgui.ImVec2(TEXT_EM * em, 0))
-    widgets.wrapped(f"{view.session.name}: {duration(view.session.run.seconds)} of solving will be lost.")
+    solved = widgets.duration(view.session.run.seconds)
+    widgets.wrapped(
+        f"{view.session.name}, solved for {solved}: what was done since it was opened or saved will be lost."
+    )
     imgui.spacing()
     size = imgui.ImVec2(BUTTON_EM * em, 0)
+    if imgui.button("Save", size):
+        state.quit_when_saved = True
+        save(view, state)
+        imgui.close_current_popup()
+    imgui.same_line()
     if imgui.button("Quit", size):
         state.requests.append(Request.QUIT)
         imgui.close_current_popup()
@@ -42,17 +50,3 @@ def quit_dialog(view: View, state: State) -> None:
     if imgui.button("Cancel", size) or imgui.is_key_pressed(imgui.Key.escape, False):
         imgui.close_current_popup()
     imgui.end_popup()
-
-
-def worth_keeping(view: View) -> bool:
-    """Whether there is a solve that took so long that nobody wants to lose it by a slip."""
-    return view.session.opened and view.session.run.seconds >= WORTH_SECONDS
-
-
-def duration(seconds: float) -> str:
-    """In words: ``42 s``, ``3 min 20 s``, ``2 h 5 min``."""
-    whole = round(seconds)
-    minutes, hours = whole // 60, whole // 3600
-    if hours:
-        return f"{hours} h {minutes % 60} min"
-    return f"{minutes} min {whole % 60} s" if minutes else f"{whole} s"

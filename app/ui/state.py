@@ -11,6 +11,8 @@ from app.compare.options import ReferenceOptions
 from app.errors import UserError
 from app.options import Options, option
 from app.session.edits import EditHistory
+from app.session.keeping import Aside, Keeping
+from app.util.recent import Recent
 
 if TYPE_CHECKING:
     from app.atlas.options import AtlasOptions
@@ -87,7 +89,8 @@ class State:
     and of which light. draw_rays: those of the picked texel, in the room. pointed: under the pointer, at which pixel.
     reveal_material: the list scrolls to the selected one. draw_lights: lamps without area, in the view. reference: of a solve
     in the background; layer: to go back to from the error. edits: of the open scene; held: whether a hand was at a control in
-    the last frame. used: of which scene, the materials that are somewhere.
+    the last frame. used: of which scene, the materials that are somewhere. keeping: saves and opens sessions; asides: what
+    crashes have left, to be asked about; quit_when_saved: the user is leaving.
     """
 
     measured: bool = True
@@ -102,6 +105,13 @@ class State:
     ask_for_file: bool = False
     ask_for_reference: bool = False
     ask_to_quit: bool = False
+    ask_for_session_name: bool = False
+    ask_for_settings: bool = False
+    ask_for_settings_name: bool = False
+    quit_when_saved: bool = False
+    keeping: Keeping = field(default_factory=Keeping)
+    asides: list[Aside] = field(default_factory=list)
+    recent: Recent = field(default_factory=Recent)
     edits: EditHistory = field(default_factory=EditHistory)
     held: bool = False
     hidden_panels: set[str] = field(default_factory=set)

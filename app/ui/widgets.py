@@ -254,3 +254,12 @@ def percent(fraction: float) -> str:
 
 def triple(values: Sequence[float], digits: int = 4) -> str:
     return "  ".join(number(float(v), digits) for v in values)
+
+
+def duration(seconds: float) -> str:
+    """In words: ``42 s``, ``3 min 20 s``, ``2 h 5 min``."""
+    whole = round(seconds)
+    minutes, hours = whole // 60, whole // 3600
+    if hours:
+        return f"{hours} h {minutes % 60} min"
+    return f"{minutes} min {whole % 60} s" if minutes else f"{whole} s"

@@ -23,7 +23,7 @@ from app.gpu import Gpu
 from app.session.pacing import Turns
 from app.session.view import View
 from app.ui.app import Ui
-from app.ui.state import Request
+from app.ui.state import Pace, Request
 from app.viewer.ui_frame import UiFrame, save_screenshot
 
 GL_VERSION = (4, 1)
@@ -84,13 +84,17 @@ def run_window(
     scenes: Sequence[str] = (),
     suffixes: Sequence[str] = (),
     layout_file: Path | None = None,
+    state_folder: Path | None = None,
+    first: Path | None = None,
+    pace: Pace | None = None,
     vsync: bool = True,
     frames: int | None = None,
 ) -> None:
     """Open the window, run until it is closed, release everything.
 
     make_view: makes a view of a session once there is a context. size: of the window [display units]. scenes: names for
-    the menu. suffixes: of the files that can be opened. layout_file: keeps the places of the panels. frames: close
+    the menu. suffixes: of the files that can be opened. layout_file: keeps the places of the panels.
+    state_folder: keeps recent files, and what a crash would lose. first: a file to open. pace: to begin with. frames: close
     after so many (for tests and measurements). Raises UserError where no window can be opened, and what
     ``make_view`` raises.
     """
@@ -104,10 +108,21 @@ def run_window(
         gpu.release()
         window.close()
         raise
-    ui = Ui(scale=_text_scale(window), layout_file=layout_file, scenes=scenes, suffixes=suffixes)
+    ui = Ui(
+        scale=_text_scale(window),
+        layout_file=layout_file,
+        state_folder=state_folder,
+        scenes=scenes,
+        suffixes=suffixes,
+    )
     frame = UiFrame(gpu, ui, whole=False)
     try:
+        ui.state.pace = pace or ui.state.pace
+        if first is not None:
+            ui.drop(view, first)
+            ui.state.run_actions()
         ViewerWindow(window, timer, view, frame, ui, frames).main_loop()
+        ui.state.keeping.end()
     finally:
         frame.release()
         ui.release()
@@ -264,7 +279,9 @@ class ViewerWindow(WindowConfig):
             window.set_mouse_cursor(window.get_system_mouse_cursor(getattr(window, name)))
 
     def _show_name(self) -> None:
-        caption = f"{self._session.name} - {TITLE}" if self._session.opened else TITLE
+        file = self._ui.state.keeping.path
+        name = self._session.name if file is None else file.name
+        caption = f"{name} - {TITLE}" if self._session.opened else TITLE
         if caption != self._caption:
             self._caption = caption
             self.wnd.title = caption

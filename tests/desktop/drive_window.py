@@ -22,9 +22,10 @@ import pyglet
 from imgui_bundle import imgui
 
 from app.gpu import Gpu
+from app.session import keeping
 from app.session.session import Session
 from app.session.view import View
-from app.ui import quit_dialog, widgets
+from app.ui import widgets
 from app.viewer.window import run_window
 
 EVERY = 3  # frames between two reports
@@ -101,7 +102,7 @@ def pass_on_events(folder: Path) -> None:
 def main() -> None:
     folder = Path(sys.argv[1])
     if len(sys.argv) > 2:
-        quit_dialog.WORTH_SECONDS = float(sys.argv[2])
+        keeping.WORTH_SECONDS = float(sys.argv[2])
 
     def make_view(gpu: Gpu) -> View:
         session = ReportingSession(gpu, folder)

@@ -170,6 +170,22 @@ def test_an_edit_is_undone_and_done_again(window: Driven) -> None:
     window.until(lambda s: s["exposure"] == after)
 
 
+def test_a_session_is_saved_and_opened_with_its_light(window: Driven, tmp_path: Path) -> None:
+    window.until(lambda s: s["shots"] > 20)
+    window.do("key", "space")
+    shots = window.until(lambda s: not s["running"])["shots"]
+    window.do("key", "ctrl+s")
+    window.do("key", "ctrl+a")
+    window.do("type", "--delay", "40", str(tmp_path / "mine"))
+    window.do("key", "Return")
+    file = tmp_path / "mine.glow"
+    window.until(lambda s: file.exists())
+    window.do("key", "r")
+    window.until(lambda s: s["shots"] == 0)
+    (tmp_path / "drop").write_text(str(file))
+    window.until(lambda s: s["shots"] == shots)
+
+
 def test_the_windows_own_button_asks_where_a_long_solve_would_be_lost(display: str, tmp_path: Path) -> None:
     window = Driven(display, tmp_path, "0")
     try:

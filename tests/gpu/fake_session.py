@@ -111,15 +111,17 @@ class FakeSession:
         cameras = (SimpleNamespace(name="front", world_from_camera=np.eye(4), yfov=0.7),)
         warnings = ("3 degenerate triangles dropped",)
         self.scene = FakeScene(materials=MATERIALS, warnings=warnings, cameras=cameras, sky=None, lights=())
+        self.scene.source = None
         self.scene.corners = np.zeros((len(MATERIALS), 3, 3))
         self.scene.bounds, self.scene.material_ids = (np.zeros(3), np.ones(3)), np.arange(len(MATERIALS))
         self.scene.normals_areas = np.zeros((len(MATERIALS), 3)), np.ones(len(MATERIALS))
-        self.unedited = self.scene
+        self.unedited, self.source, self.reading = self.scene, "fake box", object()
         self.charts = SimpleNamespace(density=40.0, tile=16, warnings=(), size=(160, 96))
         self.lightmap = SimpleNamespace(space=FakeSpace())
         self.options, self.display = ShootingOptions(), DisplayOptions()
         self.atlas, self.light = AtlasOptions(), LightmapOptions()
         self.camera = CameraView(np.eye(4), 0.7, 2.0)
+        self.bookmarks: dict[int, CameraView] = {}
         self.history = FakeHistory()
         self.timings = {
             "shooting/visibility": 1.1,
