@@ -13,18 +13,18 @@ class AtlasImage:
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
         self._pass = Pass(gpu, "render/atlas", defines={"PLACES_WIDTH": PLACES_WIDTH}, label="atlas")
-        self._image: Texture | None = None
+        self.image: Texture | None = None  # as it was drawn last
 
     def draw(self, surfaces: Surfaces, size: tuple[int, int], *, turned: bool) -> Texture:
         """An RGBA8 texture of that size, v up or, if ``turned``, to the right; the same one as before while the size stays."""
-        if self._image is None or self._image.size != size:
+        if self.image is None or self.image.size != size:
             self.release()
-            self._image = self._gpu.texture(size, 4, "f1")
-            self._target = self._gpu.target(self._image)
+            self.image = self._gpu.texture(size, 4, "f1")
+            self._target = self._gpu.target(self.image)
         surfaces.draw_atlas(self._pass, self._target, turned=turned)
-        return self._image
+        return self.image
 
     def release(self) -> None:
-        if self._image is not None:
-            self._gpu.release_all(self._target, self._image)
-            self._image = None
+        if self.image is not None:
+            self._gpu.release_all(self._target, self.image)
+            self.image = None

@@ -10,16 +10,17 @@ from app.render.camera import CameraView
 from app.render.false_colour import Scale
 from app.render.options import DisplayOptions
 from app.render.tone_mapping import curve
-from app.scene.model import F32
+from app.scene.model import F32, F64
 from app.scene.sky import SUN_ANGLE, Sky
 
 
 class Background:
     """Fills what the surfaces of a picture leave. Keeps the map of the last sky. Whoever makes it releases it."""
 
-    def __init__(self, gpu: Gpu) -> None:
-        self._gpu = gpu
-        self._dark = Pass(gpu, "render/background", label="background")
+    def __init__(self, gpu: Gpu, *, linear: bool = False) -> None:
+        """linear: as light, not developed for the screen."""
+        self._gpu, self._defines = gpu, {"LINEAR": linear}
+        self._dark = Pass(gpu, "render/background", defines=self._defines, label="background")
         self._sky: dict[str, Pass] = {}
         self._shape: F32 | None = None
         self._map: Texture | None = None
@@ -32,8 +33,10 @@ class Background:
         sky: Sky | None,
         display: DisplayOptions,
         scale: Scale | None,
+        aside_px: F64,
     ) -> None:
-        """Behind all that has depth in ``target``; a sky is developed as the display has it. scale: of the false colour."""
+        """Behind all that has depth in ``target``; a sky is developed as the display has it. scale: of the false colour.
+        aside_px: how far the picture is moved (2,)."""
         if sky is None:
             self._dark.draw(target, uniforms={"u_height_px": float(target.size[1])}, depth=True)
             return
@@ -41,10 +44,17 @@ class Background:
         if shader not in self._sky:
             slots = {"curve": f"render/{shader}.glsl"}
             self._sky[shader] = Pass(
-                self._gpu, "render/sky", slots=slots, label="background", vertex="render/background"
+                self._gpu,
+                "render/sky",
+                slots=slots,
+                defines=self._defines,
+                label="background",
+                vertex="render/background",
             )
         height = np.tan(view.yfov / 2)
-        world_from_ndc = view.world_from_camera[:3, :3] @ np.diag([height * aspect, height, -1.0])
+        back = np.eye(3)
+        back[:2, 2] = -2.0 * aside_px / target.size
+        world_from_ndc = view.world_from_camera[:3, :3] @ np.diag([height * aspect, height, -1.0]) @ back
         towards = np.zeros(3) if sky.sun is None else sky.sun.direction
         cosine = np.cos(SUN_ANGLE / 2)
         disc = sky.sun_irradiance / (np.pi * np.sin(SUN_ANGLE / 2) ** 2)

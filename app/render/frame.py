@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -12,11 +13,13 @@ from app.render.atlas_image import AtlasImage
 from app.render.background import Background
 from app.render.camera import CameraView
 from app.render.false_colour import LAYER, Scale, false_colour_scale, measured
+from app.render.mean_picture import MeanPicture
 from app.render.options import DisplayOptions
 from app.render.pick import Picker, PickHit
 from app.render.ray_picture import RayPicture
 from app.render.resolve import Reference
 from app.render.surfaces import Rect, Surfaces
+from app.scene.model import F64
 
 GL_DEPTH_CLAMP = 0x864F  # OpenGL 3.2: what lies before the near plane is drawn at it instead of being cut away
 
@@ -27,11 +30,14 @@ class FrameRenderer:
     Keeps its targets between frames of one size. Whoever makes it releases it.
     """
 
-    def __init__(self, gpu: Gpu) -> None:
-        self._gpu = gpu
-        self._background = Background(gpu)
+    def __init__(self, gpu: Gpu, *, linear: bool = False) -> None:
+        """linear: pictures are of radiance [W/(sr m²)], in targets of floats, not of what a screen shows."""
+        self._gpu, self._linear = gpu, linear
+        self._background = Background(gpu, linear=linear)
         self._picker = Picker(gpu)
         self._atlas = AtlasImage(gpu)
+        self._mean = MeanPicture(gpu, linear=linear)
+        self._copy = Pass(gpu, "common/copy", label="present")
         self._surfaces: Surfaces | None = None
         self._prepared: Surfaces | None = None
         self._picture: _Picture | None = None
@@ -40,7 +46,7 @@ class FrameRenderer:
     def prepare(self, lightmap: Lightmap, interpolation: str) -> None:
         """Make what it takes to draw a lightmap, ahead of its first frame; ``give_up`` where that will not come."""
         self.give_up()
-        self._prepared = Surfaces(self._gpu, lightmap, interpolation)
+        self._prepared = Surfaces(self._gpu, lightmap, interpolation, linear=self._linear)
 
     def give_up(self) -> None:
         """Release what was prepared and not drawn yet."""
@@ -62,54 +68,79 @@ class FrameRenderer:
         rays: RayPicture | None = None,
         scale: Scale | None = None,
         samples: int = 1,
+        add: bool = False,
         whole: bool = True,
-    ) -> None:
-        """Draw into the lower left ``size`` (width, height) [px] of ``target``.
+    ) -> bool:
+        """Draw into the lower left ``size`` (width, height) [px] of ``target``. False where nothing is drawn: not all of the
+        layer that is asked for is there yet, and what was drawn last stays.
 
         reference: for ``display.show`` and for layers that compare; None where there is none. offered: what layers need that a
         solver must offer, see app/render/layers.py.
         shooter: the patch to mark for ``display.last_shooter``: (u, v, u, v) in atlas texels. rays: to draw. scale: of the
         false colour; left out, it is found from the light, which waits for the GPU.
-        samples: per pixel along each axis. whole: show all light as it is now; False bounds the work of a frame, a large
-        lightmap is then brought up to date over several. Raises GpuError for a picture larger than a texture can be.
+        samples: pictures, each a part of a pixel aside, that this one is the mean of: smooth edges. add: to those of the last
+        call, which was of the same. whole: show all light as it is now; False bounds the work of a frame, a large lightmap is
+        then brought up to date over several. Raises GpuError for a picture larger than a texture can be.
         """
         kind = measured(display)
         layer = LAYER.get(kind, display.layer)
-        scale = None if kind == "off" else scale or false_colour_scale(display, lightmap, offered)
-        clip_from_local = view.clip_from_local(size[0] / size[1], lightmap.space)
+        scale = None if kind == "off" or self._linear else scale or false_colour_scale(display, lightmap, offered)
         surfaces = self._surfaces_of(lightmap, display.interpolation)
-        picture = self._picture_for(target, size, samples)
-
-        picture.target.clear(depth=1.0)
-        self._gpu.ctx.enable_direct(GL_DEPTH_CLAMP)
-        surfaces.draw(
-            picture.target,
-            clip_from_local,
-            layer,
-            display,
-            scale=scale,
-            reference=reference,
-            offered=offered,
-            shooter=shooter,
-            whole=whole,
-        )
-        self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
+        if not add:
+            self._mean.clear()
+        if not self._mean.count and not surfaces.resolve(
+            layer, display, size, scale=scale, reference=reference, offered=offered, whole=whole
+        ):
+            return False
         sky = lightmap.scene.sky if layer == "combined" else None
-        self._background.draw(picture.target, view, size[0] / size[1], sky, display, scale)
-        self._gpu.ctx.enable_direct(GL_DEPTH_CLAMP)
-        surfaces.draw_blended(picture.target)
-        self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
-        if rays is not None:
-            rays.draw(picture.target, clip_from_local, picture.size, display, samples)
-        if picture.own:
-            present = Pass(self._gpu, "render/present", defines={"SAMPLES": samples}, label="present")
-            present.draw(target, textures={"t_picture": picture.colour}, viewport=(0, 0, *size))
+
+        def draw(picture: _Picture, aside_px: F64) -> None:
+            aside = np.eye(4)
+            aside[:2, 3] = 2.0 * aside_px / size
+            clip_from_local = aside @ view.clip_from_local(size[0] / size[1], lightmap.space)
+            picture.target.clear(depth=1.0)
+            with self._depth_clamp():
+                surfaces.draw(picture.target, clip_from_local, layer, display, shooter=shooter)
+            self._background.draw(picture.target, view, size[0] / size[1], sky, display, scale, aside_px)
+            with self._depth_clamp():
+                surfaces.draw_blended(picture.target)
+            if rays is not None:
+                rays.draw(picture.target, clip_from_local, size, display, linear=self._linear)
+
+        alone = samples == 1 and not add
+        picture = self._picture_for(target, size, direct=alone)
+        if alone:
+            draw(picture, np.zeros(2))
+            if picture.own:
+                textures, uniforms = {"t_source": picture.colour}, {"u_offset_px": (0, 0)}
+                self._copy.draw(target, textures=textures, uniforms=uniforms, viewport=(0, 0, *size))
+        else:
+            for _ in range(samples):
+                draw(picture, self._mean.aside_px)
+                self._mean.add(picture.colour)
+            self._mean.show(target)
         self._last = lightmap, view.copy(), size
+        return True
+
+    @contextlib.contextmanager
+    def _depth_clamp(self) -> Iterator[None]:
+        self._gpu.ctx.enable_direct(GL_DEPTH_CLAMP)
+        try:
+            yield
+        finally:
+            self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
+
+    @property
+    def samples(self) -> int:
+        """Pictures that the last one is the mean of; 0 where it was drawn alone."""
+        return self._mean.count
 
     def atlas(self, lightmap: Lightmap, size: tuple[int, int], *, turned: bool) -> Texture | None:
         """The virtual atlas with what the last frame showed, see AtlasImage; None before the first frame of that lightmap."""
-        if self._surfaces is None or self._surfaces.lightmap is not lightmap or not self._surfaces.drawn:
+        if self._surfaces is None or self._surfaces.lightmap is not lightmap:
             return None
+        if not self._surfaces.ready:
+            return self._atlas.image
         return self._atlas.draw(self._surfaces, size, turned=turned)
 
     def pick(self, x_px: float, y_px: float) -> PickHit | None:
@@ -120,14 +151,13 @@ class FrameRenderer:
         assert self._surfaces is not None
         extent = 2.0 / np.array(size, np.float64)
         centre = ((np.floor([x_px, y_px]) + 0.5) * extent - 1.0) * [1.0, -1.0]
-        self._gpu.ctx.enable_direct(GL_DEPTH_CLAMP)
-        hit = self._picker.pick(self._surfaces, view.clip_from_local(size[0] / size[1], lightmap.space), centre, extent)
-        self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
-        return hit
+        with self._depth_clamp():
+            clip_from_local = view.clip_from_local(size[0] / size[1], lightmap.space)
+            return self._picker.pick(self._surfaces, clip_from_local, centre, extent)
 
     def release(self) -> None:
         self.give_up()
-        for resource in (self._surfaces, self._picture, self._picker, self._atlas, self._background):
+        for resource in (self._surfaces, self._picture, self._picker, self._atlas, self._background, self._mean):
             if resource is not None:
                 resource.release()
 
@@ -141,25 +171,25 @@ class FrameRenderer:
             assert self._surfaces is not None
         return self._surfaces
 
-    def _picture_for(self, target: Framebuffer, size: tuple[int, int], samples: int) -> _Picture:
-        """Where to draw: straight into a target that is a texture of this size, else into a picture of our own."""
-        attached = target.color_attachments or (None,)
-        direct = attached[0] if samples == 1 and isinstance(attached[0], Texture) and attached[0].size == size else None
-        drawn = size[0] * samples, size[1] * samples
+    def _picture_for(self, target: Framebuffer, size: tuple[int, int], *, direct: bool) -> _Picture:
+        """Where to draw: if ``direct``, straight into a target that is a texture of this size; else into a picture of our own."""
+        attached = (target.color_attachments or (None,))[0] if direct else None
+        theirs = attached if isinstance(attached, Texture) and attached.size == size else None
         known = self._picture
-        if known is None or known.size != drawn or (not known.own if direct is None else known.colour is not direct):
+        if known is None or known.size != size or (not known.own if theirs is None else known.colour is not theirs):
             if known:
                 known.release()
-            self._picture = known = _Picture(self._gpu, drawn, direct)
+            self._picture = known = _Picture(self._gpu, size, theirs, "f4" if self._linear else "f1")
         return known
 
 
 class _Picture:
-    """An sRGB picture with depth: of our own, or a colour texture of somebody else's that is given depth."""
+    """A picture with depth, as the screen has it or of floats: of our own, or a colour texture of somebody else's that is given
+    depth."""
 
-    def __init__(self, gpu: Gpu, size: tuple[int, int], colour: Texture | None) -> None:
+    def __init__(self, gpu: Gpu, size: tuple[int, int], colour: Texture | None, dtype: str) -> None:
         self._gpu, self.size, self.own = gpu, size, colour is None
-        self.colour = colour or gpu.texture(size, 4, "f1")
+        self.colour = colour or gpu.texture(size, 4, dtype)
         self.depth: Texture = gpu.depth_texture(size)
         self.target = gpu.target(self.colour, depth=self.depth)
 

@@ -43,13 +43,14 @@ class RayPicture:
         self._cells = _instances(self._gpu, cells, {"in_place": "2f", "in_light": "3f"})
 
     def draw(
-        self, target: Framebuffer, clip_from_local: F64, size: tuple[int, int], display: DisplayOptions, samples: int
+        self, target: Framebuffer, clip_from_local: F64, size: tuple[int, int], display: DisplayOptions, *, linear: bool
     ) -> None:
-        """The lines, in a target with depth of that size [px], which has so many samples along each axis of a pixel."""
+        """The lines, in a target with depth of that size [px]. linear: as light, not developed for the screen."""
         if self._lines is None:
             return
         shader, uniforms = curve(display, None, exposed=True)
-        how = Pass(self._gpu, "render/ray_lines", slots={"curve": f"render/{shader}.glsl"})
+        slots = {"curve": f"render/{shader}.glsl"}
+        how = Pass(self._gpu, "render/ray_lines", slots=slots, defines={"LINEAR": linear})
         target.depth_mask = False
         how.draw(
             target,
@@ -57,8 +58,8 @@ class RayPicture:
             | {
                 "u_clip_from_local": tuple(clip_from_local.T.ravel().tolist()),
                 "u_size_px": (float(size[0]), float(size[1])),
-                "u_width_px": LINE_PX * samples,
-                "u_seam_px": SEAM_PX * samples,
+                "u_width_px": LINE_PX,
+                "u_seam_px": SEAM_PX,
             },
             mesh=self._lines,
             blend="over",

@@ -29,6 +29,7 @@ from app.render.tone_mapping import curve
 # Texels around each tile: as many as interpolation at its edge reaches beyond it
 BORDER = {"nearest": 1, "bilinear": 1, "bicubic": 2}
 TEXELS_PER_FRAME = 1 << 16  # that are brought up to date in one frame, where not all must be
+SWITCHED_PER_FRAME = 4 * TEXELS_PER_FRAME  # of another layer or exposure
 LAYER_TABLES = ("t_normal_ids", "t_materials", "t_albedo", "t_emission", "t_facets", "t_leaves", "t_ambient")
 PLACES_WIDTH = 256  # of the table of places; pixels divide by it: a constant, a power of two
 T = TypeVar("T")
@@ -43,7 +44,10 @@ class Reference(NamedTuple):
 
 class DisplayTexels:
     """The display texels of one lightmap; border: see BORDER. linear: they hold light as it is, exposed, and pixels develop it.
-    Whoever makes it releases it."""
+    Whoever makes it releases it.
+
+    ready: whether all of them show the layer that was asked for last.
+    """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, ages: LeafAges, border: int, *, linear: bool = False) -> None:
         self._gpu, self._lightmap, self._ages, self._border = gpu, lightmap, ages, border
@@ -53,7 +57,7 @@ class DisplayTexels:
         self._target = gpu.target(self._colour)
         self._target.clear()
         sides = np.array([m.double_sided for m in lightmap.scene.materials], np.uint32)
-        self._unlit = gpu.texture((len(sides), 2), 4, "f1")
+        self._unlit = gpu.texture((len(sides), 2), 4, dtype)
         self._unlit_target = gpu.target(self._unlit)
         self._version, self._keys = lightmap.version, self._leaf_keys()
         self._nothing = gpu.texture((1, 1), 4, "f4", bytes(16))
@@ -75,6 +79,10 @@ class DisplayTexels:
         self._sourced_rows = 0
         self._passes: dict[tuple[object, ...], Pass] = {}
         self._next_row = 0
+        self._layer: object = None  # what they show, and how it is developed
+        self._developed: object = None
+        self._due = 0  # rows that still show another layer, or are developed otherwise
+        self.ready = False
 
     def fits(self, border: int) -> bool:
         """Whether the lightmap is still as large as it was, and the border as wide as it shall be."""
@@ -93,14 +101,15 @@ class DisplayTexels:
     ) -> dict[str, Texture]:
         """Bring the display texels up to date; the textures that surfaces bind.
 
-        If not ``whole``, those of leaves that have changed, and TEXELS_PER_FRAME others, in turn. reference: for layers that
-        compare, or, ``instead``, to be shown in place of the lightmap's irradiance. offered: for layers that a solver must offer.
+        If not ``whole``, those of leaves that have changed, and TEXELS_PER_FRAME others, in turn, or SWITCHED_PER_FRAME as long
+        as some show another layer, or another exposure. reference: for layers that compare, or, ``instead``, to be shown in place
+        of the lightmap's irradiance. offered: for layers that a solver must offer.
         """
         layer, lightmap = LAYER_SHADERS[layer_name], self._lightmap
         if self._version != lightmap.version:
             self._follow_leaves()
         shader, uniforms = curve(display, scale, exposed=layer.light is not None)
-        first, rows = self._band(whole)
+        first, rows = self._band(whole, (layer_name, shader, instead), uniforms)
         uniforms |= {
             "u_unit": lightmap.unit,
             "u_target_texel": 1.0 / (lightmap.charts.density * lightmap.space.scale),
@@ -191,16 +200,26 @@ class DisplayTexels:
         targets = (self._target, self._unlit_target, self._source_target)
         self._gpu.release_all(*targets, self._colour, self._unlit, self._nothing, *self._tables.values())
 
-    def _band(self, whole: bool) -> tuple[int, int]:
-        """First row and number of rows to resolve now; their sources are there."""
+    def forget(self) -> None:
+        """They were not shown for a while: all are brought up to date before they are again."""
+        self._layer, self.ready = None, False
+
+    def _band(self, whole: bool, layer: object, developed: Mapping[str, object]) -> tuple[int, int]:
+        """First row and number of rows to resolve now; their sources are there. Counts those that still show another layer."""
         height = self.size[1]
-        rows = height if whole else max(1, min(height, TEXELS_PER_FRAME // self.size[0]))
+        if layer != self._layer or developed != self._developed:
+            self._due, self.ready = height, self.ready and layer == self._layer
+            self._layer, self._developed = layer, dict(developed)
+        texels = SWITCHED_PER_FRAME if self._due else TEXELS_PER_FRAME
+        rows = height if whole else max(1, min(height, texels // self.size[0]))
         first = self._next_row if rows < height else 0
         rows = min(rows, height - first)
         end = first + rows
         if end > self._sourced_rows:
             self._find_rows(self._sourced_rows, end)
         self._next_row = end % height
+        self._due = max(self._due - rows, 0)
+        self.ready = self.ready or not self._due
         return first, rows
 
     def _find_rows(self, first: int, end: int) -> None:
@@ -218,7 +237,7 @@ class DisplayTexels:
         if key not in self._passes:
             own = ("TILE",) if name in ("edges", "seams") else ()
             defines = self._lightmap.defines(*layer.defines, *own) | more
-            defines |= {"LINEAR": True} if self._linear and name != "unlit" else {}
+            defines |= {"LINEAR": True} if self._linear else {}
             slots = {"layer": f"render/layers/{layer.shader}.glsl", "curve": f"render/{shader}.glsl"}
             vertex = "common/rects" if rects else FULLSCREEN
             self._passes[key] = Pass(

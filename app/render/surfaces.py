@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from app.gpu import Framebuffer, Gpu, Pass, Texture
@@ -23,24 +24,80 @@ SHARP = ("combined", "albedo")  # layers of what textures multiply
 NOWHERE: Rect = (-1e6, -1e6, -1e6, -1e6)
 
 
-class Surfaces:
-    """Draws one lightmap. Whoever makes it releases it."""
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What one part of a picture shows: the textures of its display texels, and of the light on textured materials."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, interpolation: str) -> None:
-        self._gpu, self.lightmap = gpu, lightmap
+    textures: dict[str, Texture]
+    light: dict[str, Texture] | None
+    part: Part
+
+
+class Surfaces:
+    """Draws one lightmap. linear: as light, not developed for the screen. Whoever makes it releases it.
+
+    ready: whether all of the layer that was asked for last is there.
+    """
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, interpolation: str, *, linear: bool = False) -> None:
+        self._gpu, self.lightmap, self._linear = gpu, lightmap, linear
         self._ages = LeafAges(lightmap.pool)
         self.mesh = SurfaceMesh(gpu, lightmap.pool)
-        self._texels = DisplayTexels(gpu, lightmap, self._ages, BORDER[interpolation])
-        self._others: DisplayTexels | None = None  # of a reference's light
+        self._texels: dict[tuple[bool, bool], DisplayTexels] = {}  # of a reference; of the light on textured materials
+        self._texels[False, False] = DisplayTexels(gpu, lightmap, self._ages, BORDER[interpolation], linear=linear)
         textured = textured_materials(lightmap.scene)
         self._textured = TexturedMesh(gpu, lightmap.pool, textured) if textured else None
-        self._light: dict[bool, DisplayTexels] = {}  # that falls on them, and that of a reference
         self._textured_passes: dict[tuple[object, ...], Pass] = {}
-        self._sides = True, False  # whether the solution and the reference were shown last
         self._passes = {(overlay, False, False): self._pass(overlay, bicubic=False) for overlay in (False, True)}
         self._blend: Callable[[Framebuffer], None] | None = None
-        self._shown: dict[str, Texture] = {}
-        self._live = False
+        self._shown: list[Shown] = []
+        self._live = self.ready = False
+
+    def resolve(
+        self,
+        layer_name: str,
+        display: DisplayOptions,
+        size: tuple[int, int],
+        *,
+        scale: Scale | None = None,
+        reference: Reference | None = None,
+        offered: Mapping[str, Texture] | None = None,
+        whole: bool = True,
+    ) -> bool:
+        """Bring what ``draw`` shows up to date, for a picture of that size [px]. Whether it is all of this layer; else the last
+        picture is kept.
+
+        scale: of the false colour, where one is on. reference: for layers that compare, and to be shown as ``display.show`` asks,
+        where the layer is of received light. offered: what a solver knows of every texel, for layers that need it. whole: see
+        ``DisplayTexels.resolve``; else one of many, in which new leaves shine.
+        """
+        self._live = not whole
+        self._scale = scale
+        wanted: dict[str, Any] = {"scale": scale, "reference": reference, "offered": offered}
+        lit = self._textured is not None and layer_name in SHARP and LAYER_SHADERS[layer_name].light is not None
+        left, right = _parts(layer_name, display, reference, size)
+        shown, used = [], set()
+        for part, instead in ((right, True), (left, False)):
+            if part is None or (instead and reference is None):
+                continue
+            resolved: list[dict[str, Texture]] = []
+            for light, layer in ((False, layer_name), (True, "irradiance"))[: 1 + lit]:
+                texels, fresh = self._fitting((instead, light), display)
+                resolved.append(texels.resolve(layer, display, whole=whole or fresh, instead=instead, **wanted))
+                used.add((instead, light))
+            shown.append(Shown(resolved[0], resolved[1] if lit else None, part))
+        self._forget(used, keep=reference is not None)
+        self.ready = all(self._texels[kind].ready for kind in used)
+        self._shown = shown
+        return self.ready
+
+    def _forget(self, used: Collection[tuple[bool, bool]], *, keep: bool) -> None:
+        """Those that are not shown now; with no reference, not those of one either."""
+        for kind, texels in list(self._texels.items()):
+            if kind[0] and not keep:
+                self._texels.pop(kind).release()
+            elif kind not in used:
+                texels.forget()
 
     def draw(
         self,
@@ -49,38 +106,10 @@ class Surfaces:
         layer_name: str,
         display: DisplayOptions,
         *,
-        scale: Scale | None = None,
-        reference: Reference | None = None,
-        offered: Mapping[str, Texture] | None = None,
         shooter: Rect | None = None,
-        whole: bool = True,
     ) -> None:
-        """Draw the layer into ``target``, which has depth, over what is there.
-
-        scale: of the false colour, where one is on. reference: for layers that compare, and to be shown as ``display.show`` asks,
-        where the layer is of received light. offered: what a solver knows of every texel, for layers that need it. shooter: the
-        patch to mark: lower and upper corner (u, v, u, v) in atlas texels.
-        whole: see ``DisplayTexels.resolve``; else one of many, in which new leaves shine.
-        """
-        self._live = not whole
-        wanted: dict[str, Any] = {"scale": scale, "reference": reference, "offered": offered}
-        shown: list[tuple[dict[str, Texture], Part]] = []
-        left, right = _parts(layer_name, display, reference, target.size)
-        if right is not None and reference is not None:
-            self._others, fresh = self._fitting(self._others, display)
-            now = whole or fresh or not self._sides[1]
-            shown.append((self._others.resolve(layer_name, display, whole=now, instead=True, **wanted), right))
-        elif reference is None and self._others is not None:
-            self._others.release()
-            self._others = None
-            if True in self._light:
-                self._light.pop(True).release()
-        if left is not None:
-            self._texels, fresh = self._fitting(self._texels, display)
-            now = whole or fresh or not self._sides[0]
-            shown.append((self._texels.resolve(layer_name, display, whole=now, **wanted), left))
-        self._shown, self._sides = shown[-1][0], (left is not None, right is not None)
-
+        """Draw the layer as it was resolved last into ``target``, which has depth, over what is there. shooter: the patch to
+        mark: lower and upper corner (u, v, u, v) in atlas texels."""
         uniforms: dict[str, object] = {"u_clip_from_local": uniform_matrix(clip_from_local), "u_texel": self._texel}
         marked = shooter if shooter and display.last_shooter else None
         layer = LAYER_SHADERS[layer_name]
@@ -90,24 +119,20 @@ class Surfaces:
             uniforms |= self._of_leaves
         bicubic = layer.smooth and display.interpolation == "bicubic"
         program, mesh = self._pass_of(overlay, bicubic), self.mesh.seen(clip_from_local)
-        for textures, part in shown:
-            program.draw(target, textures=textures, uniforms=uniforms, mesh=mesh, depth=True, scissor=part)
+        for one in self._shown:
+            program.draw(target, textures=one.textures, uniforms=uniforms, mesh=mesh, depth=True, scissor=one.part)
         sheer = self.mesh.sheer
         if sheer is not None:
             program, cut_by = self._pass_of(overlay, bicubic, sheer=True), sheer.textures
             if sheer.cut_out is not None:
-                for textures, part in shown:
-                    bound = textures | cut_by
+                for one in self._shown:
+                    bound = one.textures | cut_by
                     program.draw(
-                        target, textures=bound, uniforms=uniforms, mesh=sheer.cut_out, depth=True, scissor=part
+                        target, textures=bound, uniforms=uniforms, mesh=sheer.cut_out, depth=True, scissor=one.part
                     )
         if self._textured is not None and layer_name in SHARP:
-            for (_, part), instead in zip(
-                shown, [True] * (right is not None) + [False] * (left is not None), strict=True
-            ):
-                self._draw_textured(
-                    target, layer_name, display, uniforms, part, instead, wanted, overlay=overlay, whole=whole
-                )
+            for one in self._shown:
+                self._draw_textured(target, layer_name, display, uniforms, one, overlay=overlay)
         if sheer is None:
             return
 
@@ -116,14 +141,14 @@ class Surfaces:
             if mesh is None:
                 return
             target.depth_mask = False
-            for textures, part in shown:
+            for one in self._shown:
                 program.draw(
                     target,
-                    textures=textures | cut_by,
+                    textures=one.textures | cut_by,
                     uniforms=uniforms,
                     mesh=mesh,
                     depth=True,
-                    scissor=part,
+                    scissor=one.part,
                     blend="over",
                 )
             target.depth_mask = True
@@ -136,28 +161,25 @@ class Surfaces:
         layer_name: str,
         display: DisplayOptions,
         uniforms: Mapping[str, object],
-        part: Part,
-        instead: bool,
-        wanted: Mapping[str, Any],
+        one: Shown,
         *,
         overlay: bool,
-        whole: bool,
     ) -> None:
-        """Materials with textures over what was drawn of them. instead: by the light of the reference."""
+        """Materials with textures over what was drawn of them."""
         assert self._textured is not None
         lit, bicubic = LAYER_SHADERS[layer_name].light is not None, display.interpolation == "bicubic"
-        shader, developed = curve(display, wanted["scale"], exposed=lit)
-        textures = self._shown
-        if lit:
-            light, fresh = self._fitting(self._light.get(instead), display, linear=True)
-            self._light[instead] = light
-            textures = light.resolve("irradiance", display, whole=whole or fresh, instead=instead, **wanted)
+        shader, developed = curve(display, self._scale, exposed=lit)
+        textures = one.textures if one.light is None else one.light
         key = shader, overlay, bicubic, lit
         if key not in self._textured_passes:
             defines = {"OVERLAY": overlay, "BICUBIC": bicubic, "LIT": lit, "PLACES_WIDTH": PLACES_WIDTH}
             slots = {"curve": f"render/{shader}.glsl"}
             self._textured_passes[key] = Pass(
-                self._gpu, "render/textured", defines=defines, slots=slots, label="surfaces"
+                self._gpu,
+                "render/textured",
+                defines=defines | {"LINEAR": self._linear},
+                slots=slots,
+                label="surfaces",
             )
         program, gain = self._textured_passes[key], developed["u_gain"]
         self._gpu.ctx.depth_func = "=="  # where something is cut out, not over what is seen through it
@@ -170,7 +192,7 @@ class Surfaces:
                 uniforms=declared(program, {**uniforms, **developed, **own}),
                 mesh=mesh,
                 depth=True,
-                scissor=part,
+                scissor=one.part,
             )
         self._gpu.ctx.depth_func = "<"
 
@@ -179,16 +201,16 @@ class Surfaces:
         if self._blend is not None:
             self._blend(target)
 
-    def _fitting(
-        self, texels: DisplayTexels | None, display: DisplayOptions, *, linear: bool = False
-    ) -> tuple[DisplayTexels, bool]:
-        """These, or others of the size that is wanted; and whether they are new: a part of them would be black."""
-        border = BORDER[display.interpolation]
-        if texels is not None and texels.fits(border):
-            return texels, False
-        if texels is not None:
-            texels.release()
-        return DisplayTexels(self._gpu, self.lightmap, self._ages, border, linear=linear), True
+    def _fitting(self, kind: tuple[bool, bool], display: DisplayOptions) -> tuple[DisplayTexels, bool]:
+        """Those of this kind, of the size that is wanted; and whether they are new: a part of them would be black."""
+        border, known = BORDER[display.interpolation], self._texels.get(kind)
+        if known is not None and known.fits(border):
+            return known, False
+        if known is not None:
+            known.release()
+        linear = self._linear or kind[1]
+        self._texels[kind] = made = DisplayTexels(self._gpu, self.lightmap, self._ages, border, linear=linear)
+        return made, True
 
     def draw_atlas(self, program: Pass, target: Framebuffer, *, turned: bool) -> None:
         """The virtual atlas with what was drawn last, all over ``target``; ``program`` is render/atlas. turned: u for v."""
@@ -200,14 +222,9 @@ class Surfaces:
         }
         program.draw(
             target,
-            textures={n: self._shown[n] for n in ("t_display", "t_shown_pages", "t_places")},
+            textures={n: self._shown[-1].textures[n] for n in ("t_display", "t_shown_pages", "t_places")},
             uniforms=uniforms | self._of_leaves,
         )
-
-    @property
-    def drawn(self) -> bool:
-        """Whether there is something to be seen in an atlas."""
-        return bool(self._shown)
 
     @property
     def _of_leaves(self) -> dict[str, object]:
@@ -218,8 +235,9 @@ class Surfaces:
     @property
     def _texel(self) -> tuple[float, float, float]:
         """Size of a display texel as the sampler counts, and pages per texel of level 0."""
-        width, height = self._texels.size
-        return 1.0 / width, 1.0 / height, self._shown["t_shown_pages"].width / self.lightmap.charts.size[0]
+        textures = self._shown[-1].textures
+        width, height = textures["t_display"].size
+        return 1.0 / width, 1.0 / height, textures["t_shown_pages"].width / self.lightmap.charts.size[0]
 
     def _pass_of(self, overlay: bool, bicubic: bool, sheer: bool = False) -> Pass:
         kind = overlay, bicubic, sheer
@@ -234,11 +252,8 @@ class Surfaces:
         return Pass(self._gpu, "render/surfaces", defines=defines, label="surfaces")
 
     def release(self) -> None:
-        self._texels.release()
-        if self._others is not None:
-            self._others.release()
-        for light in self._light.values():
-            light.release()
+        for texels in self._texels.values():
+            texels.release()
         if self._textured is not None:
             self._textured.release()
         self.mesh.release()

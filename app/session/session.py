@@ -290,7 +290,7 @@ class Session:
     @property
     def at_rest(self) -> bool:
         """Whether nothing changes by itself: neither light nor numbers, and no scene is on its way."""
-        known = not self._can_estimate or self.estimate.knows(self._state)
+        known = not self._can_estimate or self.estimate.knows(self.state)
         return self._idle and known and not self.compared.busy
 
     @property
@@ -507,19 +507,19 @@ class Session:
 
     def compare(self, *, wait: bool = False) -> None:
         """Bring the comparison with a reference up to date, with ``wait`` to the last work."""
-        trouble = self.compared.poll(self.solver.issued, self.run.seconds, self._state, wait=wait)
+        trouble = self.compared.poll(self.solver.issued, self.run.seconds, self.state, wait=wait)
         self.message = trouble or self.message
 
     @property
     def expected(self) -> ErrorEstimate | None:
         """How far off the light is expected to be: None as long as it is not known, or nothing is lit."""
-        return self.estimate.error if self._opened and self.estimate.knows(self._state) else None
+        return self.estimate.error if self._opened and self.estimate.knows(self.state) else None
 
     def estimate_now(self, tell: Callable[[float], None], *, seconds: float = SECONDS) -> None:
         """Work out ``expected`` whole, of settled light; ``tell`` is given the share done. seconds: after which fewer points are
         enough."""
         self.estimate.seconds = seconds
-        while self._can_estimate and not self.estimate.knows(self._state):
+        while self._can_estimate and not self.estimate.knows(self.state):
             self._estimate_part(wait=True)
             tell(self.estimate.share)
 
@@ -530,11 +530,11 @@ class Session:
 
     def _estimate_part(self, *, wait: bool = False) -> None:
         """Some of the points, or none where there is nothing to do."""
-        if self._can_estimate and not self.estimate.knows(self._state):
-            self.estimate.part(self.lightmap, self._state, wait=wait)
+        if self._can_estimate and not self.estimate.knows(self.state):
+            self.estimate.part(self.lightmap, self.state, wait=wait)
 
     @property
-    def _state(self) -> object:
+    def state(self) -> object:
         """All that the light depends on: another one where the light is another."""
         shown = tuple(getattr(self.solver.options, name) for name in self.family.shows)
         return self.solver.issued, self.lightmap.version, self.edited_scene, shown

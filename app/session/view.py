@@ -92,11 +92,13 @@ class View:
         *,
         scale: Scale | None = None,
         samples: int = 1,
+        add: bool = False,
         whole: bool = True,
-    ) -> None:
-        """The picture of the solution as it is now; if not ``whole``, brought up to date over several frames."""
+    ) -> bool:
+        """The picture of the solution as it is now; if not ``whole``, brought up to date over several frames. Whether it was
+        drawn, see ``FrameRenderer.render``. samples, add: the mean of how many, and of those before, too."""
         self._size = size
-        self._renderer.render(
+        return self._renderer.render(
             target,
             size,
             self.session.lightmap,
@@ -108,8 +110,24 @@ class View:
             rays=self._marked_rays(whole=whole),
             scale=scale,
             samples=samples,
+            add=add,
             whole=whole,
         )
+
+    @property
+    def samples(self) -> int:
+        """Pictures that the last one is the mean of."""
+        return self._renderer.samples
+
+    @property
+    def still(self) -> tuple[object, ...] | None:
+        """All that the picture depends on, where it stays as it is by itself; None while light moves."""
+        session = self.session
+        if session.solving or not session.run.settled:
+            return None
+        camera = self.camera
+        seen = camera.world_from_camera.tobytes(), camera.yfov, self.shown, self.marked
+        return session.state, session.compared.comparison, session.gpu.shaders.generation, *seen
 
     def false_colour_scale(self) -> Scale:
         """Of what is shown, which is in false colour. Waits for the GPU."""

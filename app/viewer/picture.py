@@ -33,8 +33,8 @@ def picture(view: View, size: tuple[int, int]) -> np.ndarray:
 
 
 def check_size(gpu: Gpu, size: tuple[int, int]) -> None:
-    """Raise UserError for a picture whose samples do not fit a texture of this GPU."""
-    limit = gpu.limits.max_texture // SAMPLES
+    """Raise UserError for a picture that does not fit a texture of this GPU."""
+    limit = gpu.limits.max_texture
     if max(size) > limit:
         raise UserError(f"--size {size[0]}x{size[1]}: at most {limit} pixels along a side on this GPU")
 

@@ -27,7 +27,7 @@ LEGEND_COLOURS = 48
 SCALE_SHARE = 0.05  # of the time may go into finding the false-colour scale
 SCALE_SECONDS = 0.5  # between two searches, at least
 WARM_UP = 4  # frames until docked windows, their contents' heights and scroll bars have settled
-SAMPLES = 2  # per pixel of a headless picture, along each axis: smooth edges
+SAMPLES = 16  # pictures that one at rest, or one that is kept, is the mean of: smooth edges
 LEGEND_SIZE = 900  # px: the shorter side of a picture beyond which its legend grows with it
 STEP = 1.0 / 60.0  # s: a headless frame's time, whatever the clock says
 SCREENSHOT = "glowtree-{:04d}.png"
@@ -37,11 +37,14 @@ class UiFrame:
     """Owns the interface's renderer and the target of the 3-D view; borrows the interface. Whoever makes it releases
     it.
 
-    samples: of the view, per pixel along each axis. whole: show all light as it is now; False bounds the work of a frame.
+    whole: show all light as it is now; False bounds the work of a frame, and where nothing moves each adds to the samples of the
+    picture. unfinished: whether such samples are still to come.
     """
 
-    def __init__(self, gpu: Gpu, ui: Ui, *, samples: int = 1, whole: bool = True) -> None:
-        self._gpu, self._ui, self._samples, self._whole = gpu, ui, samples, whole
+    def __init__(self, gpu: Gpu, ui: Ui, *, whole: bool = True) -> None:
+        self._gpu, self._ui, self._whole = gpu, ui, whole
+        self.unfinished = False
+        self._still: object = None  # what the last picture was of, where nothing moved
         ui.use()
         self._renderer = ImguiRenderer(gpu)
         self._present = Pass(gpu, "imgui/present")
@@ -59,24 +62,31 @@ class UiFrame:
         ratio: float = 1.0,
         seconds: float = STEP,
         look: bool = True,
+        samples: int = 1,
     ) -> list[Request]:
         """Build and draw one frame into ``target``; what is left for the host to do.
 
         size: of the window [display units]; ratio: pixels per unit, so that the target has size·ratio pixels;
-        seconds: since the last frame. look: draw the view anew, or show it as it was drawn last. Reloads shaders itself.
+        seconds: since the last frame. look: draw the view anew, or show it as it was drawn last. samples: pictures that the view
+        is the mean of; all of them are drawn for a screenshot, too. Reloads shaders itself.
         """
         scale = self._false_colour(view)
         legend = None if scale is None else _legend(quantity(measured(view.shown), view.shown.quantities).name, scale)
         data = self._ui.frame(
             view, size=size, ratio=ratio, seconds=seconds, texture_id=self._renderer.texture_id, legend=legend
         )
+        requests = self._ui.take_requests()
         left, bottom, width, height = self._ui.view_rect
         known = self._view
         texture, view_target = self._view_of(width, height)
         if not view.session.opened:
             view_target.clear(*theme.PANEL)
-        elif look or known is not self._view:
-            view.draw(view_target, (width, height), scale=scale, samples=self._samples, whole=self._whole)
+        elif Request.SCREENSHOT in requests:
+            view.draw(view_target, (width, height), scale=scale, samples=SAMPLES)
+        elif self._whole and (look or known is not self._view):
+            view.draw(view_target, (width, height), scale=scale, samples=samples)
+        elif not self._whole:
+            self._look(view, view_target, scale, fresh=known is not self._view, look=look)
         target.use()
         target.clear(*theme.PANEL)
         self._present.draw(
@@ -86,10 +96,21 @@ class UiFrame:
             viewport=(left, bottom, width, height),
         )
         self._renderer.draw(target, data)
-        requests = self._ui.take_requests()
         if Request.RELOAD_SHADERS in requests:
             self._reload()
         return [r for r in requests if r is not Request.RELOAD_SHADERS]
+
+    def _look(self, view: View, target: Framebuffer, scale: Scale | None, *, fresh: bool, look: bool) -> None:
+        """Draw the view within the time of a frame: where nothing moves, one more sample of it, until there are enough. fresh:
+        nothing was drawn into ``target`` yet."""
+        size = target.size
+        now = None if view.still is None else (view.still, scale, size)
+        if now is None or now != self._still or fresh:
+            if look or fresh:
+                view.draw(target, size, scale=scale, whole=fresh)
+        elif view.samples < SAMPLES:
+            view.draw(target, size, scale=scale, add=True)
+        self._still, self.unfinished = now, now is not None and view.samples < SAMPLES
 
     def frames_to_show(self, view: View) -> int:
         """How many frames it takes until a change is seen everywhere."""
@@ -177,7 +198,7 @@ def ui_image(
     target = gpu.target(texture)
     ui = Ui(measured=measured, live=False, scale=1.0 if panels else max(1.0, min(size) / LEGEND_SIZE))
     ui.state.show_ui = panels
-    frame = UiFrame(gpu, ui, samples=SAMPLES)
+    frame = UiFrame(gpu, ui)
     try:
         for _ in range(WARM_UP):
             frame.draw(view, target, size=size)
@@ -188,6 +209,7 @@ def ui_image(
                 ui.io.add_mouse_button_event(0, down)
             for _ in range(WARM_UP):
                 frame.draw(view, target, size=size)
+        frame.draw(view, target, size=size, samples=SAMPLES)
         return pixels(target, size)
     finally:
         frame.release()

@@ -227,7 +227,8 @@ class ViewerWindow(WindowConfig):
 
     def _at_rest(self) -> bool:
         """Whether another frame would look like the last one."""
-        if not self._session.at_rest or self._ui.moving or self._frames_left is not None:
+        changes = not self._session.at_rest or self._ui.moving or self._frame.unfinished
+        if changes or self._frames_left is not None:
             self._wake()
         return time.perf_counter() > self._awake_until and self._frames_due <= 0
 

@@ -221,8 +221,9 @@ class FakeSession:
         self.calls.append(("advance",)) if self.running else None
         return 1 if self.running else 0
 
-    def draw(self, target, size, *, scale=None, samples=1, whole=True) -> None:
+    def draw(self, target, size, *, scale=None, samples=1, add=False, whole=True) -> bool:
         target.clear(0.2, 0.3, 0.4, 1.0)
+        return True
 
     def atlas_image(self, size, *, turned=False):
         self.insets.append((size, turned))

@@ -62,7 +62,7 @@ def test_walls_nearer_than_the_near_plane_are_drawn(gpu: Gpu, box: Lightmap) -> 
 # -- picking -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("samples", [1, 2])
+@pytest.mark.parametrize("samples", [1, 3])
 def test_pick_agrees_with_a_ray(gpu: Gpu, box: Lightmap, rng: np.random.Generator, samples: int) -> None:
     renderer = FrameRenderer(gpu)
     target = gpu.target(gpu.texture(SIZE, 4, "f1"))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from boxes import PLAIN, SIZE, STEP, box, cornell, even, hits, picture, put, put_ambient, some_pixels, view_of
 from numpy.typing import NDArray
-from pictures import framing, tone_map
+from pictures import framing, render_image, tone_map
 
 import app.render.resolve
 from app.atlas.parametrize import parametrize
@@ -16,10 +16,17 @@ from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.render.frame import FrameRenderer
 from app.render.options import INTERPOLATIONS, LAYERS, TONE_MAPS, DisplayOptions
+from app.render.resolve import Reference
 from app.render.tone_mapping import encode_srgb
 from app.scene.model import F64, Material, Scene
 
 __all__ = ["box", "cornell"]
+
+
+def decode_srgb(encoded: F64) -> F64:
+    """sRGB [0, 1] to linear, IEC 61966-2-1 by hand."""
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+
 
 # -- colours -----------------------------------------------------------------------------------------------------------
 
@@ -206,10 +213,40 @@ def test_sides_without_texels_show_what_they_are(gpu: Gpu, layer: str, double_si
 
 def test_samples_average_to_the_same_picture_with_smooth_edges(gpu: Gpu, box: Lightmap) -> None:
     put(box, "t_irradiance", even(box, (1.0, 1.0, 1.0)))
-    one, four = (picture(gpu, box, samples=samples).astype(int) for samples in (1, 2))
-    assert len(np.unique(four.reshape(-1, 3), axis=0)) > len(np.unique(one.reshape(-1, 3), axis=0))
-    same = (np.abs(one - four) <= 1).all(-1).mean()
+    one, many = (picture(gpu, box, samples=samples).astype(int) for samples in (1, 16))
+    assert len(np.unique(many.reshape(-1, 3), axis=0)) > len(np.unique(one.reshape(-1, 3), axis=0))
+    same = (np.abs(one - many) <= 1).all(-1).mean()
     assert 0.9 < same < 1.0
+
+
+def test_an_edge_covers_its_share_of_a_pixel(gpu: Gpu, box: Lightmap) -> None:
+    """Of pixels on the edge of the lamp in a picture of few pixels, against the same drawn 32 times as large: as the screen shows
+    them, as light."""
+    put(box, "t_irradiance", even(box, (0.0, 0.0, 0.0)))
+    small, fine = (24, 18), 32
+    large = render_image(gpu, box, view_of(box), PLAIN, (small[0] * fine, small[1] * fine)) / 255.0
+    exact = decode_srgb(large).reshape(small[1], fine, small[0], fine, 3).mean((1, 3))
+    off = {}
+    for samples in (1, 16):
+        shown = decode_srgb(render_image(gpu, box, view_of(box), PLAIN, small, samples=samples) / 255.0)
+        off[samples] = float(np.sqrt(((shown - exact) ** 2).mean()))
+    assert off[16] < 0.15 * off[1]
+
+
+def test_samples_that_are_added_one_by_one_are_those_of_one_picture(gpu: Gpu, box: Lightmap) -> None:
+    put(box, "t_irradiance", even(box, (1.0, 2.0, 3.0)))
+    expected = picture(gpu, box, samples=5)
+    renderer, colour = FrameRenderer(gpu), gpu.texture(SIZE, 4, "f1")
+    target = gpu.target(colour)
+    renderer.render(target, SIZE, box, view_of(box), PLAIN, whole=False)
+    for nth in range(5):
+        assert renderer.render(target, SIZE, box, view_of(box), PLAIN, add=True) and renderer.samples == nth + 1
+    shown = np.frombuffer(colour.read(), np.uint8).reshape(SIZE[1], SIZE[0], 4)[::-1, :, :3]
+    assert (shown == expected).all()
+    renderer.render(target, SIZE, box, view_of(box), PLAIN)
+    assert renderer.samples == 0, "what moves begins anew"
+    renderer.release()
+    gpu.release_all(target, colour)
 
 
 def test_any_target_gets_the_same_picture(gpu: Gpu, box: Lightmap) -> None:
@@ -240,18 +277,52 @@ def test_large_lightmaps_are_brought_up_to_date_in_turn(
         renderer.render(target, SIZE, box, view_of(box), display, whole=whole)
         return np.frombuffer(colour.read(), np.uint8).reshape(SIZE[1], SIZE[0], 4)[::-1, :, :3]
 
-    for display in (PLAIN, PLAIN.replace(exposure=1.0)):
-        expected = picture(gpu, box, display)
-        frames = [frame(display) for _ in range(box.size[0] * box.size[1] // (1 << 11) + 8)]
-        differing = [int((f != expected).any(-1).sum()) for f in frames]
-        assert differing[0] > differing[2] > 0
-        assert differing[-1] == 0
+    monkeypatch.setattr(app.render.resolve, "SWITCHED_PER_FRAME", 1 << 11)
+    frame(PLAIN, whole=True)
+    display = PLAIN.replace(exposure=1.0)
+    expected = picture(gpu, box, display)
+    frames = [frame(display) for _ in range(box.size[0] * box.size[1] // (1 << 11) + 8)]
+    differing = [int((f != expected).any(-1).sum()) for f in frames]
+    assert differing[0] > differing[2] > 0
+    assert differing[-1] == 0
     assert (frame(PLAIN, whole=True) == picture(gpu, box)).all()
     for interpolation in ("bicubic", "bilinear"):  # with other borders: nothing of them is there yet
         display = PLAIN.replace(interpolation=interpolation)
         assert (frame(display) == picture(gpu, box, display)).all()
     renderer.release()
     gpu.release_all(target, colour)
+
+
+def test_a_frame_is_of_one_layer(gpu: Gpu, box: Lightmap, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a frame has time for a part of the texels only, the layer before stays until all of the next is there; so does what
+    was before a reference."""
+    for name in ("TEXELS_PER_FRAME", "SWITCHED_PER_FRAME"):
+        monkeypatch.setattr(app.render.resolve, name, 1 << 11)
+    put(box, "t_irradiance", even(box, (1.0, 1.0, 1.0)))
+    other = gpu.texture(box.size, 4, "f4", np.full((*box.size[::-1], 4), 3.0, np.float32).tobytes())
+    renderer, colour = FrameRenderer(gpu), gpu.texture(SIZE, 4, "f1")
+    target = gpu.target(colour)
+
+    def frame(display: DisplayOptions) -> tuple[bool, NDArray[np.uint8]]:
+        of = Reference(other, 1.0)
+        drawn = renderer.render(target, SIZE, box, view_of(box), display, reference=of, whole=False)
+        return drawn, np.frombuffer(colour.read(), np.uint8).reshape(SIZE[1], SIZE[0], 4)[::-1, :, :3].copy()
+
+    target.clear()
+    shown = frame(PLAIN)[1]
+    assert (shown == 0).all(), "not even the first begins in parts"
+    asked = [PLAIN.replace(layer=layer) for layer in ("combined", "albedo", "charts", "irradiance", "combined")]
+    others = PLAIN.replace(show="reference"), PLAIN.replace(show="split"), PLAIN
+    for nth, display in enumerate((*asked, *others)):
+        expected, kept = picture(gpu, box, display, reference=Reference(other, 1.0)), 0
+        while not (seen := frame(display))[0]:
+            assert (seen[1] == shown).all()
+            kept += 1
+        assert (seen[1] == expected).all()
+        assert kept > 2 or nth >= len(asked), "it takes several frames"
+        shown = expected
+    renderer.release()
+    gpu.release_all(target, colour, other)
 
 
 def test_a_frame_follows_storage_and_materials(gpu: Gpu, box: Lightmap) -> None:

@@ -61,7 +61,6 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "FOLLOWS": FLAG,
     "BORDER": tuple(sorted(set(BORDER.values()))),
     "PLACES_WIDTH": (PLACES_WIDTH,),
-    "SAMPLES": (1, 4),
     "PLANAR": FLAG,
     "NEAR_FIELD": FLAG,
     "DISC": FLAG,

@@ -1,4 +1,4 @@
-// How display texels hold light: developed for the screen, or as it is, where pixels develop it. Needs develop(rgb).
+// How light is held: developed for the screen, or as it is. Needs develop(rgb).
 #define LINEAR 0
 
 vec3 shown(vec3 light) {

@@ -22,6 +22,7 @@ layout(location = 0) out vec4 out_colour;
 
 // develop(rgb): linear Rec.709 of the screen, 0 to 1
 #include <curve>
+#include "render/shown.glsl"
 #if OVERLAY
 #include "render/overlay.glsl"
 #endif
@@ -40,9 +41,9 @@ void main() {
 #else
     vec3 light = textureLod(t_display, texel * u_texel.xy, 0.0).rgb;
 #endif
-    vec3 colour = encode_srgb(develop(albedo * max(light, 0.0) + u_emission * texture(t_emission_picture, v_emission_uv).rgb));
+    vec3 colour = shown(albedo * max(light, 0.0) + u_emission * texture(t_emission_picture, v_emission_uv).rgb);
 #else
-    vec3 colour = encode_srgb(develop(albedo));
+    vec3 colour = shown(albedo);
 #endif
 #if OVERLAY
     vec4 per_px = max(fwidth(v_uv), 1e-6);
