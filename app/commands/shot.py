@@ -23,7 +23,7 @@ from app.session.session import Session
 from app.session.view import View
 from app.util.console import Console
 from app.viewer.animation import check_animation
-from app.viewer.picture import check_size, picture, save_png
+from app.viewer.picture import SUFFIXES, check_size, picture, save_picture, save_png
 from app.viewer.ui_frame import ui_image
 
 __all__ = ["shot"]
@@ -59,7 +59,7 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
             view.expose(flags.size)
         walked = None
         if path is None:
-            save_png(flags.output, _draw(view, flags))
+            _save(view, flags)
         else:
             stopped = failure is not None or session.run.interrupted
             walked = _walk(view, path.first_only if stopped else path, flags, console)
@@ -74,6 +74,13 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
         raise UserError(f"{failure}; {flags.output} shows it as it is")
     console.result(result, f"{flags.output}: {f'{walked.summary}; ' if walked else ''}{line}")
     return 130 if result["interrupted"] else 0
+
+
+def _save(view: View, flags: argparse.Namespace) -> None:
+    if flags.ui:
+        save_png(flags.output, ui_image(view, flags.size))
+    else:
+        save_picture(view, flags.output, flags.size)
 
 
 def _draw(view: View, flags: argparse.Namespace) -> np.ndarray:
@@ -117,8 +124,10 @@ def _check_output(flags: argparse.Namespace, path: CameraPath | None) -> None:
     """Raise UserError now rather than after the work."""
     output: Path = flags.output
     if path is None:
-        if output.is_dir() or output.suffix.lower() != ".png":
-            raise UserError(f"-o {output}: must be a .png file")
+        if output.is_dir() or output.suffix.lower() not in SUFFIXES:
+            raise UserError(f"-o {output}: must be a {' or '.join(SUFFIXES)} file")
+        if flags.ui and output.suffix.lower() != ".png":
+            raise UserError(f"-o {output}: what the viewer would show, --ui, is a .png file")
     else:
         check_animation(output, len(path.cameras), path.frames_per_second, flags.size)
     _check_writable(output)

@@ -71,7 +71,7 @@ def view(flags: argparse.Namespace) -> int:
             session.open(flags.scene, from_flags(FileOptions, flags), reference=flags.reference)
         return view
 
-    run_window(
+    frames, seconds = run_window(
         make_view,
         size=flags.size,
         scenes=scene_names(),
@@ -85,6 +85,8 @@ def view(flags: argparse.Namespace) -> int:
     if folder is not None:
         for made in views:
             keep(folder, quantities=made.display.quantities)
+    if flags.frames is not None:
+        Console().result({}, f"drew {frames} frames in {seconds:.1f} s")
     return 0
 
 

@@ -76,7 +76,12 @@ class Gpu:
         return texture
 
     def target(self, *colour: moderngl.Texture, depth: moderngl.Texture | None = None) -> moderngl.Framebuffer:
-        return self.ctx.framebuffer(list(colour), depth)
+        """To draw into. Raises GpuError where the driver has no memory for it."""
+        try:
+            return self.ctx.framebuffer(list(colour), depth)
+        except moderngl.Error as error:
+            width, height = colour[0].size if colour else (0, 0)
+            raise GpuError(f"{width}×{height} pixels do not fit the memory of this driver: {error}") from None
 
     def release_all(self, *resources: Any) -> None:
         """Release targets, textures and buffers, targets first. moderngl goes back to the target it bound last, even one that is

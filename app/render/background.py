@@ -18,9 +18,9 @@ class Background:
     """Fills what the surfaces of a picture leave. Keeps the map of the last sky. Whoever makes it releases it."""
 
     def __init__(self, gpu: Gpu, *, linear: bool = False) -> None:
-        """linear: as light, not developed for the screen."""
-        self._gpu, self._defines = gpu, {"LINEAR": linear}
-        self._dark = Pass(gpu, "render/background", defines=self._defines, label="background")
+        """linear: as light, not developed for the screen; where there is no sky none is behind the surfaces then."""
+        self._gpu, self._linear = gpu, linear
+        self._dark = Pass(gpu, "render/background", label="background")
         self._sky: dict[str, Pass] = {}
         self._shape: F32 | None = None
         self._map: Texture | None = None
@@ -38,7 +38,8 @@ class Background:
         """Behind all that has depth in ``target``; a sky is developed as the display has it. scale: of the false colour.
         aside_px: how far the picture is moved (2,)."""
         if sky is None:
-            self._dark.draw(target, uniforms={"u_height_px": float(target.size[1])}, depth=True)
+            if not self._linear:
+                self._dark.draw(target, uniforms={"u_height_px": float(target.size[1])}, depth=True)
             return
         shader, uniforms = curve(display, scale, exposed=True)
         if shader not in self._sky:
@@ -47,7 +48,7 @@ class Background:
                 self._gpu,
                 "render/sky",
                 slots=slots,
-                defines=self._defines,
+                defines={"LINEAR": self._linear},
                 label="background",
                 vertex="render/background",
             )

@@ -98,12 +98,37 @@ class View:
         """The picture of the solution as it is now; if not ``whole``, brought up to date over several frames. Whether it was
         drawn, see ``FrameRenderer.render``. samples, add: the mean of how many, and of those before, too."""
         self._size = size
-        return self._renderer.render(
+        return self._render(
+            self._renderer, target, self.shown, size, scale=scale, samples=samples, add=add, whole=whole
+        )
+
+    def draw_radiance(self, target: Framebuffer, size: tuple[int, int], *, samples: int) -> None:
+        """The same picture as radiance [W/(sr m²)], neither exposed nor tone-mapped, into a target of floats; of layers that are
+        no light, what they show."""
+        renderer = FrameRenderer(self.session.gpu, linear=True)
+        try:
+            self._render(renderer, target, self.shown.replace(exposure=0.0, false_colour="off"), size, samples=samples)
+        finally:
+            renderer.release()
+
+    def _render(
+        self,
+        renderer: FrameRenderer,
+        target: Framebuffer,
+        display: DisplayOptions,
+        size: tuple[int, int],
+        *,
+        scale: Scale | None = None,
+        samples: int = 1,
+        add: bool = False,
+        whole: bool = True,
+    ) -> bool:
+        return renderer.render(
             target,
             size,
             self.session.lightmap,
             self.camera,
-            self.shown,
+            display,
             reference=self._reference(whole=whole),
             offered=self._offered(whole=whole),
             shooter=self._last_shooter,

@@ -11,6 +11,7 @@ from imgui_bundle import imgui, implot
 from app.session.keeping import Keeping
 from app.ui import edits, keys, layout, navigation, overlays, theme
 from app.ui.files import Files, open_file
+from app.ui.picture_dialog import PictureDialog
 from app.ui.quit_dialog import quit_dialog
 from app.ui.recovery import recovery
 from app.ui.settings import KNOWN
@@ -58,6 +59,7 @@ class Ui:
         self.state.recent = Recent(None if state_folder is None else state_folder / "recent.json")
         self.state.asides = self.state.keeping.asides()
         self._files = Files(suffixes, native=native_dialog)
+        self._picture = PictureDialog()
 
     def use(self) -> None:
         """Make this interface's contexts the current ones."""
@@ -167,6 +169,7 @@ class Ui:
         overlays.invitation(view, state)
         overlays.no_lamps(view, state)
         self._files.frame(view, state)
+        self._picture.draw(view, state)
         overlays.legend_overlay(state.legend, state)
         overlays.loading_overlay(view.session.on_its_way)
         overlays.toasts(view, state, seconds)

@@ -52,6 +52,10 @@ def _screenshot(view: View, state: State) -> None:
     state.requests.append(Request.SCREENSHOT)
 
 
+def _save_picture(view: View, state: State) -> None:
+    state.ask_for_picture = True
+
+
 def _pause(view: View, state: State) -> None:
     toggle(view)
 
@@ -121,6 +125,7 @@ SHORTCUTS = (
     Shortcut("Ctrl+O", "open a scene or session", Key.o, _open, control=True),
     Shortcut("Ctrl+S", "save the session", Key.s, save, control=True, needs_scene=True),
     Shortcut("Ctrl+Shift+S", "save it to another file", Key.s, save_as, control=True, shift=True, needs_scene=True),
+    Shortcut("Ctrl+P", "save a picture of the view alone", Key.p, _save_picture, control=True, needs_scene=True),
     Shortcut("Ctrl+Z", "undo the last edit, or move of the camera", Key.z, undo, control=True, needs_scene=True),
     Shortcut("Ctrl+Shift+Z", "redo what was undone", Key.z, redo, control=True, shift=True, needs_scene=True),
     Shortcut(

@@ -46,6 +46,8 @@ def menu_bar(view: View, state: State) -> None:
         files.menu(view, state)
         if imgui.menu_item(f"{ICONS.ICON_FA_CAMERA}  Screenshot", "F12", False)[0]:
             state.requests.append(Request.SCREENSHOT)
+        if imgui.menu_item(f"{ICONS.ICON_FA_IMAGE}  Save picture ...", "Ctrl+P", False, view.session.opened)[0]:
+            state.ask_for_picture = True
         imgui.separator()
         if imgui.menu_item("Quit", "Ctrl+Q", False)[0]:
             state.ask_to_quit = True

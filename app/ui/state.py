@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum, auto
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.compare.options import ReferenceOptions
@@ -29,6 +30,7 @@ class Request(Enum):
 
     QUIT = auto()
     SCREENSHOT = auto()
+    SAVE_PICTURE = auto()
     RELOAD_SHADERS = auto()
 
 
@@ -46,6 +48,14 @@ class Pace(Options):
     def is_fast(self, seconds: float) -> bool:
         """Whether it is, after so many seconds of solving."""
         return self.pace == "fast" or (self.pace == "auto" and seconds >= WATCH_SECONDS)
+
+
+@dataclass(frozen=True)
+class PictureFile:
+    """A picture of the view alone that is to be saved: where, and its width and height [px]."""
+
+    path: Path
+    size: tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -104,6 +114,8 @@ class State:
     show_help: bool = False
     ask_for_file: bool = False
     ask_for_reference: bool = False
+    ask_for_picture: bool = False
+    picture: PictureFile | None = None
     ask_to_quit: bool = False
     ask_for_session_name: bool = False
     ask_for_settings: bool = False

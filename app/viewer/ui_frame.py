@@ -191,9 +191,7 @@ def ui_image(
     that is clicked once it is there.
     """
     gpu = view.session.gpu
-    limit = gpu.limits.max_texture
-    if not (1 <= min(size) and max(size) <= limit):
-        raise UserError(f"a picture of {size[0]}×{size[1]} pixels: each side must be 1 to {limit} on this GPU")
+    check_size(gpu, size)
     texture = gpu.texture(size, 4, "f1")
     target = gpu.target(texture)
     ui = Ui(measured=measured, live=False, scale=1.0 if panels else max(1.0, min(size) / LEGEND_SIZE))
@@ -215,6 +213,18 @@ def ui_image(
         frame.release()
         ui.release()
         gpu.release_all(target, texture)
+
+
+def check_size(gpu: Gpu, size: tuple[int, int]) -> None:
+    """Raise UserError for a picture that does not fit a texture of this GPU, or its memory, as the sum of its samples."""
+    limit = gpu.limits.max_texture
+    if not (1 <= min(size) and max(size) <= limit):
+        raise UserError(f"a picture of {size[0]}×{size[1]} pixels: each side must be 1 to {limit} on this GPU")
+    trial = gpu.texture(size, 4, "f4")
+    try:
+        gpu.release_all(gpu.target(trial))
+    finally:
+        gpu.release_all(trial)
 
 
 def pixels(target: Framebuffer, size: tuple[int, int]) -> NDArray[np.uint8]:

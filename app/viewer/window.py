@@ -10,6 +10,7 @@ import os
 import string
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,8 @@ from app.gpu import Gpu
 from app.session.pacing import Turns
 from app.session.view import View
 from app.ui.app import Ui
-from app.ui.state import Pace, Request
+from app.ui.state import Pace, PictureFile, Request
+from app.viewer.picture import save_picture
 from app.viewer.ui_frame import UiFrame, save_screenshot
 
 GL_VERSION = (4, 1)
@@ -89,8 +91,8 @@ def run_window(
     pace: Pace | None = None,
     vsync: bool = True,
     frames: int | None = None,
-) -> None:
-    """Open the window, run until it is closed, release everything.
+) -> tuple[int, float]:
+    """Open the window, run until it is closed, release everything. Returns how many frames were drawn, and in how many seconds.
 
     make_view: makes a view of a session once there is a context. size: of the window [display units]. scenes: names for
     the menu. suffixes: of the files that can be opened. layout_file: keeps the places of the panels.
@@ -121,8 +123,10 @@ def run_window(
         if first is not None:
             ui.drop(view, first)
             ui.state.run_actions()
-        ViewerWindow(window, timer, view, frame, ui, frames).main_loop()
+        viewer, start = ViewerWindow(window, timer, view, frame, ui, frames), time.perf_counter()
+        viewer.main_loop()
         ui.state.keeping.end()
+        return viewer.frames, time.perf_counter() - start
     finally:
         frame.release()
         ui.release()
@@ -187,6 +191,7 @@ class ViewerWindow(WindowConfig):
         self._caption = ""
         self._turns = Turns()
         self._awake_until, self._frames_due = 0.0, 0
+        self.frames = 0  # drawn so far
         ui.use()
         platform = imgui.get_platform_io()
         platform.platform_get_clipboard_text_fn = lambda _context: self._pyglet.get_clipboard_text()
@@ -253,18 +258,26 @@ class ViewerWindow(WindowConfig):
         self._show_name()
         for request in requests:
             if request is Request.SCREENSHOT:
-                self._screenshot()
+                self._save(lambda: save_screenshot(self.wnd.fbo, self.wnd.buffer_size, Path.cwd()))
+            elif request is Request.SAVE_PICTURE and state.picture is not None:
+                self._save(partial(self._save_picture, state.picture))
             elif request is Request.QUIT:
                 self.wnd.is_closing = True
         self._frames_due -= 1
+        self.frames += 1
         if self._frames_left is not None:
             self._frames_left -= 1
             if self._frames_left <= 0:
                 self.wnd.is_closing = True
 
-    def _screenshot(self) -> None:
+    def _save_picture(self, file: PictureFile) -> Path:
+        save_picture(self._view, file.path, file.size)
+        return file.path
+
+    def _save(self, save: Callable[[], Path]) -> None:
+        """Do so, and say where it went or why not."""
         try:
-            path = save_screenshot(self.wnd.fbo, self.wnd.buffer_size, Path.cwd())
+            path = save()
         except UserError as error:
             self._ui.state.notify(str(error), error=True)
         else:

@@ -27,6 +27,7 @@ from app.ui import overlays, slider, widgets
 from app.ui.app import Ui
 from app.ui.file_dialog import readable
 from app.ui.keys import ANY_POPUP, SHORTCUTS
+from app.ui.picture_dialog import free_name
 from app.ui.state import WATCH_SECONDS, Legend, Pace, Request
 from app.viewer.ui_frame import save_screenshot
 
@@ -48,6 +49,7 @@ EFFECTS: dict[str, Callable[[Desk], bool]] = {
     "C": lambda d: d.session.display.show == "reference",
     "V": lambda d: d.session.display.show == "split",
     "X": lambda d: d.session.display.layer == "error",
+    "Ctrl+P": lambda d: imgui.is_popup_open("", ANY_POPUP),
     "Ctrl+O": lambda d: imgui.is_popup_open("", ANY_POPUP),
     "Ctrl+Z": lambda d: d.session.display.exposure == 0,
     "Ctrl+Shift+Z": lambda d: d.session.display.exposure == 2,
@@ -151,6 +153,27 @@ def test_keys_typed_into_a_field_are_text(desk: Desk, where: dict[str, tuple[flo
     desk.key(imgui.Key.enter)
     assert desk.session.running
     assert desk.session.display.exposure == 3.5
+
+
+def test_a_picture_of_the_view_is_saved_where_one_says(
+    desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As large as the view, under the next free name, unless something else is typed."""
+    monkeypatch.chdir(tmp_path)
+    desk.key(imgui.Key.p, control=True)
+    desk.frames(3)
+    desk.key(imgui.Key.escape)
+    assert not desk.requests and not imgui.is_popup_open("", ANY_POPUP)
+    desk.key(imgui.Key.p, control=True)
+    desk.frames(3)
+    desk.key(imgui.Key.enter)
+    assert desk.requests == [Request.SAVE_PICTURE] and desk.ui.state.picture is not None
+    path, size = desk.ui.state.picture.path, desk.ui.state.picture.size
+    assert path.parent == tmp_path and path.suffix == ".png"
+    assert size == desk.ui.view_rect[2:]
+    path.write_bytes(b"")
+    assert free_name(tmp_path, path.stem, ".png") == tmp_path / f"{path.stem}-2.png"
+    assert free_name(tmp_path, path.stem, ".exr") == tmp_path / f"{path.stem}.exr"
 
 
 def test_the_pace_is_seen_and_changed(desk: Desk) -> None:

@@ -1,0 +1,94 @@
+"""Asks where a picture of the view alone is saved, how large, and whether as the screen shows it or as light."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+
+from app.ui import widgets
+from app.ui.state import PictureFile, Request, State
+
+if TYPE_CHECKING:
+    from app.session.view import View
+
+TITLE = "Save picture"
+SIZES = ((1280, 720), (1920, 1080), (3840, 2160))
+FORMATS = {".png": "PNG, as it is shown", ".exr": "EXR, linear radiance [W/(sr m²)]"}
+WIDTH_EM, BUTTON_EM = 26.0, 7.0
+MOST_PX = 1 << 16  # along a side, that can be typed; the GPU allows less
+
+
+class PictureDialog:
+    """Closed, or open with what has been typed."""
+
+    def __init__(self) -> None:
+        self._name, self._size = "", (1, 1)
+
+    def draw(self, view: View, state: State) -> None:
+        """Once per frame: opens where that was asked for; what is to be saved becomes a request to the host."""
+        if state.ask_for_picture:
+            state.ask_for_picture = False
+            self._begin(view, state)
+            imgui.open_popup(TITLE)
+        imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
+        flags = imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_saved_settings
+        if not imgui.begin_popup_modal(TITLE, None, flags)[0]:
+            return
+        em = imgui.get_font_size()
+        imgui.dummy(imgui.ImVec2(WIDTH_EM * em, 0))
+        entered = self._fields(state)
+        size = imgui.ImVec2(BUTTON_EM * em, 0)
+        if imgui.button("Save", size) or entered:
+            state.picture = PictureFile(Path(self._name), self._size)
+            state.requests.append(Request.SAVE_PICTURE)
+            imgui.close_current_popup()
+        imgui.same_line()
+        if imgui.button("Cancel", size) or imgui.is_key_pressed(imgui.Key.escape, False):
+            imgui.close_current_popup()
+        imgui.end_popup()
+
+    def _begin(self, view: View, state: State) -> None:
+        """As large as the view, under the next free name in the current folder."""
+        self._size = round(state.view_px[2] * state.ratio), round(state.view_px[3] * state.ratio)
+        suffix = Path(self._name).suffix or ".png"
+        self._name = str(free_name(Path.cwd(), view.session.name.lower().replace(" ", "-"), suffix))
+
+    def _fields(self, state: State) -> bool:
+        """File, format and size; whether Enter was pressed."""
+        widgets.labelled("File")
+        imgui.set_next_item_width(-1)
+        if imgui.is_window_appearing():
+            imgui.set_keyboard_focus_here()
+        entered, self._name = imgui.input_text("##file", self._name, imgui.InputTextFlags_.enter_returns_true)
+        widgets.labelled("Format")
+        imgui.set_next_item_width(-1)
+        suffixes = list(FORMATS)
+        now = Path(self._name).suffix.lower()
+        chosen = imgui.combo("##format", suffixes.index(now) if now in suffixes else -1, list(FORMATS.values()))
+        if chosen[0]:
+            self._name = str(Path(self._name or "picture").with_suffix(suffixes[chosen[1]]))
+        widgets.labelled("Size [px]")
+        imgui.set_next_item_width(-1)
+        changed, typed = imgui.input_int2("##size", list(self._size))
+        if changed:
+            self._size = min(max(typed[0], 1), MOST_PX), min(max(typed[1], 1), MOST_PX)
+        widgets.labelled("")
+        view_size = round(state.view_px[2] * state.ratio), round(state.view_px[3] * state.ratio)
+        for nth, size in enumerate((view_size, *SIZES)):
+            if nth:
+                imgui.same_line()
+            if imgui.small_button("view" if nth == 0 else f"{size[0]}×{size[1]}"):
+                self._size = size
+        imgui.spacing()
+        return bool(entered)
+
+
+def free_name(folder: Path, stem: str, suffix: str) -> Path:
+    """``stem.suffix`` in a folder, or with the next free number."""
+    path, number = folder / f"{stem}{suffix}", 1
+    while path.exists():
+        number += 1
+        path = folder / f"{stem}-{number}{suffix}"
+    return path

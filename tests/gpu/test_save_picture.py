@@ -1,0 +1,83 @@
+"""Pictures of the view alone as files: as the screen shows them, or as light, of any size."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from PIL import Image
+
+from app.atlas.options import AtlasOptions
+from app.errors import UserError
+from app.gpu import Gpu
+from app.render.options import DisplayOptions
+from app.session.run import Stop
+from app.session.session import Session
+from app.session.view import View
+from app.solvers import ShootingOptions
+from app.viewer.picture import picture, save_picture
+
+SIZE = (96, 64)
+
+
+@pytest.fixture
+def view(gpu: Gpu) -> Iterator[View]:
+    session = Session(gpu, options=ShootingOptions(residual=0.5), atlas=AtlasOptions(texels=3000))
+    view = View(session, DisplayOptions(tone_map="clamp", exposure=-1.0))
+    session.open_now("textured-room")
+    session.solve(Stop(work=16))
+    yield view
+    view.release()
+    session.release()
+
+
+def decoded(png: np.ndarray) -> np.ndarray:
+    """Linear, IEC 61966-2-1 by hand."""
+    shown = png / 255.0
+    return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+
+
+@pytest.mark.parametrize("layer", ["combined", "albedo", "residual"])
+def test_png_and_exr_are_the_same_light(view: View, tmp_path: Path, layer: str) -> None:
+    """Where the light is even and not clipped; textured materials, lamps and what lies behind all of them, too."""
+    view.display = view.display.replace(layer=layer)
+    for name in ("a.png", "a.exr"):
+        save_picture(view, tmp_path / name, SIZE)
+    png = np.asarray(Image.open(tmp_path / "a.png"))
+    assert (png == picture(view, SIZE)).all()
+    file = OpenEXR.File(str(tmp_path / "a.exr"))
+    light = file.channels()["RGB"].pixels
+    assert light.shape == (SIZE[1], SIZE[0], 3) and light.dtype == np.float32
+    assert file.header()["unit"] == "W/(sr m2)"
+    gain = 1.0 if layer == "albedo" else 0.5
+    off = np.abs(np.clip(gain * light, 0, 1) - decoded(png))
+    # 8 bits of sRGB are half a step of 1/255 times the slope of the curve, at most 2.3, off; where edges clip, the mean of what
+    # is clipped is another
+    surfaces = light.sum(-1) > 0
+    assert surfaces.mean() > 0.5
+    assert np.quantile(off[surfaces], 0.95) < 2.3 / 255
+    assert np.median(off[surfaces]) < 1.2 / 255
+    if layer == "combined":
+        assert light.max() > 4.0, "what the screen clips is there"
+
+
+def test_a_picture_may_be_larger_than_any_window(view: View, tmp_path: Path) -> None:
+    save_picture(view, tmp_path / "a.png", (2600, 10))
+    assert Image.open(tmp_path / "a.png").size == (2600, 10)
+
+
+def test_what_cannot_be_saved_is_one_line(view: View, gpu: Gpu, tmp_path: Path) -> None:
+    limit = gpu.limits.max_texture
+    for size in ((limit + 1, 10), (0, 10)):
+        for name in ("a.png", "a.exr"):
+            with pytest.raises(UserError, match=rf"each side must be 1 to {limit} on this GPU"):
+                save_picture(view, tmp_path / name, size)
+    with pytest.raises(UserError, match=r"a picture is a \.png or \.exr file"):
+        save_picture(view, tmp_path / "a.jpg", SIZE)
+    for name in ("a.png", "a.exr"):
+        with pytest.raises(UserError, match="cannot be written"):
+            save_picture(view, tmp_path / "nowhere" / name, SIZE)
+    assert list(tmp_path.iterdir()) == []
