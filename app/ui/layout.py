@@ -16,10 +16,13 @@ if TYPE_CHECKING:
     from app.session.view import View
 
 SIDE_EM = 20.5  # width of the side docks, in font heights: the widest fact fits
-BOTTOM_SHARE = 0.27  # height of the lower dock, of the window
+BOTTOM_SHARE, BOTTOM_EM = 0.27, 12.0  # height of the lower dock, of the window, and at least
+LOWEST_SHARE = 0.4  # of a very low window
 DISPLAY_EM = 18.5  # height that the upper panel needs; what is below it gets the rest
 HIGHEST_UPPER = 0.54  # of a low window for it
-WIDEST_SIDES = 0.3  # of a narrow window for each side dock
+NARROW_EM = 72.0  # width of a window, below which one column holds all panels, one group above the other
+WIDEST_SIDE = 0.4  # of a very narrow window for it
+ABOVE_SHARE = 0.68  # height of the upper group, in which the solver is
 
 
 @dataclass(frozen=True)
@@ -84,14 +87,35 @@ def _build(space: int) -> None:
     build.dock_builder_remove_node(space)
     build.dock_builder_add_node(space, imgui.internal.DockNodeFlagsPrivate_.dock_space)
     build.dock_builder_set_node_size(space, area)
-    side = min(SIDE_EM * imgui.get_font_size() / max(area.x, 1.0), WIDEST_SIDES)
-    _, left, rest = build.dock_builder_split_node_py(space, imgui.Dir.left, side)
-    _, right, rest = build.dock_builder_split_node_py(rest, imgui.Dir.right, side / (1 - side))
-    _, bottom, _ = build.dock_builder_split_node_py(rest, imgui.Dir.down, BOTTOM_SHARE)
-    upper = min(DISPLAY_EM * imgui.get_font_size() / area.y, HIGHEST_UPPER)
-    _, right_top, right = build.dock_builder_split_node_py(right, imgui.Dir.up, upper)
-    nodes = {"left": left, "right": right, "right top": right_top, "bottom": bottom}
+    nodes = _column(space, area) if area.x < NARROW_EM * imgui.get_font_size() else _both_sides(space, area)
     for panel in PANELS:
         build.dock_builder_dock_window(panel.title, nodes[panel.dock])
         build.dock_builder_get_node(nodes[panel.dock]).set_local_flags(build.DockNodeFlagsPrivate_.no_close_button)
     build.dock_builder_finish(space)
+
+
+def _bottom_share(area: imgui.ImVec2) -> float:
+    """Of the height, for the plots."""
+    return max(BOTTOM_SHARE, min(BOTTOM_EM * imgui.get_font_size() / area.y, LOWEST_SHARE))
+
+
+def _both_sides(space: int, area: imgui.ImVec2) -> dict[str, int]:
+    """The docks of a window that has room for them left and right of the view."""
+    split = imgui.internal.dock_builder_split_node_py
+    side = SIDE_EM * imgui.get_font_size() / max(area.x, 1.0)
+    _, left, rest = split(space, imgui.Dir.left, side)
+    _, right, rest = split(rest, imgui.Dir.right, side / (1 - side))
+    _, bottom, _ = split(rest, imgui.Dir.down, _bottom_share(area))
+    upper = min(DISPLAY_EM * imgui.get_font_size() / area.y, HIGHEST_UPPER)
+    _, right_top, right = split(right, imgui.Dir.up, upper)
+    return {"left": left, "right": right, "right top": right_top, "bottom": bottom}
+
+
+def _column(space: int, area: imgui.ImVec2) -> dict[str, int]:
+    """The docks of a narrow window: the view has most of its width."""
+    split = imgui.internal.dock_builder_split_node_py
+    side = min(SIDE_EM * imgui.get_font_size() / max(area.x, 1.0), WIDEST_SIDE)
+    _, left, rest = split(space, imgui.Dir.left, side)
+    _, bottom, _ = split(rest, imgui.Dir.down, _bottom_share(area))
+    _, above, below = split(left, imgui.Dir.up, ABOVE_SHARE)
+    return {"left": above, "right": below, "right top": below, "bottom": bottom}

@@ -13,6 +13,7 @@ from app.errors import UserError
 from app.options import Options, option
 from app.session.edits import EditHistory
 from app.session.keeping import Aside, Keeping
+from app.ui.plots import Zooms
 from app.util.recent import Recent
 
 if TYPE_CHECKING:
@@ -159,6 +160,8 @@ class State:
     emitting_area: tuple[object, float] = (None, 0.0)
     emission_colours: dict[int, RGB] = field(default_factory=dict)
     plot: str = "work"
+    plot_alone: str = "remaining"
+    zooms: Zooms = field(default_factory=Zooms)
     reference: ReferenceOptions = field(default_factory=ReferenceOptions)
     layer: str = "combined"
     toasts: list[Toast] = field(default_factory=list)

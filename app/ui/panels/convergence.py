@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from imgui_bundle import imgui, implot
 
-from app.ui import theme, widgets
+from app.ui import plots, theme, widgets
 from app.ui.state import State
 
 if TYPE_CHECKING:
@@ -16,47 +16,53 @@ if TYPE_CHECKING:
 MOST_POINTS = 400  # per curve: more cannot be told apart in a panel
 SMALLEST = 1e-6  # of the power emitted, for the logarithmic axis
 PLOT_EM = 20.0  # width of a plot with its legend
+LEAST_EM = 18.0, 22.0  # width of one beside another: its legend just fits above it, or inside where it is low
 TIMINGS_EM = 19.0  # width of the table of passes: the longest name and its bar
-Curve = tuple[np.ndarray, np.ndarray, theme.RGBA]  # x, y, colour
 AXES = ("work", "seconds")  # columns of the history
-AXIS = int(implot.AxisFlags_.auto_fit | implot.AxisFlags_.no_highlight)
-LEGEND = int(implot.LegendFlags_.no_menus | implot.LegendFlags_.outside | implot.LegendFlags_.horizontal)
-PLOT = int(implot.Flags_.no_mouse_text | implot.Flags_.no_menus | implot.Flags_.no_box_select)
+PLOTS, BOTH = ("remaining", "energy"), "both"
 
 
 def draw(view: View, state: State) -> None:
-    """The whole panel: what is shown, two plots side by side, and where there is room the passes to the right."""
+    """The whole panel: what is shown, two plots side by side or one, and where there is room the passes to the right."""
     em, gap = imgui.get_font_size(), imgui.get_style().item_spacing.x
     passes = bool(view.session.timings) and state.measured
     beside = passes and imgui.get_content_region_avail().x > (2 * PLOT_EM + TIMINGS_EM) * em
     choices = (*AXES, "passes") if passes and not beside else AXES
     shown = state.plot if state.measured and state.plot in choices else "work"
+    which = _which(view, state, imgui.get_content_region_avail().x - (TIMINGS_EM * em + gap if beside else 0.0))
     if state.measured:
-        _choice(state, shown, choices)
+        _choice(state, shown, choices, one=which != BOTH and view.session.family.distributes)
     area = imgui.get_content_region_avail()
     if shown == "passes":
         _passes(view, imgui.ImVec2(area.x, area.y))
         return
     table = TIMINGS_EM * em if beside else 0.0
-    _plots(
-        view,
-        imgui.ImVec2((area.x - (table + gap if table else 0.0) - gap) / 2, area.y),
-        shown,
-        None if state.measured else _axis(state, shown),
-    )
+    size = imgui.ImVec2(area.x - (table + gap if table else 0.0), area.y)
+    _plots(view, state, size, shown, None if state.measured else _axis(state, shown), which)
     if table:
         imgui.same_line()
         _passes(view, imgui.ImVec2(table, area.y))
 
 
-def _choice(state: State, shown: str, choices: tuple[str, ...]) -> None:
-    """One line: what is plotted over, or the passes; and how fast it goes."""
+def _which(view: View, state: State, width: float) -> str:
+    """Both plots where there is room for their legends."""
+    if not view.session.family.distributes:
+        return "remaining"
+    low = plots.is_low(imgui.get_content_region_avail().y - imgui.get_frame_height_with_spacing())
+    return BOTH if width >= 2 * LEAST_EM[low] * imgui.get_font_size() else state.plot_alone
+
+
+def _choice(state: State, shown: str, choices: tuple[str, ...], *, one: bool) -> None:
+    """One line: what is plotted over, or the passes; how fast it goes, or which of the plots is shown."""
     assert state.stats is not None
     for choice in choices:
         if imgui.radio_button(_axis(state, choice), shown == choice):
             state.plot = choice
         imgui.same_line()
-    widgets.dim(f"{widgets.number(state.stats.per_second, 3)} {state.stats.unit}/s")
+    if not one:
+        widgets.dim(f"{widgets.number(state.stats.per_second, 3)} {state.stats.unit}/s")
+    elif imgui.small_button("Energy" if state.plot_alone == "remaining" else state.stats.remains.capitalize()):
+        state.plot_alone = next(plot for plot in PLOTS if plot != state.plot_alone)
 
 
 def _axis(state: State, column: str) -> str:
@@ -65,19 +71,21 @@ def _axis(state: State, column: str) -> str:
     return state.stats.unit if column == "work" else column
 
 
-def _plots(view: View, size: imgui.ImVec2, column: str, label: str | None) -> None:
-    """Over a column of the history; label: written below."""
+def _plots(view: View, state: State, size: imgui.ImVec2, column: str, label: str | None, which: str) -> None:
+    """Over a column of the history; label: written below; which: one of PLOTS, or both side by side."""
     history = view.session.run.history
     rows = np.flatnonzero(np.isfinite(history.column("remaining")) & np.isfinite(history.column("absorbed")))
     chosen = _thinned(rows)
     x = history.column(column)[chosen]
     curves = {n: history.column(n)[chosen] for n in ("remaining", "absorbed", "escaped")}
-    balanced = view.session.family.distributes
-    alone = imgui.ImVec2(2 * size.x + imgui.get_style().item_spacing.x, size.y)
-    _shares(size if balanced else alone, view, column, x, curves["remaining"], label)
-    if balanced:
+    unit = _axis(state, column)
+    half = imgui.ImVec2((size.x - imgui.get_style().item_spacing.x) / 2, size.y) if which == BOTH else size
+    if which != "energy":
+        _shares(view, state, half, column, x, curves["remaining"], label, unit)
+    if which == BOTH:
         imgui.same_line()
-        _energy(size, x, curves, label)
+    if which != "remaining":
+        _energy(state, half, x, curves, label, unit)
 
 
 def _thinned(rows: np.ndarray) -> np.ndarray:
@@ -85,24 +93,24 @@ def _thinned(rows: np.ndarray) -> np.ndarray:
     return np.asarray(rows[np.unique(np.linspace(0, max(len(rows) - 1, 0), min(len(rows), MOST_POINTS)).astype(int))])
 
 
-def _begin(name: str, size: imgui.ImVec2, label: str | None) -> bool:
-    """The legend stands above the plot, in place of a title."""
-    if not implot.begin_plot(f"##{name}", size, PLOT):
-        return False
-    implot.setup_axis(implot.ImAxis_.x1, label, AXIS)
-    implot.setup_legend(implot.Location_.north, LEGEND)
-    return True
+def _ends(x: np.ndarray) -> tuple[float, float]:
+    return (float(x.min()), float(x.max())) if len(x) else (0.0, 1.0)
 
 
 def _shares(
-    size: imgui.ImVec2, view: View, column: str, x: np.ndarray, residual: np.ndarray, label: str | None
+    view: View,
+    state: State,
+    size: imgui.ImVec2,
+    column: str,
+    x: np.ndarray,
+    residual: np.ndarray,
+    label: str | None,
+    unit: str,
 ) -> None:
     """What remains, and beside it the error where there is a reference, in logarithms [fraction]."""
-    if not _begin("residual", size, label):
-        return
     family = view.session.family
     name, of = family.remains, "emitted" if family.distributes else family.part_of
-    curves: dict[str, Curve] = {f"{name} / {of}": (x, residual, theme.AMBER)}
+    curves: dict[str, plots.Curve] = {f"{name} / {of}": (x, residual, theme.AMBER)}
     if view.session.compared.comparison is not None:
         curves = {name: (x, residual, theme.AMBER)}  # all three names fit above the plot
         rows = view.session.compared.comparison.errors
@@ -112,30 +120,32 @@ def _shares(
     lowest = min(float(values.min(initial=1.0)) for _, values, _ in curves.values())
     highest = max(float(values.max(initial=1.0)) for _, values, _ in curves.values())
     decade = 10.0 ** min(np.floor(np.log10(max(lowest, SMALLEST))), -1.0)  # whole decades, at least one
-    implot.setup_axis(implot.ImAxis_.y1, None, int(implot.AxisFlags_.no_highlight))
-    implot.setup_axis_scale(implot.ImAxis_.y1, implot.Scale_.log10)
-    implot.setup_axis_limits(implot.ImAxis_.y1, decade, highest, implot.Cond_.always)
+    over = np.concatenate([curve[0] for curve in curves.values()])
+    if not plots.begin(state.zooms, "remaining", size, label, _ends(over), (decade, highest), logarithmic=True):
+        return
     for name, (over, values, colour) in curves.items():
         if len(over):
             alone = implot.Marker_.circle if len(over) == 1 else implot.Marker_.none
             line = implot.Spec(line_color=imgui.ImVec4(*colour), line_weight=2.0, marker=alone)
             implot.plot_line(name, over, np.maximum(values, SMALLEST), line)
-    implot.end_plot()
+    plots.end(state.zooms, "remaining", unit, curves, widgets.percent)
 
 
-def _energy(size: imgui.ImVec2, x: np.ndarray, curves: dict[str, np.ndarray], label: str | None) -> None:
+def _energy(
+    state: State, size: imgui.ImVec2, x: np.ndarray, shares: dict[str, np.ndarray], label: str | None, unit: str
+) -> None:
     """Where the emitted power is, stacked: absorbed, escaped, unshot [fraction]."""
-    if _begin("energy", size, label):
-        implot.setup_axis(implot.ImAxis_.y1, None, int(implot.AxisFlags_.no_highlight))
-        implot.setup_axis_limits(implot.ImAxis_.y1, 0.0, 1.0, implot.Cond_.always)
-        names = (("absorbed", theme.ABSORBED), ("escaped", theme.ESCAPED), ("unshot", theme.UNSHOT))
-        lower = np.zeros_like(x)
-        for name, colour in names:
-            upper = lower + curves["remaining" if name == "unshot" else name]
-            if len(x):
-                implot.plot_shaded(name, x, lower, upper, implot.Spec(fill_color=imgui.ImVec4(*colour), fill_alpha=0.7))
-            lower = upper
-        implot.end_plot()
+    if not plots.begin(state.zooms, "energy", size, label, _ends(x), (0.0, 1.0)):
+        return
+    names = (("absorbed", theme.ABSORBED), ("escaped", theme.ESCAPED), ("unshot", theme.UNSHOT))
+    shares = shares | {"unshot": shares["remaining"]}
+    lower = np.zeros_like(x)
+    for name, colour in names:
+        upper = lower + shares[name]
+        if len(x):
+            implot.plot_shaded(name, x, lower, upper, implot.Spec(fill_color=imgui.ImVec4(*colour), fill_alpha=0.7))
+        lower = upper
+    plots.end(state.zooms, "energy", unit, {n: (x, shares[n], colour) for n, colour in names}, widgets.percent)
 
 
 def _passes(view: View, size: imgui.ImVec2) -> None:
