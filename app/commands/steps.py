@@ -10,11 +10,12 @@ from app.atlas.options import AtlasOptions
 from app.commands.flags import sky_of
 from app.errors import UserError
 from app.lightmap.options import LightmapOptions
-from app.options import Options, from_flags, specs
+from app.options import Options, from_flags
 from app.render.layers import LAYER_SHADERS, layers_with
 from app.render.options import DisplayOptions
 from app.scene.load import NO_LIGHT
 from app.scene.options import FileOptions
+from app.session.goal import options_for_error
 from app.session.report import notes
 from app.session.run import Keeper, NotFiniteError, Stop
 from app.session.session import Session
@@ -42,11 +43,9 @@ def _solver_options(flags: argparse.Namespace) -> Options:
     family = SOLVERS[flags.solver]
     options: Options = from_flags(family.options, flags)
     asked = [error for name in ("error", "error_rms") if (error := getattr(flags, name, None)) is not None]
-    if not asked or family.per_error is None or getattr(flags, family.threshold) is not None:
+    if not asked or getattr(flags, family.threshold) is not None:
         return options
-    spec = next(spec for spec in specs(family.options) if spec.name == family.threshold)
-    allowed = family.per_error * min(asked) / 100
-    return options.replace(**{family.threshold: max(min(allowed, spec.default), spec.minimum)})
+    return options_for_error(family, options, min(asked) / 100)
 
 
 def _not_reached(session: Session, flags: argparse.Namespace) -> str | None:

@@ -18,10 +18,24 @@ from app.bake.own_layout import Laid, laid_out, why_not_kept
 from app.lightmap.collapse import collapse
 from app.lightmap.gutter import fill_gutter
 from app.lightmap.seams import jumps
+from app.scene.model import Scene
 from app.session.report import picture, report, summary
 from app.session.session import Session
 
-__all__ = ["Baked", "bake_folder", "write_light"]
+__all__ = ["Baked", "Taken", "bake_folder", "take_light", "write_light", "write_taken"]
+
+
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """The light of a session at one moment, ready to be written: what is to be read of the GPU has been. scene: as edited;
+    unedited: as it was read. result, line: the report so far, and that in a line. lost: texels whose light is no number."""
+
+    scene: Scene
+    unedited: Scene
+    light: Laid
+    result: dict[str, Any]
+    line: str
+    lost: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +52,11 @@ class Baked:
 def write_light(session: Session, folder: Path, how: BakeOptions, *, unwrap: bool = False) -> Baked:
     """Write the light as it is now, with the scene as it was edited. unwrap: not by the file's own layout. Waits for the GPU.
     Raises UserError."""
+    return write_taken(take_light(session), folder, how, unwrap=unwrap)
+
+
+def take_light(session: Session) -> Taken:
+    """The light as it is now, with the scene as it was edited. Waits for the GPU."""
     clock = time.perf_counter()
     lightmap = session.lightmap
     irradiance, covered = collapse(lightmap.pool, lightmap.irradiance(ambient=True))
@@ -47,25 +66,30 @@ def write_light(session: Session, folder: Path, how: BakeOptions, *, unwrap: boo
     result = report(session) | picture(session) | {"texels_not_finite": lost}
     irradiance = np.where(finite[..., None], np.maximum(irradiance, 0), np.float32(0))  # no light is still owed
     laid = Laid(session.charts, irradiance, covered & finite)
+    return Taken(session.edited_scene, session.unedited, laid, result, summary(session, result), lost)
+
+
+def write_taken(taken: Taken, folder: Path, how: BakeOptions, *, unwrap: bool = False) -> Baked:
+    """Write light that was taken, in any thread. Raises UserError."""
+    laid, result = taken.light, dict(taken.result)
     result |= _seams(laid)
     notes: tuple[str, ...] = ()
-    if not unwrap and session.scene.uv1 is not None:
-        laid, notes = _own_layout(session, laid)
+    if not unwrap and taken.scene.uv1 is not None:
+        laid, notes = _own_layout(taken.scene, laid)
         result["atlas"] = list(laid.charts.size)
-        result["warnings"] += notes
+        result["warnings"] = [*result["warnings"], *notes]
     light = laid.charts, laid.irradiance, laid.covered
-    files = write_bake(folder, session.scene, *light, result, how, unedited=session.unedited)
-    notes += tuple(files.notes)
-    result["warnings"] += files.notes
-    return Baked(files, result, summary(session, result) + _at_seams(result), notes, lost)
+    files = write_bake(folder, taken.scene, *light, result, how, unedited=taken.unedited)
+    result["warnings"] = [*result["warnings"], *files.notes]
+    return Baked(files, result, taken.line + _at_seams(result), (*notes, *files.notes), taken.lost)
 
 
-def _own_layout(session: Session, laid: Laid) -> tuple[Laid, tuple[str, ...]]:
+def _own_layout(scene: Scene, laid: Laid) -> tuple[Laid, tuple[str, ...]]:
     """The light as the file's own layout has it, where that will do, and what there is to say of it."""
-    against = why_not_kept(session.scene, laid)
+    against = why_not_kept(scene, laid)
     if against is not None:
         return laid, (f"the file's own layout, TEXCOORD_1, is not kept: {against}",)
-    own = laid_out(session.scene, laid)
+    own = laid_out(scene, laid)
     squares = f"the squares that {own.squares} objects have in TEXCOORD_1 are placed side by side"
     return own, (squares,) if own.squares > 1 else ()
 

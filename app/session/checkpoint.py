@@ -14,6 +14,7 @@ from app.errors import UserError
 from app.options import Options, option
 from app.session.light_state import light_state, restore_light
 from app.session.session import Session
+from app.util.background import BackgroundTask
 from app.util.state_file import read_state, remove_state, write_state
 
 CHECKPOINT_NAME = "bake.checkpoint"
@@ -28,7 +29,8 @@ class CheckpointOptions(Options):
         "write the light so far every so many seconds, to resume from",
         unit="s",
         minimum=0,
-        maximum=86400,
+        maximum=86_400,
+        usual=(0, 600),
         zero="never",
     )
 
@@ -36,10 +38,13 @@ class CheckpointOptions(Options):
 class Checkpoint:
     """Of one session's solve, in one file. say: is told once why it cannot be written, if so; the solve goes on."""
 
-    def __init__(self, session: Session, path: Path, seconds: float, say: Callable[[str], None]) -> None:
-        """seconds: between two, 0 for never."""
-        self._session, self.path, self._seconds, self._say = session, path, seconds, say
+    def __init__(
+        self, session: Session, path: Path, seconds: float, say: Callable[[str], None], *, aside: bool = False
+    ) -> None:
+        """seconds: between two, 0 for never. aside: written in a thread of its own, which nothing waits for."""
+        self._session, self.path, self._seconds, self._say, self._aside = session, path, seconds, say, aside
         self._works = seconds > 0
+        self._writing: BackgroundTask[None] | None = None
         self.begin()
 
     def begin(self) -> None:
@@ -59,23 +64,39 @@ class Checkpoint:
 
     def between(self) -> None:
         """Between two pieces of work: write it if it is time."""
-        if time.perf_counter() >= self._due:
+        if self._writing is not None and self._writing.ended:
+            self._end_writing()
+        if self._writing is None and time.perf_counter() >= self._due:
             self.write()
 
     def write(self) -> None:
         """Write it now, in place of the one before."""
-        if not self._works:
-            return
+        self._end_writing()
+        if self._works:
+            state = light_state(self._session)
+            self._writing = BackgroundTask(str(self.path), lambda tell: write_state(self.path, state))
+            if not self._aside:
+                self._end_writing()
+            self.begin()
+
+    def _end_writing(self) -> None:
+        """Wait for what is being written, if anything."""
+        writing, self._writing = self._writing, None
         try:
-            write_state(self.path, light_state(self._session))
+            if writing is not None:
+                _ = writing.result
         except UserError as error:
             self._works = False
             self._say(f"{error}: the bake goes on without checkpoints")
-        self.begin()
 
     def remove(self) -> None:
         """What it was kept for is done."""
+        self._end_writing()
         remove_state(self.path)
+
+    def close(self) -> None:
+        """The last one is to stay."""
+        self._end_writing()
 
 
 __all__ = ["CHECKPOINT_NAME", "Checkpoint", "CheckpointOptions"]

@@ -5,12 +5,17 @@ A solve that goes on from there comes to the same light as one that was never st
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from app import __version__
+from app.atlas.options import AtlasOptions
 from app.errors import UserError
+from app.lightmap.options import LightmapOptions
+from app.options import Options
 from app.scene.arrays import arrays_of
 from app.session.session import Session
+from app.solvers import SOLVERS
 from app.util import cache
 from app.util.state import State, StateError, fitting
 
@@ -44,6 +49,25 @@ def restore_light(session: Session, state: State) -> None:
         raise UserError(f"the light that was kept is damaged: {error}") from error
 
 
+@dataclass(frozen=True)
+class Settings:
+    """By which light was solved that is kept."""
+
+    solver: str
+    options: Options
+    light: LightmapOptions
+    atlas: AtlasOptions
+
+
+def settings_of(state: State) -> Settings:
+    """Those that a session must have to go on from a state. Raises UserError where there are no such."""
+    with fitting():
+        of = state.values[OF]
+        solver = of["solver"]
+        options = SOLVERS[solver].options(**of["options"])
+        return Settings(solver, options, LightmapOptions(**of["light"]), AtlasOptions(**of["atlas"]))
+
+
 def _light_of(session: Session) -> dict[str, Any]:
     """What the light is of, in plain values."""
     charts = session.charts
@@ -54,30 +78,34 @@ def _light_of(session: Session) -> dict[str, Any]:
     }
     return {
         "glowtree": __version__,
-        "--solver": session.solver_name,
-        **{_flag(name): value for name, value in session.options.as_dict().items()},
-        **{_flag(name): value for name, value in session.light.as_dict().items()},
-        **{_flag(name): value for name, value in session.atlas.as_dict().items()},
+        "solver": session.solver_name,
+        "options": session.options.as_dict(),
+        "light": session.light.as_dict(),
+        "atlas": session.atlas.as_dict(),
         "scene": cache.digest(b"scene", arrays),
     }
 
 
-def _flag(name: str) -> str:
-    return "--" + name.replace("_", "-")
-
-
 def _difference(kept: dict[str, Any], now: dict[str, Any]) -> str | None:
     """What to say where the light is of something else."""
-    for name, value in now.items():
-        if kept.get(name) != value:
-            if name == "scene":
-                return "the light that was kept is of another scene: it, or its materials, lamps or sky have changed"
-            return f"the light that was kept is of {name} {_text(kept.get(name))}, not {_text(value)}"
+    for name in ("glowtree", "solver", "options", "light", "atlas"):
+        before, after = (_flags(name, of[name]) for of in (kept, now))
+        for flag, value in after.items():
+            if before.get(flag) != value:
+                return f"the light that was kept is of {flag} {_text(before.get(flag))}, not {_text(value)}"
+    if kept["scene"] != now["scene"]:
+        return "the light that was kept is of another scene: it, or its materials, lamps or sky have changed"
     return None
+
+
+def _flags(name: str, value: Any) -> dict[str, Any]:
+    """Settings as the command line has them, by flag."""
+    named = value if isinstance(value, dict) else {name: value}
+    return {name if name == "glowtree" else "--" + name.replace("_", "-"): value for name, value in named.items()}
 
 
 def _text(value: Any) -> str:
     return "unset" if value is None else str(value)
 
 
-__all__ = ["light_state", "restore_light"]
+__all__ = ["Settings", "light_state", "restore_light", "settings_of"]

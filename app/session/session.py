@@ -381,6 +381,13 @@ class Session:
         if self._opened:
             self.run.options_changed()
 
+    def set_options_of(self, solver: str, options: Options) -> None:
+        """The same of any solver, also one that is to be chosen."""
+        if solver == self.solver_name:
+            self.set_options(options)
+        else:
+            self._choice.options[solver] = options
+
     def set_solver(self, name: str) -> None:
         """Another solver, live. It begins with the light that is there if its method can, else from nothing. One that needs a
         tree for its rays is waited for in the background, and all goes on as it was until then. Raises UserError."""

@@ -104,6 +104,8 @@ class Ui:
         imgui.render()
         state.run_actions()
         state.held = self.held
+        if state.baking is not None:
+            state.baking.poll()
         if view.session.opened:
             edits.watch(view, state, seconds)
         return imgui.get_draw_data()
@@ -119,7 +121,7 @@ class Ui:
 
     @property
     def moving(self) -> bool:
-        """Whether something of the interface changes by itself: a notice, a flight of the eye, a file dialog."""
+        """Whether something of the interface changes by itself: a notice, a flight of the eye, a file dialog, a bake."""
         state = self.state
         return (
             bool(state.toasts)
@@ -127,6 +129,7 @@ class Ui:
             or state.drag_button >= 0
             or state.flying
             or self._files.waiting
+            or (state.baking is not None and state.baking.active)
         )
 
     @property
@@ -148,7 +151,9 @@ class Ui:
         return requests
 
     def release(self) -> None:
-        """Destroy the contexts."""
+        """Destroy the contexts; a bake that is being written is waited for."""
+        if self.state.baking is not None:
+            self.state.baking.release()
         self.use()
         implot.destroy_context(self._plots)
         imgui.destroy_context(self._context)

@@ -20,9 +20,17 @@ class FileDialog:
     """Closed, or waiting for an answer. ``poll`` never blocks."""
 
     def __init__(
-        self, title: str, kind: str, suffixes: Sequence[str], hint: str, *, native: bool | None = None
+        self,
+        title: str,
+        kind: str,
+        suffixes: Sequence[str],
+        hint: str,
+        *,
+        native: bool | None = None,
+        folders: bool = False,
     ) -> None:
-        """kind: of the files, as a plural; hint: what is said in a folder without any."""
+        """kind: of the files, as a plural; hint: what is said in a folder without any. folders: asks for a folder instead."""
+        self._folders = folders
         self._title, self._kind, self._hint = title, kind, hint
         self._suffixes = tuple(suffixes)
         self._native = system_dialog(native)
@@ -34,6 +42,8 @@ class FileDialog:
         """Ask, from the folder of the last answer on."""
         if not self._native:
             self._opening = True
+        elif self._pending is None and self._folders:
+            self._pending = portable_file_dialogs.select_folder(self._title, str(self._folder))
         elif self._pending is None:
             patterns = " ".join(f"*{s}" for s in self._suffixes) or "*"
             self._pending = portable_file_dialogs.open_file(self._title, str(self._folder), [self._kind, patterns])
@@ -47,7 +57,7 @@ class FileDialog:
         """Once per frame: the file that was chosen just now, or None."""
         chosen = self._listed() if self._pending is None else self._answered()
         if chosen is not None:
-            self._folder = chosen.parent
+            self._folder = chosen if self._folders else chosen.parent
         return chosen
 
     def _answered(self) -> Path | None:
@@ -55,7 +65,9 @@ class FileDialog:
             return None
         answer = self._pending.result()
         self._pending = None
-        return Path(answer[0]) if answer else None
+        if not answer:
+            return None
+        return Path(answer if self._folders else answer[0])
 
     def _listed(self) -> Path | None:
         if self._opening:
@@ -70,6 +82,10 @@ class FileDialog:
         imgui.begin_child("files", imgui.ImVec2(0, -imgui.get_frame_height_with_spacing()), imgui.ChildFlags_.borders)
         chosen = self._entries()
         imgui.end_child()
+        if self._folders and imgui.button("Take this folder"):
+            chosen = self._folder
+        if self._folders:
+            imgui.same_line()
         if imgui.button("Cancel") or chosen is not None or imgui.is_key_pressed(imgui.Key.escape, False):
             imgui.close_current_popup()
         imgui.end_popup()
@@ -82,17 +98,19 @@ class FileDialog:
         ]:
             self._folder = self._folder.parent
         entries = readable(self._folder, self._suffixes)
-        if not any(entry.is_file() for entry in entries):
+        if not self._folders and not any(entry.is_file() for entry in entries):
             wanted = f" ({' '.join(self._suffixes)})" if self._suffixes else ""
             widgets.wrapped(f"No files{wanted} here. {self._hint}", theme.DIM)
         for entry in entries:
             folder = entry.is_dir()
             icon = theme.ICONS.ICON_FA_FOLDER if folder else theme.ICONS.ICON_FA_CUBE
+            imgui.begin_disabled(self._folders and not folder)
             if imgui.selectable(f"{icon}  {entry.name}", False, imgui.SelectableFlags_.no_auto_close_popups)[0]:
                 if folder:
                     self._folder = entry
                 else:
                     chosen = entry
+            imgui.end_disabled()
         return chosen
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -38,12 +39,13 @@ class Files:
         self._settings = FileDialog("Open settings", "Settings", (SETTINGS,), WRITTEN, native=native)
         self._session_name = SaveDialog("Save the session", SUFFIX, native=native)
         self._settings_name = SaveDialog("Save settings", SETTINGS, native=native)
+        self._folders = FileDialog("Bake into a folder", "Folders", (), "", native=native, folders=True)
         self._known: object = None
 
     @property
     def waiting(self) -> bool:
         """Whether a dialog of the desktop's own is open, from which no event comes."""
-        dialogs = (self._scenes, self._bakes, self._settings, self._session_name, self._settings_name)
+        dialogs = (self._scenes, self._bakes, self._settings, self._session_name, self._settings_name, self._folders)
         return any(dialog.waiting for dialog in dialogs)
 
     def frame(self, view: View, state: State) -> None:
@@ -63,6 +65,11 @@ class Files:
         if state.ask_for_settings_name:
             state.ask_for_settings_name = False
             self._settings_name.open(Path.cwd() / f"settings{SETTINGS}")
+        if state.ask_for_folder:
+            state.ask_for_folder = False
+            self._folders.open()
+        if (folder := self._folders.poll()) is not None and state.order is not None:
+            state.order = replace(state.order, folder=folder)
         for dialog in (self._scenes, self._bakes):
             if (chosen := dialog.poll()) is not None:
                 open_file(view, state, chosen)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 
 from app.ui import theme, widgets
-from app.ui.panels import compare, convergence, display, inspect, lights, materials, scene, solver
+from app.ui.panels import bake, compare, convergence, display, inspect, lights, materials, scene, solver
 from app.ui.state import State
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ PANELS = (
     Panel("Display", "right top", display.draw),
     Panel("Inspect", "right", inspect.draw),
     Panel("Compare", "right", compare.draw),
+    Panel("Bake", "right", bake.draw),
     Panel("Convergence", "bottom", convergence.draw),
 )
 

@@ -18,6 +18,7 @@ from app.util.recent import Recent
 
 if TYPE_CHECKING:
     from app.atlas.options import AtlasOptions
+    from app.session.baking import Baking, Order
     from app.session.picking import Picked
     from app.session.stats import Stats
 
@@ -101,7 +102,8 @@ class State:
     reveal_material: the list scrolls to the selected one. draw_lights: lamps without area, in the view. reference: of a solve
     in the background; layer: to go back to from the error. edits: of the open scene; held: whether a hand was at a control in
     the last frame. used: of which scene, the materials that are somewhere. keeping: saves and opens sessions; asides: what
-    crashes have left, to be asked about; quit_when_saved: the user is leaving.
+    crashes have left, to be asked about; quit_when_saved: the user is leaving. order: of the next bake, as far as it was
+    edited; baking: the last.
     """
 
     measured: bool = True
@@ -163,6 +165,9 @@ class State:
     plot_alone: str = "remaining"
     zooms: Zooms = field(default_factory=Zooms)
     reference: ReferenceOptions = field(default_factory=ReferenceOptions)
+    ask_for_folder: bool = False
+    order: Order | None = None
+    baking: Baking | None = None
     layer: str = "combined"
     toasts: list[Toast] = field(default_factory=list)
     last_message: str | None = None
@@ -195,6 +200,7 @@ class State:
             self.picked = self.atlas = self.adaptive = None
         if scene is not self._known[0]:
             self.flight, self.material, self.light, self.area_lamp = None, 0, 0, 0
+            self.order = None
             self.emission_colours.clear()
             self.edits = EditHistory()
         self._known = scene, lightmap

@@ -55,6 +55,13 @@ class ReportingView(View):
 
         return noting
 
+    def note_tab(self, panel: str) -> None:
+        """Remember where the tab of a docked panel is."""
+        window = imgui.internal.find_window_by_name(panel)
+        if window is not None:
+            tab = window.dc.dock_tab_item_rect
+            self.places[f"tab {panel}"] = (tab.min.x + tab.max.x) / 2, (tab.min.y + tab.max.y) / 2
+
 
 class ReportingSession(Session):
     """Tells the test, every few frames, how it is, and its view."""
@@ -69,6 +76,7 @@ class ReportingSession(Session):
         pyglet.app.platform_event_loop.dispatch_posted_events()  # of the test; at rest the window does it
         self.frame += 1
         if self.frame % EVERY == 0:
+            self.view.note_tab("Bake")
             state = {
                 "frame": self.frame,
                 "name": self.name,

@@ -231,6 +231,31 @@ def test_no_display_renders_headless_and_says_where(tmp_path: Path) -> None:
     assert image[:, :280].std() > 10 and image[60:480, 420:860].std() > 20  # panels and a lit box
 
 
+def test_a_bake_from_the_panel_is_stopped_and_goes_on(window: Driven, tmp_path: Path) -> None:
+    """The window runs in that folder, and bakes into one there."""
+    state = window.until(lambda s: s["shots"] > 5 and s["places"].get("tab Bake", (0, 0))[0] > 0)
+    click(window, state, "tab Bake")
+    click(window, window.until(lambda s: "bake" in s["places"]), "bake")
+    click(window, window.until(lambda s: "stop" in s["places"]), "stop")
+    window.until(lambda s: not s["running"] and "go on" in s["places"])
+    folder = tmp_path / "Cornell box baked"
+    assert [path.name for path in folder.iterdir()] == ["bake.checkpoint"]
+    time.sleep(0.5)  # the panel has other buttons now
+    click(window, window.state(), "go on")
+    state = window.until(lambda s: s["running"])
+    window.until(lambda s: "show" in s["places"])
+    assert sorted(path.name for path in folder.iterdir()) == ["irradiance.exr", "report.json", "scene.glb"]
+    report = json.loads((folder / "report.json").read_text())
+    assert report["converged"] and report["resumed"]
+
+
+def click(window: Driven, state: dict[str, Any], place: str) -> None:
+    x, y = (round(v) for v in state["places"][place])
+    window.do("mousemove", x, y)
+    window.do("mousedown", 1)
+    window.do("mouseup", 1)
+
+
 def test_frames_of_a_window_are_not_counted_without_one(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "app", "view", "furnace", "--frames", "3"]
     done = subprocess.run(

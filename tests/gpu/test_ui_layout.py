@@ -26,7 +26,7 @@ def test_panels_stand_side_by_side(gpu: Gpu, size: tuple[int, int]) -> None:
     desk = Desk(gpu, FakeSession(), size)
     taken = np.zeros((size[1], size[0]), int)
     windows = {panel.title: imgui.internal.find_window_by_name(panel.title) for panel in layout.PANELS}
-    tabs = {"Compare": "Inspect", "Lights": "Solver", "Materials": "Solver", "Scene": "Solver"}
+    tabs = {"Compare": "Inspect", "Bake": "Inspect", "Lights": "Solver", "Materials": "Solver", "Scene": "Solver"}
     docks = {window.dock_id: window for title, window in windows.items() if title not in tabs}
     for title, other in tabs.items():
         assert windows[title].dock_id == windows[other].dock_id, "a tab behind the other"
