@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
+from app.bake.embedded import embedded_glb
 from app.bake.exr import IRRADIANCE, fits_half, write_exr
 from app.bake.gltf_edit import edited_glb_bytes, is_of_gltf
 from app.bake.gltf_writer import glb_bytes
@@ -45,8 +46,9 @@ REPORT_NAME = "report.json"
 HDR_NAME = "irradiance.hdr"
 RGBE_NAME = "irradiance.rgbe.png"
 SKY_NAME = "sky.exr"
+EMBEDDED_NAME = "embedded.glb"
 PAGE_NAME = "index.html"
-OPTIONAL = (HDR_NAME, RGBE_NAME, SKY_NAME, PAGE_NAME)
+OPTIONAL = (EMBEDDED_NAME, HDR_NAME, RGBE_NAME, SKY_NAME, PAGE_NAME)
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,9 @@ def write_bake(
             staged(SCENE_NAME).write_bytes(glb)
             if scene.sky is not None and scene.sky.emits:
                 write_sky(staged(SKY_NAME), scene.sky)
+            if options.embed:
+                embedded = embedded_glb(scene, charts, light, report.get("exposure", 0.0))
+                staged(EMBEDDED_NAME).write_bytes(embedded)
             if options.web:
                 shown = staged.read(SCENE_NAME, IRRADIANCE_NAME, SKY_NAME)
                 page = web_page(scene.name, shown, report, find_three(options.three))

@@ -20,7 +20,7 @@ from app.bake.gltf_materials import MaterialWriter
 from app.bake.gltf_own_materials import OwnMaterials
 from app.bake.gltf_writer import (
     about_lightmap,
-    add_camera,
+    add_cameras,
     add_light,
     add_objects,
     add_primitive,
@@ -216,9 +216,7 @@ class _Editor:
         """Nodes of cameras where the file has none, and of all lights where they were edited."""
         glb, scene, roots = self._glb, self._scene, []
         if not self._reader.cameras:
-            lower, upper = scene.bounds
-            radius = float(np.linalg.norm(upper - lower)) / 2
-            roots += [add_camera(glb, camera, radius) for camera in scene.cameras]
+            roots += add_cameras(glb, scene)
         if scene.lights != self._unedited.lights:
             for node in glb.document["nodes"]:
                 drop(node, "extensions", "KHR_lights_punctual")

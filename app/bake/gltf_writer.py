@@ -60,15 +60,23 @@ def glb_bytes(scene: Scene, charts: Charts, lightmap: str, *, moz_lightmap: bool
     texture = lightmap_texture(glb, lightmap) if moz_lightmap else None
     materials = MaterialWriter(glb, scene.materials, lightmap, texture)
 
-    lower, upper = scene.bounds
-    centre, radius = (lower + upper) / 2, float(np.linalg.norm(upper - lower)) / 2
-    offset = centre if np.linalg.norm(centre) > FAR * radius else np.zeros(3)
-    nodes = add_objects(glb, scene, sides_of(scene, charts), materials, offset)
-    nodes += [add_camera(glb, camera, radius) for camera in scene.cameras]
+    nodes = add_objects(glb, scene, sides_of(scene, charts), materials, offset_of(scene))
+    nodes += add_cameras(glb, scene)
     nodes += [add_light(glb, light) for light in scene.lights if light.emits]
     glb.add("scenes", {"name": scene.name, "nodes": nodes, "extras": {"lightmap": about_lightmap(lightmap)}})
     glb.document["scene"] = 0
     return glb.to_bytes()
+
+
+def offset_of(scene: Scene) -> F64:
+    """Where nodes put their meshes (3,) [m]: 0, unless the scene is far from there."""
+    centre, radius = _middle(scene)
+    return centre if np.linalg.norm(centre) > FAR * radius else np.zeros(3)
+
+
+def _middle(scene: Scene) -> tuple[F64, float]:
+    lower, upper = scene.bounds
+    return (lower + upper) / 2, float(np.linalg.norm(upper - lower)) / 2
 
 
 def about_lightmap(file: str) -> dict[str, Any]:
@@ -173,9 +181,14 @@ def add_primitive(glb: GlbBuilder, attributes: dict[str, F32]) -> dict[str, Any]
     return {"attributes": written, "indices": glb.add_indices(rank[inverse])}
 
 
-def add_camera(glb: GlbBuilder, camera: Camera, radius: float) -> int:
-    """A node with the camera. radius: of the scene [m]."""
-    perspective = {"yfov": camera.yfov, "znear": NEAR_PLANE * radius}
+def add_cameras(glb: GlbBuilder, scene: Scene) -> list[int]:
+    """A node for each camera of the scene."""
+    near = NEAR_PLANE * _middle(scene)[1]
+    return [_add_camera(glb, camera, near) for camera in scene.cameras]
+
+
+def _add_camera(glb: GlbBuilder, camera: Camera, near: float) -> int:
+    perspective = {"yfov": camera.yfov, "znear": near}
     index = glb.add("cameras", {"name": camera.name, "type": "perspective", "perspective": perspective})
     matrix = camera.world_from_camera.T.reshape(-1).tolist()
     return glb.add("nodes", {"name": camera.name, "camera": index, "matrix": matrix})

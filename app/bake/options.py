@@ -14,6 +14,10 @@ class BakeOptions(Options):
     )
     hdr: bool = option(False, "write the lightmap as irradiance.hdr, too (Radiance RGBE, right to 0.4 %)")
     rgbe_png: bool = option(False, "write the lightmap as irradiance.rgbe.png, too: RGBE in the channels of a PNG")
+    embed: bool = option(
+        False,
+        "write embedded.glb, too: light and albedo as one picture, exposed, which any viewer shows, without extensions",
+    )
     web: bool = option(
         False, "write index.html, too: a page that shows the bake without a network (needs the npm package three)"
     )
