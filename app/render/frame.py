@@ -13,6 +13,7 @@ from app.render.atlas_image import AtlasImage
 from app.render.background import Background
 from app.render.camera import CameraView
 from app.render.false_colour import LAYER, Scale, false_colour_scale, measured
+from app.render.flat import FlatMesh
 from app.render.mean_picture import MeanPicture
 from app.render.options import DisplayOptions
 from app.render.pick import Picker, PickHit
@@ -111,9 +112,7 @@ class FrameRenderer:
         picture = self._picture_for(target, size, direct=alone)
         if alone:
             draw(picture, np.zeros(2))
-            if picture.own:
-                textures, uniforms = {"t_source": picture.colour}, {"u_offset_px": (0, 0)}
-                self._copy.draw(target, textures=textures, uniforms=uniforms, viewport=(0, 0, *size))
+            self._show_own(picture, target, size)
         else:
             for _ in range(samples):
                 draw(picture, self._mean.aside_px)
@@ -134,6 +133,15 @@ class FrameRenderer:
     def samples(self) -> int:
         """Pictures that the last one is the mean of; 0 where it was drawn alone."""
         return self._mean.count
+
+    def render_flat(self, target: Framebuffer, size: tuple[int, int], mesh: FlatMesh, display: DisplayOptions) -> None:
+        """Draw a scene that has no light yet into the lower left ``size`` (width, height) [px] of ``target``."""
+        picture, aspect = self._picture_for(target, size, direct=True), size[0] / size[1]
+        picture.target.clear(depth=1.0)
+        with self._depth_clamp():
+            mesh.draw(picture.target, aspect)
+        self._background.draw(picture.target, mesh.view, aspect, None, display, None, np.zeros(2))
+        self._show_own(picture, target, size)
 
     def atlas(self, lightmap: Lightmap, size: tuple[int, int], *, turned: bool) -> Texture | None:
         """The virtual atlas with what the last frame showed, see AtlasImage; None before the first frame of that lightmap."""
@@ -170,6 +178,11 @@ class FrameRenderer:
             self._surfaces, self._prepared = self._prepared, None
             assert self._surfaces is not None
         return self._surfaces
+
+    def _show_own(self, picture: _Picture, target: Framebuffer, size: tuple[int, int]) -> None:
+        if picture.own:
+            textures, uniforms = {"t_source": picture.colour}, {"u_offset_px": (0, 0)}
+            self._copy.draw(target, textures=textures, uniforms=uniforms, viewport=(0, 0, *size))
 
     def _picture_for(self, target: Framebuffer, size: tuple[int, int], *, direct: bool) -> _Picture:
         """Where to draw: if ``direct``, straight into a target that is a texture of this size; else into a picture of our own."""

@@ -16,6 +16,7 @@ from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import Array, TilePool
 from app.render.exposure import first_exposure
+from app.render.flat import FlatScene
 from app.render.seen import seen_texels
 from app.scene.load import load_scene
 from app.scene.model import Scene
@@ -50,16 +51,23 @@ def read_and_unfold(
     file: FileOptions | None = None,
     sky: Sky | None = None,
     roots: bool = False,
+    show: Callable[[FlatScene], None] | None = None,
 ) -> tuple[Scene, Charts, dict[str, float]]:
     """The scene, cut where its surfaces meet, its charts, and the seconds of both stages. file: its unit and axes, guessed if
-    None. roots: whether texels are the coarsest of quadtrees. Raises UserError (SceneError)."""
+    None. roots: whether texels are the coarsest of quadtrees. show: is given what can be drawn as soon as the scene is read.
+    Raises UserError (SceneError)."""
     start = time.perf_counter()
     tell("reading", 0.0)
     scene = source if isinstance(source, Scene) else load_scene(source, file, default_light=default_light, sky=sky)
-    middle = time.perf_counter()
+    seconds = {"read": time.perf_counter() - start}
+    if show is not None:
+        start = time.perf_counter()
+        show(FlatScene.of(scene))
+        seconds["flat"] = time.perf_counter() - start
+    start = time.perf_counter()
     tell("unfolding", 0.1)
     scene, charts = charts_of(scene, atlas, roots=roots, progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share))
-    return scene, charts, {"read": middle - start, "unfold": time.perf_counter() - middle}
+    return scene, charts, seconds | {"unfold": time.perf_counter() - start}
 
 
 def load(
@@ -74,9 +82,10 @@ def load(
     rays: bool = False,
     make: Callable[[Scene], Scene] | None = None,
     progress: Progress | None = None,
+    show: Callable[[FlatScene], None] | None = None,
 ) -> Loaded:
     """Read a scene, or take one as it is; unfold it, cut it into texels, with ``expose`` find its exposure, and with ``rays``
-    build the tree that they walk. file: as of ``read_and_unfold``. make: makes another scene of one that is taken as it is.
+    build the tree that they walk. file, show: as of ``read_and_unfold``. make: makes another scene of one that is taken as it is.
     Raises UserError (SceneError)."""
     tell: Progress = progress or (lambda stage, share: None)
     if make is not None:
@@ -84,7 +93,7 @@ def load(
         source = make(source)
     options = options or LightmapOptions()
     scene, charts, seconds = read_and_unfold(
-        source, atlas, default_light, tell, file=file, sky=sky, roots=options.adaptive
+        source, atlas, default_light, tell, file=file, sky=sky, roots=options.adaptive, show=show
     )
     start = time.perf_counter()
 
@@ -114,7 +123,7 @@ def load(
 
 class Loading(BackgroundTask[Loaded]):
     """A scene on its way, see ``load``. solver: by name, what it is made ready for. atlas, light: how it is cut and held.
-    version: what the open scene becomes, if it is that."""
+    version: what the open scene becomes, if it is that. flat: what can be drawn of a scene as soon as it is read."""
 
     def __init__(
         self,
@@ -130,12 +139,18 @@ class Loading(BackgroundTask[Loaded]):
         version: Version | None = None,
     ) -> None:
         self.source, self.solver, self.atlas, self.light = source, solver, atlas, options
+        self.flat: FlatScene | None = None
         self.version, make = version, None if version is None else version.make
         more: dict[str, Any] = {"default_light": default_light, "expose": expose, "rays": SOLVERS[solver].rays}
         super().__init__(
             "this scene",
-            lambda tell: load(source, atlas, options, file=file, sky=sky, make=make, **more, progress=tell),
+            lambda tell: load(
+                source, atlas, options, file=file, sky=sky, make=make, **more, progress=tell, show=self._show
+            ),
         )
+
+    def _show(self, flat: FlatScene) -> None:
+        self.flat = flat
 
     @property
     def name(self) -> str:

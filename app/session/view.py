@@ -16,6 +16,7 @@ from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
 from app.render.exposure import exposure_of, first_exposure, is_trapped
 from app.render.false_colour import Scale, false_colour_scale
+from app.render.flat import FlatMesh
 from app.render.frame import FrameRenderer
 from app.render.layers import LAYER_SHADERS, SEAMS, layers_with
 from app.render.options import DisplayOptions
@@ -50,6 +51,8 @@ class View:
         self.marked: tuple[int, int] | None = None
         self._size = SIZE
         self._looked_at: object = None
+        self._flat: FlatMesh | None = None  # of the scene that is loading
+        self._flat_drawn: object = None
         self._renderer, self._rays = FrameRenderer(session.gpu), RayPicture(session.gpu)
         self._seams = SeamJumps(session.gpu)
         self._rays_of: object = None
@@ -62,6 +65,7 @@ class View:
 
     def _opened(self, exposure: float | None, *, same_scene: bool, reference_gone: bool) -> None:
         """Another lightmap is open. exposure: that its light will need [EV], where it is known."""
+        self._drop_flat()
         if not same_scene:
             self.look_through(self.session.scene.cameras[0])
             self.bookmarks = {}
@@ -153,6 +157,27 @@ class View:
         camera = self.camera
         seen = camera.world_from_camera.tobytes(), camera.yfov, self.shown, self.marked
         return session.state, session.compared.comparison, session.gpu.shaders.generation, *seen
+
+    def draw_flat(self, target: Framebuffer, size: tuple[int, int]) -> bool:
+        """The scene that is on its way, flat, where nothing is open and it has been read; whether there is one. Drawn once into a
+        target."""
+        loading = self.session.loading
+        flat = None if loading is None or self.session.opened else loading.flat
+        if self._flat is not None and self._flat.scene is not flat:
+            self._drop_flat()
+        if flat is None:
+            return False
+        if self._flat is None:
+            self._flat = FlatMesh(self.session.gpu, flat)
+        if self._flat_drawn != (target, size):
+            self._renderer.render_flat(target, size, self._flat, self.display)
+            self._flat_drawn = target, size
+        return True
+
+    def _drop_flat(self) -> None:
+        if self._flat is not None:
+            self._flat.release()
+        self._flat = self._flat_drawn = None
 
     def false_colour_scale(self) -> Scale:
         """Of what is shown, which is in false colour. Waits for the GPU."""
@@ -298,6 +323,7 @@ class View:
         return Reference(comparison.texels.texture, float(np.sqrt(3.0)) * comparison.dark)
 
     def release(self) -> None:
+        self._drop_flat()
         self._rays.release()
         self._seams.release()
         self._renderer.release()

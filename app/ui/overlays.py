@@ -208,11 +208,13 @@ def no_lamps(view: View, state: State) -> None:
     imgui.end()
 
 
-def loading_overlay(loading: Any) -> None:
-    """Stage, progress and a way out while a scene or a solver is on its way."""
+def loading_overlay(loading: Any, state: State) -> None:
+    """Stage, progress and a way out while a scene or a solver is on its way, at the top of the view: the middle shows it flat."""
     if loading is None:
         return
-    imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
+    left, top, width, _ = state.view_px
+    middle = imgui.ImVec2(left + width / 2, top + imgui.get_font_size())
+    imgui.set_next_window_pos(middle, imgui.Cond_.always, imgui.ImVec2(0.5, 0.0))
     imgui.begin("##loading", None, FLOATING)
     imgui.text_unformatted(loading.stage)
     width = imgui.get_font_size() * LOADING_EM

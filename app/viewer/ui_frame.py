@@ -80,7 +80,8 @@ class UiFrame:
         known = self._view
         texture, view_target = self._view_of(width, height)
         if not view.session.opened:
-            view_target.clear(*theme.PANEL)
+            if not view.draw_flat(view_target, (width, height)):
+                view_target.clear(*theme.PANEL)
         elif Request.SCREENSHOT in requests:
             view.draw(view_target, (width, height), scale=scale, samples=SAMPLES)
         elif self._whole and (look or known is not self._view):

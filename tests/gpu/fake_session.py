@@ -225,6 +225,9 @@ class FakeSession:
         target.clear(0.2, 0.3, 0.4, 1.0)
         return True
 
+    def draw_flat(self, target, size) -> bool:
+        return False
+
     def atlas_image(self, size, *, turned=False):
         self.insets.append((size, turned))
         return self.image

@@ -18,9 +18,13 @@ from app.commands.flags import sky_of
 from app.gpu import Gpu, gpu_context
 from app.lightmap.options import LightmapOptions
 from app.options import from_flags
+from app.render.flat import FlatMesh, FlatScene
+from app.render.frame import FrameRenderer
+from app.render.options import DisplayOptions
 from app.scene.options import FileOptions
 from app.session.loading import load
 from app.session.opening import Opening
+from app.session.view import SIZE
 from app.solvers import SOLVERS
 from app.util import cache
 from app.util.background import Progress
@@ -31,6 +35,7 @@ from app.util.tables import Column, markdown_table
 RUNS = ("new", "again")
 STAGES = {
     "read": "read",
+    "flat": "flat picture",
     "unfold": "unfold",
     "texels": "cut into texels",
     "rays": "rays",
@@ -46,8 +51,8 @@ COLUMNS = (
     Column("cpu_seconds", "CPU s", ".2f"),
 )
 NOTE = (
-    "Seconds of each stage until one piece of work of the solver is done, on the GPU too; new: with empty caches, again: with "
-    "what that left there."
+    "Seconds of each stage until one piece of work of the solver is done, on the GPU too; flat picture: of the scene as it is "
+    "read, before it has light; new: with empty caches, again: with what that left there."
 )
 
 
@@ -75,17 +80,31 @@ def bench_open(flags: argparse.Namespace) -> int:
 def _opened(gpu: Gpu, flags: argparse.Namespace, report: Progress) -> dict[str, Any]:
     """Seconds of each stage."""
     start, cpu, family = time.perf_counter(), _cpu_seconds(), SOLVERS[flags.solver]
-    loaded = load(
-        flags.scene,
-        from_flags(AtlasOptions, flags),
-        from_flags(LightmapOptions, flags),
-        file=from_flags(FileOptions, flags),
-        default_light=flags.light,
-        sky=sky_of(flags),
-        expose=True,
-        rays=family.rays,
-        progress=report,
-    )
+    renderer = FrameRenderer(gpu)
+
+    def draw(flat: FlatScene) -> None:
+        texture, mesh = gpu.texture(SIZE, 4, "f1"), FlatMesh(gpu, flat)
+        target = gpu.target(texture)
+        renderer.render_flat(target, SIZE, mesh, DisplayOptions())
+        gpu.ctx.finish()
+        mesh.release()
+        gpu.release_all(target, texture)
+
+    try:
+        loaded = load(
+            flags.scene,
+            from_flags(AtlasOptions, flags),
+            from_flags(LightmapOptions, flags),
+            file=from_flags(FileOptions, flags),
+            default_light=flags.light,
+            sky=sky_of(flags),
+            expose=True,
+            rays=family.rays,
+            progress=report,
+            show=draw,
+        )
+    finally:
+        renderer.release()
     seconds = dict(loaded.seconds)
     before = time.perf_counter()
     ready = Opening(gpu).at_once(loaded, flags.solver, {flags.solver: from_flags(family.options, flags)})
