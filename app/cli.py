@@ -173,8 +173,8 @@ def _shot_flags(shot: Parser, family: Family) -> None:
 
 
 def _bake_flags(bake: Parser, family: Family) -> None:
-    scene_flags(bake)
-    output_flag(bake, "DIR", "the folder to write")
+    scene_flags(bake, several=True)
+    output_flag(bake, "DIR", "the folder to write; of several scenes, one in it for each")
     help = "lay the lightmap out anew, also where the file has a layout for it (TEXCOORD_1 within 0 to 1, without overlaps)"
     bake.add_argument("--unwrap", action="store_true", help=help)
     add_flags(bake, BakeOptions)

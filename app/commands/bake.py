@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 from app.bake import check_options
 from app.bake.options import BakeOptions
@@ -10,7 +14,7 @@ from app.commands.steps import estimate, open_scene, session_options, solve
 from app.errors import UserError
 from app.gpu import gpu_context
 from app.options import from_flags
-from app.session.bake import bake_folder, write_light
+from app.session.bake import Baked, bake_folder, write_light
 from app.session.checkpoint import CHECKPOINT_NAME, Checkpoint, CheckpointOptions
 from app.session.session import Session
 from app.solvers import SOLVERS
@@ -18,33 +22,96 @@ from app.util.console import Console
 
 __all__ = ["bake"]
 
+LEFT = tuple({family.threshold for family in SOLVERS.values()})  # names of what remains, in a report
+
 
 def bake(flags: argparse.Namespace) -> int:
-    """Solve and write scene.glb, irradiance.exr and report.json. Raises UserError."""
+    """Solve and write scene.glb, irradiance.exr and report.json; of several scenes, into a folder for each. Raises UserError."""
     if not SOLVERS[flags.solver].everywhere:
         raise UserError(
             f"--solver {flags.solver}: it lights what is around an observer, and a bake is seen from everywhere"
         )
-    console, how = Console(quiet=flags.json), from_flags(BakeOptions, flags)
-    check_options(how)
+    check_options(from_flags(BakeOptions, flags))
+    console = Console(quiet=flags.json)
+    if len(flags.scenes) > 1:
+        return _all(flags, console)
+    baked, whole = _one(_for_scene(flags, flags.scenes[0], flags.output), console)
+    console.result(baked.result, f"{flags.output}: {baked.line}")
+    return _code(baked, whole)
+
+
+def _one(flags: argparse.Namespace, console: Console) -> tuple[Baked, bool]:
+    """One scene; what was written, and whether all was done. Raises UserError."""
     with bake_folder(flags.output), gpu_context() as gpu:
         session = Session(gpu, **session_options(flags))
-        open_scene(session, flags, console)
-        checkpoint = _checkpoint(session, flags, console)
-        failure = solve(session, flags, console, checkpoint)
-        stopped = failure is not None or session.run.interrupted
-        whole = stopped or estimate(session, flags, console)
-        baked = write_light(session, flags.output, how, unwrap=flags.unwrap)
-        if not stopped:
-            checkpoint.remove()
-        session.release()
+        try:
+            open_scene(session, flags, console)
+            checkpoint = _checkpoint(session, flags, console)
+            failure = solve(session, flags, console, checkpoint)
+            stopped = failure is not None or session.run.interrupted
+            whole = stopped or estimate(session, flags, console)
+            baked = write_light(session, flags.output, from_flags(BakeOptions, flags), unwrap=flags.unwrap)
+            if not stopped:
+                checkpoint.remove()
+        finally:
+            session.release()
     for note in baked.notes:
         console.warn(note)
     if failure is not None:
         raise UserError(f"{failure}; {flags.output} has the light of all texels but {baked.lost}")
-    result = {"output": [str(path) for path in baked.files.paths], **baked.result}
-    console.result(result, f"{flags.output}: {baked.line}")
-    return 130 if result["interrupted"] or not whole else 0
+    output = {"output": [str(path) for path in baked.files.paths]}
+    return replace(baked, result={**output, **baked.result}), whole
+
+
+def _all(flags: argparse.Namespace, console: Console) -> int:
+    """Each scene in a folder of its name; one that cannot be baked is said, and the next follows. Ctrl-C ends all. Raises
+    UserError for two of one name."""
+    folders = [flags.output / Path(scene).stem for scene in flags.scenes]
+    twice = next((folder for folder in folders if folders.count(folder) > 1), None)
+    if twice is not None:
+        raise UserError(f"{twice}: two of the scenes would have this folder; bake them one by one")
+    rows: list[tuple[str, ...]] = [("scene", "texels", "seconds", "left", "expected error", "")]
+    results, codes = [], []
+    for scene, folder in zip(flags.scenes, folders, strict=True):
+        try:
+            baked, whole = _one(_for_scene(flags, scene, folder), console)
+        except UserError as error:
+            print(f"glowtree: {error}", file=sys.stderr)
+            results.append({"scene": scene, "failed": str(error)})
+            rows.append((scene, "", "", "", "", "failed"))
+            codes.append(2)
+            continue
+        except KeyboardInterrupt:
+            codes.append(130)
+            break
+        results.append(baked.result)
+        rows.append(_row(scene, baked.result))
+        codes.append(_code(baked, whole))
+        if codes[-1] == 130:
+            break
+    for scene in flags.scenes[len(results) :]:
+        rows.append((scene, "", "", "", "", "not baked"))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    console.result({"bakes": results}, "\n".join(table))
+    return max(codes)
+
+
+def _row(scene: str, result: dict[str, Any]) -> tuple[str, ...]:
+    """A line of the table."""
+    expected, seconds = result.get("expected_error"), sum(result["seconds"].values())
+    state = "stopped early" if result["interrupted"] else "converged" if result["converged"] else "stopped as asked"
+    left = next(f"{result[name]:.2%} {name}" for name in LEFT if name in result)
+    error = "" if expected is None else f"{expected['median']:.1%} median, {expected['rms']:.1%} RMS"
+    return scene, str(result["texels"]), f"{seconds:.1f}", left, error, state
+
+
+def _for_scene(flags: argparse.Namespace, scene: str, folder: Path) -> argparse.Namespace:
+    return argparse.Namespace(**{**vars(flags), "scene": scene, "output": folder})
+
+
+def _code(baked: Baked, whole: bool) -> int:
+    return 130 if baked.result["interrupted"] or not whole else 0
 
 
 def _checkpoint(session: Session, flags: argparse.Namespace, console: Console) -> Checkpoint:

@@ -66,9 +66,11 @@ def _flags_of(family: Family) -> set[str]:
     return {f"--{family.unit}", *(s.flag for s in own), *(f"--no-{s.flag[2:]}" for s in own if s.type is bool)}
 
 
-def scene_flags(parser: Parser, *, optional: bool = False) -> None:
+def scene_flags(parser: Parser, *, optional: bool = False, several: bool = False) -> None:
     help = "a file (.glb .gltf .obj .ply .stl .toml) or the name of a scene"
-    if optional:
+    if several:
+        parser.add_argument("scenes", nargs="+", metavar="scene", help=f"{help}, or several of them")
+    elif optional:
         parser.add_argument("scene", nargs="?", default=DEFAULT_SCENE, help=f"{help} (default {DEFAULT_SCENE})")
     else:
         parser.add_argument("scene", help=help)

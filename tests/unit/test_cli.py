@@ -475,3 +475,19 @@ def json_of(capsys: pytest.CaptureFixture[str], line: list[str]) -> dict[str, An
     values = json.loads(capsys.readouterr().out)
     assert isinstance(values, dict)
     return values
+
+
+def test_many_bakes_have_a_folder_each_and_one_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = ["--texels", "600", "--rays", "8"]
+    assert run(["bake", "cornell-box", "nowhere", "furnace", "-o", "many", *line]) == 2
+    out, err = capsys.readouterr()
+    table = out.splitlines()
+    assert [row.split()[0] for row in table] == ["scene", "cornell-box", "nowhere", "furnace"]
+    assert table[2].endswith("failed") and "nowhere" in err
+    for scene in ("cornell-box", "furnace"):
+        assert (folder / "many" / scene / "scene.glb").is_file()
+    assert not (folder / "many" / "nowhere").exists()
+    values = json_of(capsys, ["bake", "cornell-box", "furnace", "-o", "many", "--json", *line])
+    assert [result["rays"] for result in values["bakes"]] == [8, 8]
+    assert run(["bake", "furnace", "furnace", "-o", "many", *line]) == 2
+    assert "two of the scenes would have this folder" in capsys.readouterr().err
