@@ -187,6 +187,7 @@ class ViewerWindow(WindowConfig):
         self._keys = _keys()
         self._pyglet = window._window
         self._held: set[imgui.Key] = set()
+        self._let_go: set[imgui.Key] = set()
         self._cursor: int | None = None
         self._caption = ""
         self._turns = Turns()
@@ -254,6 +255,9 @@ class ViewerWindow(WindowConfig):
         target, ratio = self.wnd.fbo, self.wnd.pixel_ratio
         requests = self._frame.draw(self._view, target, size=self.wnd.size, ratio=ratio, seconds=frame_time, look=look)
         session.run.drawn()
+        for known in self._let_go:
+            self._key(known, False)
+        self._let_go.clear()
         self._show_cursor()
         self._show_name()
         for request in requests:
@@ -308,6 +312,13 @@ class ViewerWindow(WindowConfig):
         if known is None:
             return
         down = action == self.wnd.keys.ACTION_PRESS
+        self._let_go.discard(known)
+        if not down and any(known in keys for keys in MODIFIERS.values()):
+            self._let_go.add(known)  # after this frame: it was held while the key beside it went down
+        else:
+            self._key(known, down)
+
+    def _key(self, known: imgui.Key, down: bool) -> None:
         (self._held.add if down else self._held.discard)(known)
         for modifier, keys in MODIFIERS.items():
             if known in keys:
@@ -354,6 +365,7 @@ class ViewerWindow(WindowConfig):
 
     def _on_deactivate(self) -> None:
         self._held.clear()
+        self._let_go.clear()
         self._ui.io.add_focus_event(False)
 
 
