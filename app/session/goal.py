@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from app.options import Options, specs
 from app.session.history import History
 from app.session.stats import Stats
@@ -34,12 +36,10 @@ def seconds_left(family: Family, goal: float, stats: Stats, history: History) ->
         return None
     if not family.distributes:
         return stats.seconds * ((now / goal) ** 2 - 1)
-    seconds, remaining = history.column("seconds"), history.column("remaining")
-    middle = int(seconds.searchsorted(stats.seconds / 2))
-    if middle >= len(seconds) or not now < remaining[middle] <= 1:
+    before = float(np.interp(stats.seconds / 2, history.column("seconds"), history.column("remaining")))
+    if not now < before <= 1:
         return None
-    rate = math.log(remaining[middle] / now) / max(stats.seconds - float(seconds[middle]), 1e-9)
-    return math.log(now / goal) / rate
+    return math.log(now / goal) / math.log(before / now) * stats.seconds / 2
 
 
 __all__ = ["options_for_error", "seconds_left"]

@@ -11,6 +11,7 @@ from imgui_bundle import imgui, implot
 from app.session.keeping import Keeping
 from app.ui import edits, keys, layout, navigation, overlays, theme
 from app.ui.files import Files, open_file
+from app.ui.panels import bake
 from app.ui.picture_dialog import PictureDialog
 from app.ui.quit_dialog import quit_dialog
 from app.ui.recovery import recovery
@@ -105,7 +106,7 @@ class Ui:
         state.run_actions()
         state.held = self.held
         if state.baking is not None:
-            state.baking.poll()
+            bake.follow(state, state.baking)
         if view.session.opened:
             edits.watch(view, state, seconds)
         return imgui.get_draw_data()

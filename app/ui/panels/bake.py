@@ -45,6 +45,18 @@ def draw(view: View, state: State) -> None:
         state.order = replace(state.order, files=files, keep=widgets.edit_options(state.order.keep))
 
 
+def follow(state: State, baking: Baking) -> None:
+    """Once per frame: let the bake go on, and say when it is over."""
+    under_way = baking.active
+    baking.poll()
+    if not under_way or baking.active:
+        return
+    if baking.baked is not None:
+        state.notify(f"baked: {baking.order.folder}")
+    elif baking.note is not None:
+        state.notify(f"no bake: {baking.note}", error=True)
+
+
 def first_folder(view: View) -> Path:
     """Beside whoever started the program, named after the scene."""
     name = "".join(c if c.isalnum() or c in "-_. " else "-" for c in view.session.name).strip() or "scene"
@@ -177,7 +189,7 @@ def _last(state: State, baking: Baking) -> None:
         if imgui.button(f"{ICONS.ICON_FA_FOLDER_OPEN} Show in folder###show", imgui.ImVec2(-1, 0)):
             state.act(lambda: show_folder(baking.order.folder))
     if baking.note is not None:
-        widgets.wrapped(f"{baking.note[:1].upper()}{baking.note[1:]}", theme.DIM)
+        widgets.wrapped(words.plain(f"{baking.note[:1].upper()}{baking.note[1:]}"), theme.DIM)
     widgets.section("Another")
 
 
