@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
+from app.ui import bookmarks
 from app.ui.edits import let_go, redo, undo
 from app.ui.files import save, save_as
 from app.ui.navigation import focus
@@ -154,6 +155,8 @@ def dispatch(view: View, state: State) -> None:
         if not modal and imgui.is_key_pressed(Key.escape, False):
             imgui.internal.close_popup_to_level(0, True)
         return
+    if view.session.opened and not io.want_text_input:
+        bookmarks.answer(view, state, control=io.key_ctrl or io.key_super)
     for shortcut in SHORTCUTS:
         held = io.key_ctrl or io.key_super
         ready = (view.session.opened or not shortcut.needs_scene) and (not io.want_text_input or shortcut.while_typing)

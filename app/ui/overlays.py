@@ -9,10 +9,9 @@ from imgui_bundle import imgui
 
 from app.render.units import QUANTITIES, UNITS
 from app.session.balance import verdict_of
-from app.ui import edits, files, new_lamps, pointer, theme, widgets
+from app.ui import bookmarks, edits, files, new_lamps, pointer, theme, widgets
 from app.ui.keys import POINTER, SHORTCUTS, flip_pace
 from app.ui.layout import PANELS
-from app.ui.navigation import look_through
 from app.ui.panels.display import counted
 from app.ui.state import TOAST_SECONDS, Legend, Request, State
 from app.ui.words import plain
@@ -72,9 +71,7 @@ def _view_menu(view: View, state: State) -> None:
             (state.hidden_panels.discard if shown else state.hidden_panels.add)(panel.title)
     imgui.separator()
     if imgui.begin_menu("Camera", view.session.opened):
-        for camera in view.session.scene.cameras:
-            if imgui.menu_item(camera.name, "", False)[0]:
-                look_through(view, state, camera)
+        bookmarks.menu(view, state)
         imgui.end_menu()
     if imgui.begin_menu("Quantities", view.session.opened):
         for quantities in UNITS:
@@ -171,7 +168,7 @@ def help_overlay(state: State) -> None:
     imgui.set_next_window_pos(middle, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
     imgui.begin("##help", None, FLOATING)
     if imgui.begin_table("keys", 2, imgui.TableFlags_.sizing_fixed_fit):
-        for label, meaning in (*((s.label, s.help) for s in SHORTCUTS), *POINTER):
+        for label, meaning in (*((s.label, s.help) for s in SHORTCUTS), *bookmarks.KEYS, *POINTER):
             imgui.table_next_row()
             imgui.table_next_column()
             imgui.text_colored(imgui.ImVec4(*theme.AMBER), label)

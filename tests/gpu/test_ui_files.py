@@ -199,3 +199,32 @@ def test_recent_files(tmp_path: Path) -> None:
         file.write_bytes(content)
         assert Recent(file).paths == []
     Recent(tmp_path / "0.glb" / "no folder").add(scenes[1])  # nothing to be done about it
+
+
+# -- bookmarks of the camera -------------------------------------------------------------------------------------------
+
+
+def test_a_digit_goes_where_it_was_set(desk: Desk) -> None:
+    start = desk.session.camera.world_from_camera.copy()
+    desk.key(imgui.Key._3)
+    assert "no bookmark 3" in desk.ui.state.toasts[-1].text
+    desk.key(imgui.Key._3, control=True)
+    desk.drag((640, 260), (700, 300))
+    moved = desk.session.camera.world_from_camera.copy()
+    assert not (moved == start).all()
+    desk.key(imgui.Key._3)
+    assert (desk.session.camera.world_from_camera == start).all()
+    assert desk.session.camera is not desk.session.bookmarks[3], "what moves on is not the bookmark"
+    desk.key(imgui.Key.z, control=True)
+    assert (desk.session.camera.world_from_camera == moved).all(), "a jump is undone"
+    assert desk.ui.state.keeping.unsaved(desk.session), "they are kept in the session"
+
+
+def test_digits_that_are_typed_are_text(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
+    desk.frames()
+    desk.ui.io.add_key_event(imgui.Key.mod_ctrl, True)
+    desk.click(*where["exposure"])
+    desk.ui.io.add_key_event(imgui.Key.mod_ctrl, False)
+    desk.frames(2)
+    desk.key(imgui.Key._3)
+    assert desk.ui.state.toasts == []
