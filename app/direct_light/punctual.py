@@ -1,4 +1,5 @@
-"""Direct light of lamps without area: shadow rays to their points, or to what makes their shadows soft.
+"""Direct light of lamps without area, and of the sun, which is one: shadow rays to their points, or to what makes their shadows
+soft.
 
     H = Σ_k w_k V_k / (p_k n),    w = I(ω) cos θ / d² of the lamp that a ray goes to, chosen with p = w / Σ w of its set
 
@@ -10,93 +11,64 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from app.gpu import Framebuffer, Gpu, Pass, Texture
+from app.direct_light.lit import PASS, Draw, Kind, Lit
+from app.gpu import Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import upload
-from app.lightmap.tile_pool import Moves
 from app.scene.lights import Light
-from app.scene.model import F32
+from app.scene.model import F32, Scene
+from app.visibility.origins import Origins
 
 ALONE = 8  # lamps that are a set of their own: each takes 32 bytes a texel
 
-
-@dataclass
-class LightLit:
-    """What is known of the light of one lamp, or of several. seen, all: see light_rays.frag.glsl. passes: of each slot."""
-
-    lights: tuple[Light, ...]
-    table: Texture
-    seen: Texture
-    all: Texture
-    target: Framebuffer
-    stream: int
-    passes: NDArray[np.int64]
-    passes_table: Texture
-
-    @property
-    def kept(self) -> dict[str, Texture]:
-        """What shadow rays have found, by name."""
-        return {"seen": self.seen, "all": self.all}
-
-    @property
-    def from_afar(self) -> bool:
-        return self.lights[0].from_afar
-
-    def knows(self, lights: tuple[Light, ...]) -> bool:
-        """Whether all that is known holds for these as well, but for the strength and colour of a single one."""
-        return self.lights == lights or (
-            len(lights) == len(self.lights) == 1 and _shape(lights[0]) == _shape(self.lights[0])
-        )
-
-    def release(self, gpu: Gpu) -> None:
-        gpu.release_all(self.target, self.seen, self.all, self.table, self.passes_table)
+Lights = tuple[Light, ...]
 
 
-class PunctualLight:
-    """Programs, and what they read, for lamps without area on one lightmap."""
+class PunctualLight(Kind[Lights]):
+    """Sets of lights."""
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, rays: dict[str, object], a_pass: int) -> None:
-        """rays: defines of visibility/rays.glsl; a_pass: shadow rays in one."""
-        self._gpu, self._lightmap, self._pass = gpu, lightmap, {"PASS": a_pass}
-        reads = lightmap.defines("MATERIAL_BITS", "TILE") | self._pass | rays
-        self._shoot = Pass(gpu, "direct_light/light_rays", defines=reads, vertex="common/rects")
-        reads = lightmap.defines("TILE") | self._pass
+    name = "lights"
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, rays: dict[str, object], origins: Origins) -> None:
+        super().__init__(gpu, lightmap, rays, origins)
+        self._shoot = Pass(gpu, "direct_light/light_rays", defines=self.read_by_rays, vertex="common/rects")
+        reads = lightmap.defines("TILE") | {"PASS": PASS}
         self._add = Pass(gpu, "direct_light/light_sum", defines=reads, vertex="common/rects")
 
-    def lit(self, lights: tuple[Light, ...], stream: int, passes_table: Texture) -> LightLit:
-        """Of other lamps, of whose light nothing is known yet."""
-        gpu, size = self._gpu, self._lightmap.size
-        seen, all_ = gpu.texture(size, 4, "f4"), gpu.texture(size, 4, "f4")
-        target = gpu.target(seen, all_)
-        target.clear()
-        rows = [_shape(lights[0])] if len(lights) == 1 else lights
-        table = upload(gpu, light_rows(rows, self._lightmap))
-        passes = np.zeros(self._lightmap.pool.tiles, np.int64)
-        return LightLit(lights, table, seen, all_, target, stream, passes, passes_table)
+    def reads(self, of: Lights) -> dict[str, Texture]:
+        rows = [_shape(of[0])] if len(of) == 1 else of
+        return {"t_lights": upload(self.gpu, light_rows(rows, self.lightmap))}
 
-    def shooting(self, lit: LightLit) -> tuple[Pass, dict[str, Texture], dict[str, Any]]:
-        """The program of shadow rays, and what it reads besides origins and rays."""
-        uniforms = {"u_stream": lit.stream, "u_lights": len(lit.lights)}
-        return self._shoot, {"t_passes": lit.passes_table, "t_lights": lit.table}, uniforms
+    def wanted(self, scene: Scene, known: list[Lights]) -> list[Lights]:
+        return light_sets(scene.lights_and_sun)
 
-    def adding(self, lit: LightLit) -> tuple[Pass, dict[str, Texture], dict[str, Any]]:
-        """The program that sums up, and what it reads."""
-        scale = np.array(lit.lights[0].intensity) if len(lit.lights) == 1 else np.ones(3)
-        textures = {"t_seen": lit.seen, "t_all": lit.all, "t_passes": lit.passes_table}
-        scale = scale / self._lightmap.unit
-        return self._add, textures, {"u_scale": tuple(scale.tolist()), "u_size": self._lightmap.size}
+    def same(self, known: Lights, wanted: Lights) -> bool:
+        """But for the strength and colour of a single one."""
+        return known == wanted or (len(known) == len(wanted) == 1 and _shape(known[0]) == _shape(wanted[0]))
 
-    def resized(self, lit: LightLit, moves: Moves) -> None:
-        """The tile pool has got another number of slots."""
-        self._gpu.release_all(lit.target)
-        lit.seen, lit.all = self._lightmap.moved(lit.seen, moves), self._lightmap.moved(lit.all, moves)
-        lit.target = self._gpu.target(lit.seen, lit.all)
+    def emits(self, of: Lights, scene: Scene) -> bool:
+        return any(light.emits for light in of)
+
+    def place(self, of: Lights, scene: Scene) -> list[int]:
+        return [scene.lights_and_sun.index(light) for light in of]
+
+    def at(self, place: list[int], scene: Scene) -> Lights:
+        return tuple(scene.lights_and_sun[nth] for nth in place)
+
+    def from_afar(self, of: Lights) -> bool | None:
+        return of[0].from_afar
+
+    def shooting(self, lit: Lit[Lights]) -> Draw:
+        return Draw(self._shoot, lit.reads, {"u_lights": len(lit.of)})
+
+    def adding(self, lit: Lit[Lights], scene: Scene) -> Draw:
+        scale = (np.array(lit.of[0].intensity) if len(lit.of) == 1 else np.ones(3)) / self.lightmap.unit
+        textures = {"t_seen": lit.found["seen"], "t_all": lit.found["all"]}
+        return Draw(self._add, textures, {"u_scale": tuple(scale.tolist())})
 
 
 def light_sets(lights: Sequence[Light]) -> list[tuple[Light, ...]]:
@@ -124,4 +96,4 @@ def _shape(light: Light) -> Light:
     return replace(light, name="", intensity=(1.0, 1.0, 1.0), on=True)
 
 
-__all__ = ["LightLit", "PunctualLight", "light_rows", "light_sets"]
+__all__ = ["PunctualLight", "light_rows", "light_sets"]

@@ -13,26 +13,18 @@ NORMALS = int(glsl_constant("direct_light/sky_light.frag.glsl", "NORMALS"))  # a
 MOST_COLUMNS = 512  # of the tables: a sun among the pixels of a picture is found, and the search stays short
 
 
-class SkyMap:
-    """One sky. Whoever makes it releases it.
+def sky_textures(gpu: Gpu, sky: Sky) -> dict[str, Texture]:
+    """Its map, and the tables by which directions are chosen: see direct_light/sky_sample.glsl."""
+    rows, columns = chances(sky.shape)
+    light = upload(gpu, sky.shape)
+    light.filter = (gpu.ctx.LINEAR, gpu.ctx.LINEAR)
+    light.repeat_x = True
+    return {"t_sky": light, "t_sky_rows": upload(gpu, rows), "t_sky_columns": upload(gpu, columns)}
 
-    textures: see direct_light/sky_sample.glsl. even: whether its light is the same from everywhere.
-    """
 
-    def __init__(self, gpu: Gpu, sky: Sky) -> None:
-        self._gpu, shape = gpu, sky.shape
-        self.even = bool((shape == shape[0, 0]).all())
-        rows, columns = chances(shape)
-        self.textures: dict[str, Texture] = {
-            "t_sky": upload(gpu, shape),
-            "t_sky_rows": upload(gpu, rows),
-            "t_sky_columns": upload(gpu, columns),
-        }
-        self.textures["t_sky"].filter = (gpu.ctx.LINEAR, gpu.ctx.LINEAR)
-        self.textures["t_sky"].repeat_x = True
-
-    def release(self) -> None:
-        self._gpu.release_all(*self.textures.values())
+def is_even(sky: Sky) -> bool:
+    """Whether its light is the same from everywhere."""
+    return bool((sky.shape == sky.shape[0, 0]).all())
 
 
 def chances(shape: F32) -> tuple[F32, F32]:
@@ -77,4 +69,4 @@ def irradiance_table(sky: Sky) -> F32:
     return out
 
 
-__all__ = ["NORMALS", "SkyMap", "chances", "irradiance_table"]
+__all__ = ["NORMALS", "chances", "irradiance_table", "is_even", "sky_textures"]

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from app.atlas.points import Points
 from app.direct_light.punctual import light_rows
-from app.direct_light.sky_light import sun_uniform
-from app.direct_light.sky_map import SkyMap
+from app.direct_light.sky_map import sky_textures
 from app.gpu import Gpu, Pass, ReadBack, Texture, glsl_constant
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import upload, write_table
@@ -69,7 +68,7 @@ class RayGather:
         light = lightmap.defines("TILE", "MATERIAL_BITS", "ALBEDO_TEXTURE", "EMISSION_TEXTURE") | self._rays.defines
         self._links = Pass(gpu, "estimate/links", defines=light)
         self._light, self._gather = light, dict[tuple[bool, bool], Pass]()
-        self._sky: tuple[Sky, SkyMap] | None = None
+        self._sky: tuple[Sky, dict[str, Texture]] | None = None
         self._lights = gpu.texture((1, 1), 4, "f4")  # see common/light.glsl
         self._light_count = 0
         self._add = Pass(gpu, "estimate/add", defines={"BLOCK": BLOCK})
@@ -78,8 +77,9 @@ class RayGather:
     def find_lamps(self) -> bool:
         """Use the lamps, with an area or without, and the sky of the scene as it is now. False where nothing sends light."""
         scene = self._lightmap.scene
-        self._find_sky(scene.sky if scene.lit_by_sky else None)
-        lights = [light for light in scene.lights if light.emits]
+        sky = scene.sky if scene.lit_by_sky else None
+        self._find_sky(sky if sky is not None and sky.shines else None)
+        lights = [light for light in scene.lights_and_sun if light.emits]
         self._light_count = len(lights)
         if lights:
             self._lights = write_table(self._gpu, self._lights, light_rows(lights, self._lightmap))
@@ -94,10 +94,10 @@ class RayGather:
 
     def _find_sky(self, sky: Sky | None) -> None:
         if self._sky is not None and self._sky[0] is not sky:
-            self._sky[1].release()
+            self._gpu.release_all(*self._sky[1].values())
             self._sky = None
         if sky is not None and self._sky is None:
-            self._sky = sky, SkyMap(self._gpu, sky)
+            self._sky = sky, sky_textures(self._gpu, sky)
 
     @property
     def _gathering(self) -> Pass:
@@ -116,7 +116,7 @@ class RayGather:
         self._write_nodes(position, normal, shifts)
         more, values = dict[str, Texture](), dict[str, object]()
         if self._sky is not None:
-            more, values = self._sky[1].textures, sky_uniforms(self._sky[0])
+            more, values = self._sky[1], {"u_sky": tuple(self._sky[0].scale.tolist())}
         if self._light_count:
             more = more | {"t_lights": self._lights}
             values = values | {"u_lights": self._light_count, "u_rays": rays}
@@ -183,7 +183,7 @@ class RayGather:
     def release(self) -> None:
         self._rays.release()
         if self._sky is not None:
-            self._sky[1].release()
+            self._gpu.release_all(*self._sky[1].values())
         self._gpu.release_all(self._link_target, *self._targets.values())
         self._gpu.release_all(self._lamps, self._lights, self._all_nodes, *self._textures.values())
 
@@ -210,9 +210,3 @@ class RayGather:
 
     def _read(self, looked: ReadBack) -> F32:
         return np.frombuffer(looked.take(), np.float32).reshape(self.rows, -1, 4)
-
-
-def sky_uniforms(sky: Sky) -> dict[str, object]:
-    """See estimate/gather.frag.glsl."""
-    sun = (0.0, 1.0, 0.0, 0.0) if sky.sun is None else sun_uniform(sky)
-    return {"u_sky": tuple(sky.scale.tolist()), "u_facing_sun": tuple(sky.sun_irradiance.tolist()), "u_sun": sun}

@@ -153,6 +153,12 @@ class Scene:
         return self.sky is not None and self.sky.emits
 
     @property
+    def lights_and_sun(self) -> tuple[Light, ...]:
+        """Lamps without area; before them the sun, which is one of them."""
+        sun = None if self.sky is None else self.sky.sun_light
+        return self.lights if sun is None else (sun, *self.lights)
+
+    @property
     def lit_by_lights(self) -> bool:
         """Whether light comes from lamps without area."""
         return any(light.emits for light in self.lights)

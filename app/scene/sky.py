@@ -114,7 +114,7 @@ class Sky:
         """(3,) on a surface that faces the sun, of the sun alone [W/m²]; 0 without one."""
         return np.zeros(3) if self.sun is None else self.scale * sun_irradiance(self.sun.height, self.turbidity)
 
-    @property
+    @functools.cached_property
     def sun_light(self) -> Light | None:
         """The sun as a directional light; none without one, or where it is dark."""
         if self.sun is None or not self.sun_irradiance.any():

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from app.atlas.charts import TILES
-from app.direct_light.shadow_rays import PASS
+from app.direct_light.lit import PASS
 from app.gpu import Glsl, Gpu, Mesh, Pass, ShaderError, ShaderLibrary
 from app.gpu.shader import SHADERS, Source
 from app.options import specs
@@ -78,7 +78,6 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "LIGHT": FLAG,
     "LIGHTS": FLAG,
     "PIXELS": (1024,),
-    "SUN": FLAG,
     "GATHERED": FLAG,
     "TRACED": FLAG,
     "FINER": FLAG,

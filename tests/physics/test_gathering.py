@@ -11,7 +11,7 @@ from solver_scenes import EVERY_LIGHTMAP, Solution, begin, grey, quads_scene, ro
 
 from app.atlas.options import AtlasOptions
 from app.direct_light.lamps import ALONE
-from app.direct_light.shadow_rays import folded
+from app.direct_light.lit import folded
 from app.gpu import Gpu
 from app.lightmap.options import STORAGE
 from app.scene.model import F64, Material, Scene, Texture
@@ -176,7 +176,7 @@ def test_a_lamp_that_goes_on_while_leaves_get_their_shadow_rays_lights_all_of_th
         lit.step(4)
         new = lit.rays.direct.sets[-1]
         there = lit.lightmap.pool.slot_texels > 0
-        assert new.lamps.materials == (RED,) and new.passes[there].min() > 1
+        assert new.of.materials == (RED,) and new.passes[there].min() > 1
         for _ in range(20):
             lit.step(4)
         light.append(lit.means(lit.H))
@@ -294,7 +294,7 @@ def test_a_lamp_in_many_pieces_gives_the_light_of_one(gpu: Gpu) -> None:
         ]
         scene = quads_scene([floor, *lamp], [grey(0.0), grey(0.0, 1.0)], [0] + [1] * len(lamp))
         lit = gathered(gpu, scene, 512, density=8)
-        assert lit.rays.direct.sets[0].lamps.closed_form == (n == 1)
+        assert lit.rays.direct.sets[0].of.closed_form == (n == 1)
         on = lit.object == 0
         flux, noise = (lit.H[:, 0] * lit.area)[on].sum(), np.sqrt((lit.area**2 * lit.variance)[on].sum())
         light.append((flux, noise))
@@ -319,7 +319,7 @@ def test_a_lamp_with_a_picture_gives_the_light_of_its_bright_parts(gpu: Gpu) -> 
     flux, noise = [], []
     for scene in (whole, cut):
         lit = gathered(gpu, scene, 256, density=16)
-        assert lit.rays.direct.sets[0].lamps.picture == (scene is whole)
+        assert lit.rays.direct.sets[0].of.picture == (scene is whole)
         flux.append([(lit.H[:, 0] * lit.area)[lit.object == k].sum() for k in range(6)])
         noise.append([np.sqrt((lit.area**2 * lit.variance)[lit.object == k].sum()) for k in range(6)])
         lit.release()

@@ -1,7 +1,7 @@
 // The direct light of a set of lamps without area, as its shadow rays have it so far: the mean of V w / p. Blended.
 #define PASS  // shadow rays
 #include "common/tile.glsl"
-uniform sampler2D t_seen;  // see light_rays.frag.glsl
+uniform sampler2D t_seen;  // see rays_loop.glsl
 uniform sampler2D t_all;
 uniform sampler2D t_passes;  // of PASS shadow rays, that each slot has had
 uniform vec3 u_scale;        // to stored units

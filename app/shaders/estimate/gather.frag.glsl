@@ -4,16 +4,14 @@
 //
 // Lamps are chosen by the power of their triangles, points on them evenly.
 #define SKY 0
-#define LIGHTS 0  // 1: there are lamps without area
+#define LIGHTS 0  // 1: there are lamps without area, or a sun
 #include "common/hemisphere.glsl"
 #include "estimate/node.glsl"
 #include "estimate/surface.glsl"
 
 #if SKY
 #include "direct_light/sky_sample.glsl"
-#include "direct_light/sun.glsl"
 uniform vec3 u_sky;           // scale of its map [W/(sr m²)]
-uniform vec3 u_facing_sun;    // what faces the sun receives of it [W/m²]
 #endif
 #if LIGHTS
 #include "direct_light/light_sample.glsl"
@@ -77,10 +75,7 @@ vec4 from_sky(Node node, int ray) {
     vec3 direction = sky_direction(share);
     vec4 light = vec4(0.0);
     if (dot(direction, node.normal) > 0.0 && !any_hit(node.origin, direction, 0.0, REACH)) light = from_beyond(node, direction);
-    vec3 to_sun = sun_direction(share);
-    float cosine = dot(to_sun, node.normal);
-    if (u_facing_sun == vec3(0.0) || cosine <= 0.0 || any_hit(node.origin, to_sun, 0.0, REACH)) return light;
-    return light + cosine * vec4(u_facing_sun, dot(u_facing_sun, vec3(1.0 / 3.0)));
+    return light;
 #else
     return vec4(0.0);
 #endif

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from app.atlas.texels import uniform_leaves
-from app.direct_light.shadow_rays import PASS, DirectLight
+from app.direct_light.lit import PASS
+from app.direct_light.shadow_rays import DirectLight
 from app.gpu import Framebuffer, Gpu, ReadBack, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import Change

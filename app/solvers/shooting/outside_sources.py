@@ -75,8 +75,7 @@ def sources_of(scene: Scene, lightmap: Lightmap) -> Sources:
     """Of all light from outside; those at the same place, or in the same direction, added up."""
     blended = any(m.blended for m in scene.materials)
     radius, angle = (APART * lightmap.space.scale, APART_ANGLE) if blended else (0.0, 0.0)
-    sun = None if scene.sky is None else scene.sky.sun_light
-    lights = [light for light in (*scene.lights, sun) if light is not None and light.emits]
+    lights = [light for light in scene.lights_and_sun if light.emits]
     found: Sources = {}
     for light in lights:
         if light.from_afar:
