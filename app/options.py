@@ -15,7 +15,7 @@ import functools
 import math
 import types
 import typing
-from collections.abc import Container, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from typing import Any, Self, TypeVar
 
@@ -41,6 +41,16 @@ class Spec:
     optional: bool = False
     zero: str = ""
     usual: tuple[float, float] | None = None
+    label: str = ""
+    tip: str = ""
+    term: str = ""
+    off: Callable[[Any], str | None] | None = None
+
+    @property
+    def title(self) -> str:
+        """What a widget is called: ``Frame budget`` for frame_budget, where nothing else was declared."""
+        words = self.name.replace("_", " ")
+        return self.label or words[:1].upper() + words[1:]
 
     @property
     def flag(self) -> str:
@@ -97,14 +107,29 @@ def option(
     multiple: int = 1,
     zero: str = "",
     usual: tuple[float, float] | None = None,
+    label: str = "",
+    tip: str = "",
+    term: str = "",
+    off: Callable[[Any], str | None] | None = None,
 ) -> Any:
-    """Declare one field of an ``Options`` dataclass. zero: what a widget shows instead of 0. usual: ends of a widget's range,
-    inside of what is legal."""
+    """Declare one field of an ``Options`` dataclass. help: for the flag. zero: what a widget shows instead of 0. usual: ends of a
+    widget's range, inside of what is legal. label: of the widget, where it is not the name. tip: what the option does for the
+    picture and what it costs, for the widget's tooltip; help where that says it. term: what papers call it. off: why the option
+    has no effect, given all options of the class, or None where it has one."""
     meta = {"help": help, "unit": unit, "minimum": minimum, "maximum": maximum, "choices": tuple(choices)}
     return dataclasses.field(
         default=default,
-        metadata={**meta, "logarithmic": logarithmic, "multiple": multiple, "zero": zero, "usual": usual},
+        metadata={
+            **meta,
+            **{"logarithmic": logarithmic, "multiple": multiple, "zero": zero, "usual": usual},
+            **{"label": label, "tip": tip, "term": term, "off": off},
+        },
     )
+
+
+def only_with(name: str, values: Container[Any], reason: str) -> Callable[[Any], str | None]:
+    """The ``off`` of an option that has an effect only where the option ``name`` is one of ``values``."""
+    return lambda options: None if getattr(options, name) in values else reason
 
 
 @dataclass(frozen=True)

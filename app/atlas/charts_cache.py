@@ -59,7 +59,7 @@ def _made(
     scene: Scene, atlas: AtlasOptions, roots: bool, progress: Callable[[str, float], None] | None
 ) -> tuple[Scene, Charts]:
     report = progress or (lambda stage, share: None)
-    report("contacts", 0.0)
+    report("cutting where surfaces meet", 0.0)
     cut = cut_at_contacts(scene)
     charts = parametrize(
         cut.scene,

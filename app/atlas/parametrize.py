@@ -80,14 +80,14 @@ def parametrize(
     """
     check(density, texels)
     report = progress or (lambda stage, share: None)
-    report("sides", 0.0)
+    report("finding sides that light can reach", 0.0)
     lit = lit_sides(scene)
-    report("weld", 0.05)
+    report("joining corners", 0.05)
     points, corners = weld(scene)
-    report("flat pieces", 0.1)
+    report("finding flat pieces", 0.1)
     facet = facets(points, corners, scene.material_ids, scene_size(scene))
     layout, method, warnings = _unfold(scene, lit, points, corners, facet, ends, time_limit, report)
-    report("pack", UNFOLDED)
+    report("placing pieces side by side", UNFOLDED)
     if density is None:
         aim = texels if texels is not None else default_texels(len(lit.triangle), roots)
         density = _density_for(layout, aim)
@@ -98,7 +98,7 @@ def parametrize(
             f"--density {density:g} needs {need:,.0f} texels: the limit is {MAX_TEXELS:,} (density {best:.3g})"
         )
     charts = _place(layout, lit, facet, density, tile)
-    report("what lies on surfaces", 0.8)
+    report("finding what lies on surfaces", 0.8)
     face_uv, face_chart, face_facet, rects, size = charts
     hidden = hidden_pieces(scene, points, corners, facet, lit.triangle, lit.back, face_uv, density)
     if hidden.left_out:
@@ -108,7 +108,7 @@ def parametrize(
         warnings = (*warnings, soup)
     if not roots:
         warnings += _too_small(layout, density)
-    report("seams", 0.95)
+    report("joining edges of pieces", 0.95)
     return Charts(
         size=size,
         tile=tile,
@@ -171,7 +171,7 @@ def _unfold(
     report: Progress,
 ) -> tuple[Layout, str, tuple[str, ...]]:
     """Charts in metres for every triangle with a lit side; their story in words; warnings."""
-    report("rectangles", 0.2)
+    report("laying out rectangles", 0.2)
     used = np.unique(lit.triangle)
     rectangles = find_rectangles(points, corners[used], scene.material_ids[used], facet[used])
     slot = np.full(int(facet.max()) + 1, -1, np.int32)

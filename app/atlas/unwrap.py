@@ -201,7 +201,7 @@ def _run_worker(source: Path, target: Path, time_limit: float, triangles: int, p
                 if elapsed > time_limit:
                     raise _UnwrapError(f"took longer than {time_limit:g} s")
                 if progress is not None:
-                    progress("unwrap", elapsed / (elapsed + EXPECTED_S[0] + EXPECTED_S[1] * triangles))
+                    progress("unfolding curved pieces", elapsed / (elapsed + EXPECTED_S[0] + EXPECTED_S[1] * triangles))
                 time.sleep(POLL_S)
         finally:
             worker.kill()

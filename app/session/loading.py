@@ -57,7 +57,7 @@ def read_and_unfold(
     None. roots: whether texels are the coarsest of quadtrees. show: is given what can be drawn as soon as the scene is read.
     Raises UserError (SceneError)."""
     start = time.perf_counter()
-    tell("reading", 0.0)
+    tell("reading the file", 0.0)
     scene = source if isinstance(source, Scene) else load_scene(source, file, default_light=default_light, sky=sky)
     seconds = {"read": time.perf_counter() - start}
     if show is not None:
@@ -65,7 +65,7 @@ def read_and_unfold(
         show(FlatScene.of(scene))
         seconds["flat"] = time.perf_counter() - start
     start = time.perf_counter()
-    tell("unfolding", 0.1)
+    tell("unfolding surfaces", 0.1)
     scene, charts = charts_of(scene, atlas, roots=roots, progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share))
     return scene, charts, seconds | {"unfold": time.perf_counter() - start}
 
@@ -102,7 +102,7 @@ def load(
 
     cutting(0.0)
     pool = quadtree_pool(scene, charts, cutting) if options.adaptive else TilePool(scene, charts, report=cutting)
-    tell("exposing", 0.8)
+    tell("finding the exposure", 0.8)
     exposure = None
     with ThreadPoolExecutor(1) as beside:
         # cached in the pool: the window, which reads them next, does not wait

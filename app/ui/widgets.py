@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 
 from app.options import Options, Spec, specs
 from app.ui import slider, theme
-from app.ui.words import title
+from app.ui.words import meaning
 
 OptionsT = TypeVar("OptionsT", bound=Options)
 
@@ -38,7 +38,8 @@ def edit_options(
     """One widget per declared option; returns ``options`` itself, or a checked copy where something was changed.
 
     A right-click puts the default back. Labels of options that are not at their default are bright.
-    ``only`` some of them, in that order, or all but ``skip``. ``off`` says of options that have no effect now why: they are grey.
+    ``only`` some of them, in that order, or all but ``skip``. ``off`` says of options that have no effect now why, besides
+    what is declared of them: they are grey.
     ``starts`` are the values that optional ones have while they are not given one, and begin with when they are; ``units`` and
     ``choices`` what is shown instead of those that are declared.
     """
@@ -51,7 +52,8 @@ def edit_options(
             value = getattr(options, spec.name)
             unit = (units or {}).get(spec.name, spec.unit)
             shown_as = dataclasses.replace(spec, unit=unit, choices=(choices or {}).get(spec.name, spec.choices))
-            edited = edit_option(shown_as, value, (starts or {}).get(spec.name), off=(off or {}).get(spec.name))
+            reason = (off or {}).get(spec.name) or (spec.off(options) if spec.off is not None else None)
+            edited = edit_option(shown_as, value, (starts or {}).get(spec.name), off=reason)
             if edited != value:
                 changes[spec.name] = edited
     imgui.pop_id()
@@ -65,8 +67,7 @@ def _specs(options: type[Options]) -> list[Spec]:
 
 def edit_option(spec: Spec, value: Any, start: Any = None, *, off: str | None = None) -> Any:
     """The widget of one option; the legal value that it holds afterwards. off: why it has no effect now, if it has none."""
-    label = title(spec.name)
-    labelled(label, changed=value != spec.default and off is None)
+    labelled(spec.title, changed=value != spec.default and off is None)
     imgui.push_id(spec.name)
     imgui.begin_disabled(off is not None)
     if spec.optional:
@@ -74,9 +75,7 @@ def edit_option(spec: Spec, value: Any, start: Any = None, *, off: str | None = 
     edited = value if value is None else _editor(spec, value, start)
     imgui.end_disabled()
     edited = edited if off is not None else put_back(edited, spec.default)
-    unit = f" [{spec.unit}]" if spec.unit else ""
-    reason = "" if off is None else f"\nNo effect now: {off}"
-    tooltip(f"{spec.help}{unit}: {spec.allowed}\nRight-click: default ({shown(spec.default)}){reason}")
+    tooltip(meaning(spec, off))
     imgui.pop_id()
     return edited
 

@@ -1,18 +1,36 @@
-"""What messages say of flags of the command line, in the words of the window."""
+"""Words of the window: what a control does, as its tooltip says, and what messages say of flags of the command line."""
 
 from __future__ import annotations
 
+import functools
 import re
 
+from app.atlas.options import AtlasOptions
+from app.lightmap.options import LightmapOptions
+from app.options import Spec, specs
+from app.render.options import DisplayOptions
 from app.solvers import SOLVERS
 
-FLAG = re.compile(r"--(?:no-)?([a-z][a-z-]*)")
+FLAG = re.compile(r"(?<![\w-])--(?:no-)?([a-z][a-z-]*)")
 SOLVER = re.compile(r"--solver (\w+)")
 PLACES = {
     "light": "Ceiling in the Lights panel",
     "sky": "Sky in the Lights panel",
     "sun": "the sun's place in the Lights panel",
 }
+LEAST, MOST = 1e-5, 1e8  # numbers beyond which a range has no end to speak of
+
+
+def meaning(spec: Spec, off: str | None = None) -> str:
+    """What a tooltip says of an option: what it does and costs, its range, default and the papers' word. off: why it has no
+    effect now."""
+    text = spec.tip or spec.help
+    lines = [f"{text[:1].upper()}{text[1:]}.", _range(spec)]
+    if spec.term:
+        lines.append(f"In papers: {spec.term}.")
+    if off is not None:
+        lines.append(f"No effect now: {off}.")
+    return "\n".join(lines)
 
 
 def plain(text: str) -> str:
@@ -22,9 +40,47 @@ def plain(text: str) -> str:
 
 
 def title(name: str) -> str:
-    """``shots_per_frame`` as a label: ``Shots per frame``."""
+    """What the widget of an option is called: ``Patch level`` for level."""
     words = name.replace("_", " ")
-    return words[:1].upper() + words[1:]
+    return _titles().get(name) or words[:1].upper() + words[1:]
 
 
-__all__ = ["plain", "title"]
+def number(value: float) -> str:
+    """Without an exponent, thousands apart: 0.001, 16,000,000."""
+    text = f"{value:,.8f}".rstrip("0").rstrip(".") if isinstance(value, float) else f"{value:,}"
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
+@functools.cache
+def _titles() -> dict[str, str]:
+    families = (family.options for family in SOLVERS.values())
+    return {
+        spec.name: spec.title
+        for one in (AtlasOptions, LightmapOptions, DisplayOptions, *families)
+        for spec in specs(one)
+    }
+
+
+def _range(spec: Spec) -> str:
+    """Of legal values, and the default: ``0 to 4 (default 2)``."""
+    unit = f" {spec.unit.replace('1/', 'per ')}" if spec.unit else ""
+    if spec.type is bool:
+        default = "on" if spec.default else "off"
+    elif spec.default is None:
+        default = "found from the scene"
+    else:
+        default = number(spec.default) + unit if spec.type in (int, float) else str(spec.default)
+    default = f"default {spec.zero if spec.default == 0 and spec.zero else default}; right-click: back to it"
+    if spec.choices or spec.minimum is None or spec.maximum is None:
+        return f"{default[:1].upper()}{default[1:]}."
+    steps = f" in steps of {spec.multiple}" if spec.multiple > 1 else ""
+    low, high = spec.minimum, spec.maximum
+    bounds = f"{number(low)} to {number(high)}{unit}"
+    if 0 < low < LEAST:
+        bounds = f"Above 0{unit}" if high > MOST else f"Up to {number(high)}{unit}"
+    elif high > MOST:
+        bounds = f"From {number(low)}{unit}"
+    return f"{bounds}{steps}; {default}."
+
+
+__all__ = ["meaning", "number", "plain", "title"]

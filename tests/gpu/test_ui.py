@@ -254,6 +254,7 @@ def test_one_walks_through_a_large_world(
 
 def test_an_error_becomes_a_toast(gpu: Gpu, where: dict[str, tuple[float, float]]) -> None:
     desk = Desk(gpu, FakeSession(), (1920, 1080))
+    desk.session.options = ShootingOptions(form_factor="disc")
 
     def refuse(options: ShootingOptions) -> None:
         raise UserError("--discs 4: no such discs here")

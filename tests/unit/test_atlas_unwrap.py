@@ -154,7 +154,7 @@ def test_cancelling_ends_the_worker(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subprocess, "Popen", sleeper)
 
     def cancel(stage: str, share: float) -> None:
-        if stage == "unwrap":
+        if stage == "unfolding curved pieces":
             raise KeyboardInterrupt
 
     begin = time.monotonic()

@@ -17,6 +17,10 @@ class GatheringOptions(Options):
         minimum=1e-5,
         maximum=1,
         logarithmic=True,
+        label="Noise at most",
+        tip="The solve has converged once the noise of the light, over its mean, is no more than this. Half of it "
+        "takes four times the rays",
+        term="standard error",
     )
     ray_memory: int = option(
         1024,
@@ -25,5 +29,13 @@ class GatheringOptions(Options):
         minimum=0,
         maximum=65_536,
         logarithmic=True,
+        tip="Memory for what rays have hit, 4 bytes each. What is kept makes bounces and edits of light nearly free; "
+        "rays beyond it are traced again in each bounce",
+        term="visibility cache",
     )
-    smooth: bool = option(True, "smooth indirect light within charts, by as much as it is noisy")
+    smooth: bool = option(
+        True,
+        "smooth indirect light within charts, by as much as it is noisy",
+        tip="Smooths indirect light in the picture, by no more than it is noisy. It costs little; off, the light is "
+        "as it was gathered",
+    )

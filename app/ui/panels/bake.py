@@ -70,8 +70,7 @@ def _light(view: View, state: State) -> None:
     widgets.section(session.family.title)
     atlas = session.atlas if state.atlas is None else state.atlas
     starts = {"density": float(session.charts.density), "texels": stats.texels}
-    off = {} if atlas.density is None else {"texels": "Density says how many there are"}
-    state.atlas = widgets.edit_options(atlas, only=CUT, starts=starts, off=off)
+    state.atlas = widgets.edit_options(atlas, only=CUT, starts=starts)
     options = widgets.edit_options(session.options, only=(session.family.threshold,))
     if options is not session.options:
         state.act(lambda: session.set_options(options))

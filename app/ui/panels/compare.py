@@ -130,7 +130,7 @@ def _reference(view: View, state: State) -> None:
     width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
     if imgui.button(f"{ICONS.ICON_FA_FOLDER_OPEN} Open a bake ...", imgui.ImVec2(width, 0)):
         state.ask_for_reference = True
-    widgets.tooltip("What 'glowtree bake' wrote of this scene; the irradiance.exr can be dropped on the window, too")
+    widgets.tooltip("A bake of this scene, its irradiance.exr, which can be dropped on the window, too")
     imgui.same_line()
     imgui.begin_disabled(comparison is None)
     if imgui.button("Forget", imgui.ImVec2(width, 0)):

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 CUT = ("texels", "density", "tile")  # in the order that a newcomer needs them
 FIRST = ("depth", "gradient")  # of a quadtree's options: always in sight
 MORE = ("criterion", "shadow", "budget", "storage")
-UNIFORM = "texels are uniform; Adaptive turns quadtrees on"
 
 
 def draw(view: View, state: State) -> None:
@@ -26,10 +25,9 @@ def draw(view: View, state: State) -> None:
     light = session.light
     if light.adaptive:
         _leaves(state)
-    off = _off(view)
-    light = widgets.edit_options(light, only=FIRST, off=off)
+    light = widgets.edit_options(light, only=FIRST)
     if imgui.tree_node("More###more detail"):
-        light = widgets.edit_options(light, only=MORE, off=off)
+        light = widgets.edit_options(light, only=MORE)
         imgui.tree_pop()
     if light is not session.light:
         state.act(lambda: session.set_light(light))
@@ -42,8 +40,7 @@ def _cut(view: View, state: State) -> None:
     atlas = session.atlas if state.atlas is None else state.atlas
     light = session.light if state.adaptive is None else session.light.replace(adaptive=state.adaptive)
     starts = {"density": float(session.charts.density), "texels": stats.texels}
-    off = {} if atlas.density is None else {"texels": "Density says how many there are"}
-    state.atlas = atlas = widgets.edit_options(atlas, only=CUT, starts=starts, off=off)
+    state.atlas = atlas = widgets.edit_options(atlas, only=CUT, starts=starts)
     light = widgets.edit_options(light, only=("adaptive",))
     state.adaptive = light.adaptive
     same, busy = (atlas, light) == (session.atlas, session.light), session.loading is not None
@@ -70,12 +67,3 @@ def _leaves(state: State) -> None:
     widgets.tooltip(f"Of the {stats.uniform_texels:,} texels that the finest level everywhere would take")
     if stats.refining:
         widgets.dim("leaves are changing")
-
-
-def _off(view: View) -> dict[str, str]:
-    """Options of quadtrees that have no effect now, and why."""
-    light = view.session.light
-    if not light.adaptive:
-        return dict.fromkeys((*FIRST, "criterion", "shadow", "budget"), UNIFORM)
-    other = {"gradient": "shadow", "shadow": "gradient"}[light.criterion]
-    return {other: f"leaves split by {light.criterion}, see Criterion"}

@@ -1,0 +1,134 @@
+"""Words of the window: tooltips, messages, and controls that have no effect now."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from desks import Desk, desk, session, where
+
+from app.atlas.options import AtlasOptions
+from app.compare.options import ReferenceOptions
+from app.lightmap.options import LightmapOptions
+from app.options import Options, specs
+from app.render.options import DisplayOptions
+from app.solvers import SOLVERS, ShootingOptions
+from app.solvers.pairs.options import PairsOptions
+from app.ui import widgets
+from app.ui.panels.display import COMPARED
+from app.ui.state import Pace
+from app.ui.words import meaning, number, plain
+
+__all__ = ["desk", "session", "where"]
+
+SHOWN = (AtlasOptions, LightmapOptions, DisplayOptions, ReferenceOptions, *(f.options for f in SOLVERS.values()))
+MACHINE = re.compile(r"--|\\d e[+-]?\\d|e[+-]\\d|true or false|whole number|unset")
+
+
+@pytest.mark.parametrize("options", [*SHOWN, Pace], ids=lambda o: o.__name__)
+def test_tooltips_are_for_people(options: type[Options]) -> None:
+    for spec in specs(options):
+        for text in (meaning(spec), spec.title):
+            assert not MACHINE.search(text), f"{spec.name}: {text}"
+        assert meaning(spec).startswith(meaning(spec)[0].upper()) and "efault" in meaning(spec)
+        if options is not Pace and spec.name not in COMPARED:
+            assert len(spec.tip.split()) >= 8, f"{spec.name}: what it does, and what it costs"
+            assert not spec.tip.endswith(".") and spec.tip != spec.help
+    assert len({spec.title for spec in specs(options)}) == len(specs(options))
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1e-5, "0.00001"), (16_000_000, "16,000,000"), (0.5, "0.5"), (-24.0, "\N{MINUS SIGN}24"), (2, "2")],
+)
+def test_numbers_have_no_exponent(value: float, text: str) -> None:
+    assert number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("message", "said"),
+    [
+        ("--keep-pairs with --senders stride", "Keep pairs with Senders stride"),
+        (
+            "smaller ones (--density, --level) or --solver gathering would do",
+            "smaller ones (Density, Patch level) or Gathering would do",
+        ),
+        ("--residual 0: must be more", "Unshot at most 0: must be more"),
+        ("--sky adds a sky", "Sky in the Lights panel adds a sky"),
+        ("a-b, c--d and -- stay", "a-b, c--d and -- stay"),
+    ],
+)
+def test_messages_name_controls_and_no_flags(message: str, said: str) -> None:
+    assert plain(message) == said
+
+
+EFFECTS = (
+    (ShootingOptions(), {"discs"}),
+    (ShootingOptions(form_factor="disc"), set()),
+    (AtlasOptions(density=3.0), {"texels"}),
+    (AtlasOptions(texels=300), set()),
+    (LightmapOptions(), {"depth", "criterion", "gradient", "shadow", "budget"}),
+    (LightmapOptions(adaptive=True), {"shadow"}),
+    (LightmapOptions(adaptive=True, criterion="shadow"), {"gradient"}),
+    (PairsOptions(senders="all"), {"window", "voxels", "directions", "merge"}),
+    (PairsOptions(senders="directional"), {"window", "voxels", "merge", "keep_pairs"}),
+    (PairsOptions(senders="quadtree", occlusion="voxels"), {"directions", "keep_pairs"}),
+)
+
+
+@pytest.mark.parametrize(
+    ("options", "without"), EFFECTS, ids=lambda v: type(v).__name__ if isinstance(v, Options) else ""
+)
+def test_what_has_no_effect_says_why(options: Options, without: set[str]) -> None:
+    reasons = {spec.name: spec.off(options) for spec in specs(type(options)) if spec.off is not None}
+    assert {name for name, reason in reasons.items() if reason} == without
+    for spec in specs(type(options)):
+        reason = reasons.get(spec.name)
+        assert reason is None or f"No effect now: {reason}." in meaning(spec, reason)
+
+
+def test_a_grey_control_does_nothing_and_tells(
+    desk: Desk, where: dict[str, tuple[float, float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    real = widgets.tooltip
+    monkeypatch.setattr(widgets, "tooltip", lambda text: told.append(text) or real(text))
+    desk.frames()
+    x, y = where["gradient"]
+    desk.drag((x, y), (x + 40, y))
+    desk.click(x, y, button=1)
+    assert not any(call[0] == "set_light" for call in desk.session.calls)
+    assert any("No effect now: texels are uniform" in text for text in told)
+    desk.session.light = desk.session.light.replace(adaptive=True)
+    desk.frames(2)
+    x, y = where["gradient"]
+    desk.drag((x, y), (x + 40, y))
+    assert any(call[0] == "set_light" for call in desk.session.calls)
+
+
+@pytest.mark.parametrize(
+    ("display", "grey"),
+    [
+        ({}, set()),
+        ({"false_colour": "luminance", "false_colour_max": 9.0, "false_colour_log": False}, set()),
+        ({"layer": "albedo"}, {"exposure", "tone_map"}),
+        ({"layer": "error"}, {"false_colour"}),
+    ],
+    ids=str,
+)
+def test_the_display_shows_what_has_an_effect(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch, display: dict[str, object], grey: set[str]
+) -> None:
+    found: dict[str, str] = {}
+    real = widgets.edit_options
+
+    def noting(options: Options, **more: object) -> Options:
+        if isinstance(options, DisplayOptions):
+            found.update(more["off"])  # type: ignore[call-overload]
+        return real(options, **more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(widgets, "edit_options", noting)
+    desk.session.compare()
+    desk.session.display = DisplayOptions(**display)  # type: ignore[arg-type]
+    desk.frames()
+    assert found.keys() == grey and all(found.values())
