@@ -22,7 +22,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from app.atlas.sides import FLAT, FLAT_ANGLE, distinct_rows, facets, scene_size, weld
+from app.atlas.sides import FLAT, FLAT_ANGLE, distinct_rows, facets, least, middle, most, scene_size, weld
 from app.scene.model import F64, I32, Scene
 
 GAP = 0.05  # of a texel: what is no farther from a surface lies on it
@@ -95,8 +95,8 @@ class _Facets:
             _Members(order, np.append(first, len(order))),
             normals[order[first]],
             corners[order[first], 0],
-            np.minimum.reduceat(corners[order].min(1), first),
-            np.maximum.reduceat(corners[order].max(1), first),
+            np.minimum.reduceat(least(corners)[order], first),
+            np.maximum.reduceat(most(corners)[order], first),
             _depths(corners, triangles, facet, normals, flat),
             count,
         )
@@ -256,7 +256,7 @@ def _on_faces(pieces: F64, faces: F64, uv: F64) -> F64:
 def _depths(corners: F64, triangles: I32, facet: I32, normals: F64, flat: float) -> F64:
     """(facets,) how far a body reaches behind each facet that ends one, next to it: triangles that meet it in an edge are all
     behind and face away. 0 where it ends none."""
-    count, centre = len(triangles), corners.mean(1)
+    count, centre = len(triangles), middle(corners)
     has = coo_array((np.ones(3 * count, bool), (np.repeat(np.arange(count), 3), _edges(triangles)[0]))).tocsr()
     of_edge = has.T.tocsr()
     deep = np.zeros(int(facet.max(initial=-1)) + 1)

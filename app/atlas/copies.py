@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.sides import SPREAD, distinct_rows, groups_of, totals
+from app.atlas.sides import SPREAD, distinct_rows, groups_of, middle, totals
 from app.scene.model import F64, I32
 
 LEAST = 32  # triangles of a surface that is looked for: fewer cost no time to unfold
@@ -88,8 +88,8 @@ def _sizes(corners: F64, first: I64, count: I64) -> I64:
     """(s,) the area of each surface over the square of its extent, roughly: surfaces that seem alike may differ there."""
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     surface = np.repeat(np.arange(len(count)), count)
-    middle = totals(surface, corners.mean(1), len(count)) / count[:, None]
-    spread = totals(surface, ((corners - middle[surface][:, None]) ** 2).sum((1, 2)), len(count)) / count
+    centre = totals(surface, middle(corners), len(count)) / count[:, None]
+    spread = totals(surface, ((corners - centre[surface][:, None]) ** 2).sum((1, 2)), len(count)) / count
     least = np.finfo(float).tiny
     ratio = totals(surface, doubled, len(count)) / np.maximum(spread, least)
     return np.asarray(np.round(64 * np.log2(np.maximum(ratio, least))), np.int64)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from app.atlas.sides import FLAT, FLAT_ANGLE
+from app.atlas.sides import FLAT, FLAT_ANGLE, least, most
 from app.scene.model import F64, I32
 
 NEAR = 4 * FLAT  # what is no farther apart is in one place
@@ -60,7 +60,7 @@ def contacts(corners: F64, surface: I64) -> tuple[Contacts, bool]:
     normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
     found = [Contacts(np.empty(0, np.int64), np.empty((0, 2, 3)), np.empty(0, bool), np.empty(0, bool))]
     pairs = 0
-    for one, other in _pairs_that_meet(corners.min(1) - FLAT, corners.max(1) + FLAT, surface):
+    for one, other in _pairs_that_meet(least(corners) - FLAT, most(corners) + FLAT, surface):
         pairs += len(one)
         if pairs > MOST_PAIRS:
             return found[0], True

@@ -22,7 +22,7 @@ from app.atlas.cuts import GOES_ON
 from app.atlas.packing import MAX_SIDE, outlines, pack
 from app.atlas.rectangles import Rectangles, find_rectangles
 from app.atlas.seams import find_seams
-from app.atlas.sides import Sides, distinct_rows, facets, lit_sides, scene_size, totals, weld
+from app.atlas.sides import Sides, distinct_rows, facets, least, lit_sides, most, scene_size, totals, weld
 from app.atlas.unwrap import unwrap
 from app.errors import UserError
 from app.scene.model import F64, I32, Scene
@@ -225,8 +225,8 @@ def _parted(
     parted = np.isin(of[:count], chart[some])
     low[parted], high[parted] = np.inf, -np.inf
     mine = some[pieces[some] < count]
-    np.minimum.at(low, pieces[mine], uv[mine].min(axis=1))
-    np.maximum.at(high, pieces[mine], uv[mine].max(axis=1))
+    np.minimum.at(low, pieces[mine], least(uv[mine]))
+    np.maximum.at(high, pieces[mine], most(uv[mine]))
     moved = uv.copy()
     moved[mine] -= low[pieces[mine]][:, None]
     return pieces, moved, high - low
@@ -245,8 +245,8 @@ def _measured(chart: I32, uv: F64, rectangle_size: F64, lit: Sides) -> Layout:
     count = int(chart.max()) + 1
     owner, local = chart[used], uv[used]
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
-    np.minimum.at(low, owner, local.min(axis=1))
-    np.maximum.at(high, owner, local.max(axis=1))
+    np.minimum.at(low, owner, least(local))
+    np.maximum.at(high, owner, most(local))
     rectangles = len(rectangle_size)
     low[:rectangles], high[:rectangles] = 0.0, rectangle_size
     local = local - low[owner][:, None]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.sides import distinct_rows, totals
+from app.atlas.sides import distinct_rows, least, most, totals
 from app.scene.model import F64, I32
 
 SAME = 1e-4  # relative: area against the bounding rectangle's; width against height of a square
@@ -106,8 +106,8 @@ def _extents(
     across = np.einsum("mck,mk->mc", p, np.cross(normal[at], axes[at]))
     low, high = np.full((len(wanted), 2), np.inf), np.full((len(wanted), 2), -np.inf)
     for k, s in enumerate((along, across)):
-        np.minimum.at(low[:, k], slot[at], s.min(axis=1))
-        np.maximum.at(high[:, k], slot[at], s.max(axis=1))
+        np.minimum.at(low[:, k], slot[at], least(s))
+        np.maximum.at(high[:, k], slot[at], most(s))
     return low, high
 
 

@@ -10,6 +10,7 @@ file order or diagonal they came with.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,6 +39,21 @@ class Sides:
     triangle: I32
     back: NDArray[np.bool_]
     dark: int
+
+
+def least(corners: F64) -> F64:
+    """The least of three, of triangles (n, 3, k) the lower corners (n, k) of their boxes; many times faster than min(1)."""
+    return np.minimum(np.minimum(corners[:, 0], corners[:, 1]), corners[:, 2])
+
+
+def most(corners: F64) -> F64:
+    """The most of three, as ``least``."""
+    return np.maximum(np.maximum(corners[:, 0], corners[:, 1]), corners[:, 2])
+
+
+def middle(corners: F64) -> F64:
+    """The mean of three, of triangles (n, 3, k) their centroids (n, k)."""
+    return np.asarray((corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3)
 
 
 def scene_size(scene: Scene) -> float:
@@ -93,6 +109,7 @@ def distinct_rows(*columns: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np
 
     columns (n,) each; many times faster than np.unique(axis=0).
     """
+    columns = _packed(columns)
     order = np.lexsort(columns[::-1])
     fresh = np.zeros(len(order), bool)
     fresh[:1] = True
@@ -104,6 +121,21 @@ def distinct_rows(*columns: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np
     return order[fresh], kind, np.diff(np.append(np.flatnonzero(fresh), len(order)))
 
 
+def _packed(columns: tuple[NDArray[Any], ...]) -> tuple[NDArray[Any], ...]:
+    """Columns of whole numbers in one of the same order, that is sorted once, where that holds them."""
+    if not len(columns[0]) or any(column.dtype.kind not in "biu" for column in columns):
+        return columns
+    least = [int(column.min()) for column in columns]
+    spans = [int(column.max()) - low + 1 for column, low in zip(columns, least, strict=True)]
+    if math.prod(spans) >= 1 << 63:
+        return columns
+    key = np.zeros(len(columns[0]), np.int64)
+    for column, low, span in zip(columns, least, spans, strict=True):
+        key *= span
+        key += column.astype(np.int64) - low
+    return (key,)
+
+
 def totals(label: NDArray[np.integer], values: F64, count: int) -> F64:
     """Sums of values (n,) or (n, k) over each label in [0, count): (count,) or (count, k)."""
     if values.ndim == 1:
@@ -113,14 +145,16 @@ def totals(label: NDArray[np.integer], values: F64, count: int) -> F64:
 
 def weld(scene: Scene) -> tuple[F64, I32]:
     """Join vertices that coincide: points (n, 3) [m] and the corner indices (m, 3) of the triangles into them."""
-    corners = scene.positions[scene.triangles.reshape(-1)]
-    index, inverse, _ = distinct_rows(*corners.T)
-    points = corners[index]
+    used = np.zeros(len(scene.positions), bool)
+    used[scene.triangles] = True
+    vertices = scene.positions[used]
+    index, kind, _ = distinct_rows(*vertices.T)
+    points = vertices[index]
     pairs = cKDTree(points).query_pairs(WELD * scene_size(scene), output_type="ndarray")
     count, label = groups_of(len(points), pairs)
     first = np.zeros(count, np.int64)
     first[label[::-1]] = np.arange(len(points))[::-1]
-    return points[first], label[inverse.reshape(-1, 3)].astype(np.int32)
+    return points[first], label[kind[np.cumsum(used)[scene.triangles] - 1]].astype(np.int32)
 
 
 def facets(points: F64, triangles: I32, materials: I32, size: float) -> I32:
@@ -139,7 +173,7 @@ def facets(points: F64, triangles: I32, materials: I32, size: float) -> I32:
     # plane of each piece, and how far the piece strays from it
     mean = totals(label, normals * doubled[:, None], count)
     mean /= np.maximum(np.linalg.norm(mean, axis=1), np.finfo(float).tiny)[:, None]
-    centre = totals(label, corners.mean(axis=1), count) / np.bincount(label, minlength=count)[:, None]
+    centre = totals(label, middle(corners), count) / np.bincount(label, minlength=count)[:, None]
     stray = np.abs(np.einsum("mck,mk->mc", corners - centre[label][:, None], mean[label])).max(axis=1)
     bent = np.zeros(count, bool)
     bent[label[stray > 4 * FLAT]] = True  # an honest plane strays by FLAT from its neighbour, a few from the mean

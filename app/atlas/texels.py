@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
 from app.atlas.contacts import inside_triangles
+from app.atlas.sides import least, most
 from app.atlas.unit_square import SLIVER, area_and_centroid, edge_distances
 from app.scene.model import F32, F64, I32, Scene
 from app.util.ahead import ahead
@@ -298,8 +299,8 @@ def _cells_of_few(uv: F64, leaves: Leaves, mine: I64) -> _Windows | None:
 
 def _bounds(uv: F64) -> tuple[I64, I64]:
     """(f, 2) each: the first cell of each triangle's box, and the one beyond the last."""
-    low = np.floor(uv.min(axis=1)).astype(np.int64)
-    return low, np.maximum(np.ceil(uv.max(axis=1)).astype(np.int64), low + 1)
+    low = np.floor(least(uv)).astype(np.int64)
+    return low, np.maximum(np.ceil(most(uv)).astype(np.int64), low + 1)
 
 
 def _fragments(uv: F64, windows: _Windows | None = None) -> Iterator[_Fragments]:

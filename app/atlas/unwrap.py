@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.copies import find_surfaces
-from app.atlas.sides import distinct_rows, totals
+from app.atlas.sides import distinct_rows, middle, totals
 from app.scene.model import F64, I32
 from app.util import cache
 
@@ -158,10 +158,10 @@ def _meshes(corners: F64, groups: I32, surface: NDArray[np.int64]) -> tuple[I32,
         return mesh, np.ones(int(mesh.max()) + 1, np.float32), 0.0
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     most_area = max(float(area.sum() - area[large].sum()), 1.0)
-    pieces = []
+    pieces, centre = [], middle(corners)
     for rows in np.split(large[np.argsort(surface[large], kind="stable")], np.cumsum(np.bincount(surface[large]))[:-1]):
         if len(rows):
-            pieces += _pieces(corners.mean(axis=1), rows)
+            pieces += _pieces(centre, rows)
     number = int(mesh.max()) + 1
     for k, rows in enumerate(pieces):
         mesh[rows] = number + k

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
+from app.atlas.sides import least, middle, most
 from app.scene.model import F64, Scene
 
 Array = NDArray[np.generic]
@@ -83,14 +84,14 @@ def visible_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
     points = local[scene.triangles]
     fixed = _overlaps_in_plane(points)
     cluster = np.empty(count, np.int64)
-    for mine, order in ((fixed, np.arange(fixed.sum())), (~fixed, _morton_order(points[~fixed].mean(1)))):
+    for mine, order in ((fixed, np.arange(fixed.sum())), (~fixed, _morton_order(middle(points[~fixed])))):
         cluster[np.flatnonzero(mine)[order]] = np.arange(len(order)) // CLUSTER
     order = np.lexsort((cluster, ~fixed))  # stable: within a cluster in the scene's order
     of, is_fixed = cluster[order], fixed[order]
     first = np.flatnonzero(np.r_[True, (of[1:] != of[:-1]) | (is_fixed[1:] != is_fixed[:-1])])
     clusters = Clusters(
-        lower=np.minimum.reduceat(points.min(1)[order], first),
-        upper=np.maximum.reduceat(points.max(1)[order], first),
+        lower=np.minimum.reduceat(least(points)[order], first),
+        upper=np.maximum.reduceat(most(points)[order], first),
         first=np.r_[first, count],
         fixed=int(is_fixed[first].sum()),
     )
@@ -143,10 +144,10 @@ def _overlaps_in_plane(points: F64) -> Mask:
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     steep = (np.abs(normal) > 0.5).argmax(1)  # an axis that the plane is not parallel to: a unit vector has such
     normal *= np.sign(normal[row, steep])[:, None]  # either winding
-    plane = np.concatenate([normal, (normal * points.mean(1)).sum(1, keepdims=True)], 1)
+    plane = np.concatenate([normal, (normal * middle(points)).sum(1, keepdims=True)], 1)
     across = (steep[:, None] + [1, 2]) % 3
     flat = np.take_along_axis(points, across[:, None], 2)  # (n, 3, 2), seen along that axis
-    (u0, v0), (u1, v1) = (flat.min(1) + TOUCHING).T, (flat.max(1) - TOUCHING).T
+    (u0, v0), (u1, v1) = (least(flat) + TOUCHING).T, (most(flat) - TOUCHING).T
     for shift in (0.0, 0.5):  # or rounding would part equal planes
         of = np.zeros(count, np.uint64)
         for cell in np.floor(plane / SAME_PLANE + shift).T:

@@ -134,7 +134,7 @@ class Scene:
         length = np.linalg.norm(cross, axis=1)
         return cross / length[:, None], length / 2
 
-    @property
+    @functools.cached_property
     def bounds(self) -> tuple[F64, F64]:
         """Lower and upper corner of the box around all triangles [m]."""
         used = self.corners.reshape(-1, 3)
