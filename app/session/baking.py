@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from app.atlas.options import AtlasOptions
-from app.bake import prepare_directory
+from app.bake import check_options, prepare_directory
 from app.bake.options import BakeOptions
 from app.errors import UserError
 from app.options import Options, option
@@ -86,6 +86,7 @@ class Baking:
         why = why_not(session)
         if why is not None:
             raise UserError(why)
+        check_options(order.files)
         prepare_directory(order.folder)
         path = order.folder / CHECKPOINT_NAME
         self._checkpoint = Checkpoint(session, path, order.keep.checkpoint, self._say, aside=True)

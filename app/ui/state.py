@@ -175,6 +175,10 @@ class State:
     actions: list[Callable[[], object]] = field(default_factory=list)
     _known: tuple[object, object] = (None, None)
 
+    def is_fast(self, seconds: float) -> bool:
+        """Whether as much is solved as there is time for, after so many seconds of solving; a bake is not watched."""
+        return self.pace.is_fast(seconds) or (self.baking is not None and self.baking.active)
+
     def act(self, action: Callable[[], object]) -> None:
         """Do this once the frame is built: what it raises cannot leave a window half drawn."""
         self.actions.append(action)

@@ -245,7 +245,7 @@ class ViewerWindow(WindowConfig):
             session.poll(interactive=self._ui.held)
             self._view.tell_observer()
             self._view.look_for_light()
-            held, fast = self._ui.held, session.opened and state.pace.is_fast(session.run.seconds)
+            held, fast = self._ui.held, session.opened and state.is_fast(session.run.seconds)
             solve, look = self._turns.next(frame_time) if session.solving and (held or not fast) else (True, True)
             if solve:
                 session.advance(fast=fast, interactive=held)

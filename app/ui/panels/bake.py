@@ -57,6 +57,13 @@ def follow(state: State, baking: Baking) -> None:
         state.notify(f"no bake: {baking.note}", error=True)
 
 
+def roughly(seconds: float) -> str:
+    """In one unit: what is foreseen is not known to the second."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
+
+
 def first_folder(view: View) -> Path:
     """Beside whoever started the program, named after the scene."""
     name = "".join(c if c.isalnum() or c in "-_. " else "-" for c in view.session.name).strip() or "scene"
@@ -108,7 +115,7 @@ def _estimate(view: View, state: State) -> None:
         left = seconds_left(session.family, threshold(view), stats, session.run.history)
         if left is not None and times != 1:
             left = (left + stats.seconds) * times
-        rows.append(("Time", "not known yet" if left is None else f"about {widgets.duration(left)}"))
+        rows.append(("Time", "not known yet" if left is None else f"about {roughly(left)}"))
     widgets.facts("estimate", rows)
     widgets.tooltip("Estimates: of texels as the surfaces' area has it, of time from the solve so far")
 
@@ -120,7 +127,7 @@ def _begin(view: View, state: State) -> None:
     why = "a scene is loading" if session.on_its_way is not None else why_not(session)
     kept = order.folder / CHECKPOINT_NAME
     if kept.exists():
-        ago = widgets.duration(max(time.time() - kept.stat().st_mtime, 0.0)) if state.measured else "a while"
+        ago = roughly(max(time.time() - kept.stat().st_mtime, 0.0)) if state.measured else "a while"
         widgets.wrapped(f"A bake into this folder was not finished; kept {ago} ago.", theme.AMBER)
         imgui.begin_disabled(why is not None)
         if imgui.button(f"{ICONS.ICON_FA_PLAY} Go on###go on", imgui.ImVec2(-1, 0)):
@@ -157,7 +164,7 @@ def _under_way(view: View, state: State, baking: Baking) -> None:
     rows = [(words.title(stats.remains), remains)]
     if state.measured and baking.stage == SOLVING:
         left = seconds_left(session.family, threshold(view), stats, session.run.history)
-        rows.append(("Time left", "not known yet" if left is None else f"about {widgets.duration(left)}"))
+        rows.append(("Time left", "not known yet" if left is None else f"about {roughly(left)}"))
     widgets.facts("baking", rows)
     if baking.stage == SOLVING and not session.run.running:
         widgets.wrapped("Solving is paused: Space", theme.AMBER)
