@@ -22,7 +22,9 @@ class BakeOptions(Options):
         False, "write index.html, too: a page that shows the bake without a network (needs the npm package three)"
     )
     three: str | None = option(
-        None, "folder of the npm package three; unset: node_modules/three, here or in a folder above"
+        None,
+        "folder of the npm package three; unset: node_modules/three, here or in a folder above",
+        tip="Folder of the npm package three, which the page is made with",
     )
     moz_lightmap: bool = option(
         False, "name the lightmap in scene.glb by MOZ_lightmap, too, which readers that parse all images may refuse"

@@ -103,7 +103,7 @@ def _optional(spec: Spec, value: Any, start: Any) -> Any:
     if value is not None or start is not None:
         imgui.same_line()
     if value is None and start is not None:
-        dim(f"{shown(start)} {spec.unit}")
+        dim(f"{number(start, 4) if spec.type is float else f'{start:,}'} {spec.unit}")
     return value
 
 
