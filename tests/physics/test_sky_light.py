@@ -202,6 +202,18 @@ def test_what_is_unshot_is_one_number_while_the_sky_shoots(gpu: Gpu) -> None:
     lit.release()
 
 
+def test_no_more_than_all_is_unshot_after_an_edit_of_the_sky(gpu: Gpu) -> None:
+    """What another sun takes back is to be shot, and what it gives."""
+    scene = quads_scene([FLOOR, WALL], [grey(0.5, double_sided=True)]).with_sky(Sky("clear", sun=Sun(60, 30)))
+    lit = solved(gpu, scene, "shooting")
+    lit.solver.set_sky(Sky("clear", sun=Sun(120, 40)))
+    assert lit.solver.poll().remaining == 1.0
+    for _ in range(3):
+        lit.step(8)
+        assert 0 < lit.solver.poll(wait=True).remaining <= 1.0
+    lit.release()
+
+
 def test_what_cannot_follow_a_sky_says_so(gpu: Gpu) -> None:
     scene = quads_scene([FLOOR], [grey(0.5)]).with_sky(Sky())
     with pytest.raises(UserError, match="pairs"):

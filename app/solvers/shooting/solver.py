@@ -185,7 +185,8 @@ class Shooting:
             if finer:
                 batch.shoot_finer()
         self._strongest = float(values["strongest"]) * ledger.watt
-        self._progress = Progress(int(values["shots"]), unshot, values["escaped"].astype(np.float64) * ledger.watt)
+        remaining = min(unshot, 1.0) if outside.left else unshot  # an edit takes back light, and gives as much
+        self._progress = Progress(int(values["shots"]), remaining, values["escaped"].astype(np.float64) * ledger.watt)
         if choice is None:
             return
         if sizes_of(report.shooter):
@@ -196,7 +197,8 @@ class Shooting:
     def _unshot_share(self) -> float:
         """What is unshot now, as a share of the emitted power. Waits for the GPU."""
         self._under_way.finish()
-        return self.batch.ledger.share(self.batch.unshot())
+        unshot = self.batch.ledger.share(self.batch.unshot())
+        return min(unshot, 1.0) if self.batch.outside.left else unshot
 
     @property
     def _all_shot(self) -> bool:
