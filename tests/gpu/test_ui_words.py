@@ -114,7 +114,7 @@ def test_a_grey_control_does_nothing_and_tells(
         ({"layer": "albedo"}, {"exposure", "tone_map"}),
         ({"layer": "error"}, {"false_colour"}),
     ],
-    ids=str,
+    ids=["combined", "false colour", "albedo", "error"],
 )
 def test_the_display_shows_what_has_an_effect(
     desk: Desk, monkeypatch: pytest.MonkeyPatch, display: dict[str, object], grey: set[str]
