@@ -2,6 +2,10 @@
 
 A bilinear look-up inside a covered texel reads its eight neighbours. Charts lie ``atlas.charts.GAP`` = 2 texels apart,
 so such a neighbour is at most √2 from its own chart and at least 2 from any other: the nearest texel is its own.
+
+That is at full size. A texel of mip level 1 is the mean of four, and its neighbours reach three texels beyond a chart: there
+charts bleed into each other, and more so in every further level, so that a lightmap is for use without mip-maps. How much,
+tests/unit/test_bleeding.py measures.
 """
 
 from __future__ import annotations
@@ -11,7 +15,7 @@ from numpy.typing import NDArray
 
 from app.scene.model import F32
 
-GUTTER = 4  # texels; one is needed at full size, 2^k for bilinear look-ups in mip level k: good down to level 2
+GUTTER = 4  # texels; one is needed at full size, others lessen what mip levels take from where there is nothing
 
 
 def fill_gutter(values: F32, covered: NDArray[np.bool_]) -> F32:
