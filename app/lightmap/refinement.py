@@ -31,6 +31,9 @@ MERGE = 1 / 8
 MERGE_AFTER = 4  # times as much work as when it was split, a leaf may merge
 
 
+HELD = "leaves stay as they are: another depth or gradient lets them change again"
+
+
 class LeafFollower(Protocol):
     """What follows the leaves of a lightmap: whatever a solver keeps for each of them."""
 
@@ -44,6 +47,9 @@ class LeafFollower(Protocol):
     def leaves_changed(self, change: Change) -> None:
         """Leaves have split, or merged."""
 
+    def give_up(self) -> None:
+        """New leaves keep the light that they have from those before them."""
+
     def slots_will_move(self) -> None:
         """Leaves are about to change their slots: what names them by slot must be read now."""
 
@@ -55,7 +61,8 @@ class Refinement:
     """The quadtrees of one lightmap. Whoever makes it releases it.
 
     options: obeyed from the next look on. stable: whether the last look found nothing to do; looked_at: the clock then. waiting:
-    whether a judgement is on its way, which the next look will act on. note: what the user should know, if anything.
+    whether a judgement is on its way, which the next look will act on. wanted: leaves that the last judgement would split. held:
+    whether leaves stay as they are, whatever is judged. note: what the user should know, if anything.
     """
 
     def __init__(self, light: LightTextures, options: LightmapOptions) -> None:
@@ -63,6 +70,7 @@ class Refinement:
         self.tree = Quadtree(light.pool)
         self.follower: LeafFollower | None = None
         self.stable, self.looked_at = False, 0
+        self.wanted, self.held = 0, False
         self.note: str | None = None
         self._transfer = LightTransfer(light.gpu, light)
         self._judge = Pass(light.gpu, "lightmap/judge", defines=light.defines("TILE"))
@@ -84,6 +92,7 @@ class Refinement:
         changed = any(getattr(options, name) != getattr(self.options, name) for name in QUADTREE)
         self.options = options
         if changed:
+            self._let_go()
             self._split_at.clear()
             if self.follower is not None:
                 self.follower.options_changed()
@@ -92,7 +101,19 @@ class Refinement:
         """Forget what is known of the leaves: the light is another. They stay; those that are not needed merge."""
         self.drop_judgement()
         self.stable = False
+        self._let_go()
         self._split_at.clear()
+
+    def hold(self) -> None:
+        """Leave the leaves as they are, until other ones are asked for or the light is another. Asked for again, new ones keep
+        the light that they have."""
+        if self.held and self.follower is not None:
+            self.follower.give_up()
+        self.held, self.wanted, self.note = True, 0, HELD
+
+    def _let_go(self) -> None:
+        if self.held:
+            self.held, self.note = False, None
 
     def drop_judgement(self) -> None:
         """Forget the judgement that is on its way: it is of other light."""
@@ -143,6 +164,10 @@ class Refinement:
     def look(self, most: int, bands: int, clock: int) -> Iterator[None]:
         """Judge all leaves, in parts; at the next look act on the judgement, which has arrived, on so many of them at most. One
         look does one of both: a frame has time for either."""
+        if self.held:
+            self.drop_judgement()
+            self.stable, self.looked_at = True, clock
+            return
         if self._judged is None:
             for band in range(bands):
                 self.judge(band, bands)
@@ -179,14 +204,16 @@ class Refinement:
         level = pool.leaves.level
         rough, smooth = self._opinion(judged)
         grows = np.flatnonzero(pool.used & (level < options.depth) & rough)
+        self.wanted = len(grows)
         grows = grows[np.argsort(-judged[grows, 0])][:most]
         self.note = None
         splits = self.tree.splits(grows.tolist(), options.depth)[:most]
         self._make_room(4 * len(splits))
-        within_budget = max(options.budget // pool.tile**2 - len(self.tree), 0) // 3  # four leaves for one
-        if len(splits) > min(self.tree.room // 4, within_budget):
-            self.note = f"leaves stop growing: the budget of {options.budget:,} texels is reached"
-            splits = splits[: min(self.tree.room // 4, within_budget)]
+        most_leaves, reason = self._bound
+        fit = min(self.tree.room // 4, max(most_leaves - len(self.tree), 0) // 3)  # four leaves for one
+        if len(splits) > fit:
+            self.wanted, self.note = 0, f"leaves stop growing: {reason}"
+            splits = splits[:fit]
         if splits:
             self._split_at |= {self.tree.tile(slot): clock for slot in splits}
             self._apply(self.tree.split(splits))
@@ -229,11 +256,19 @@ class Refinement:
         pool = self._light.pool
         if self.tree.room >= slots:
             return
-        longest = self._gpu.limits.max_texture // (pool.tile + 4)  # slots in a column of display texels and borders
-        most = min(self.options.budget // pool.tile**2, pool.columns * longest)
-        wanted = min(max(pool.tiles * 3 // 2, pool.tiles + slots), most)
+        wanted = min(max(pool.tiles * 3 // 2, pool.tiles + slots), self._bound[0])
         if wanted > pool.tiles:
             self._resize(wanted)
+
+    @property
+    def _bound(self) -> tuple[int, str]:
+        """How many leaves there may be, and why no more."""
+        pool, texels = self._light.pool, self.options.budget
+        longest = self._gpu.limits.max_texture // (pool.tile + 4)  # slots in a column of display texels and borders
+        by_budget, by_texture = texels // pool.tile**2, pool.columns * longest
+        if by_texture < by_budget:
+            return by_texture, f"a texture of this GPU holds no more than {by_texture * pool.tile**2:,} texels"
+        return by_budget, f"the budget of {texels:,} texels is reached"
 
     def _give_room_back(self) -> None:
         """Keep room for half as many leaves again, once there is more than twice that: leaves that come and go do not have it

@@ -434,6 +434,12 @@ class Session:
             else:
                 self.run.options_changed()
 
+    def hold_leaves(self) -> None:
+        """Leave the leaves of quadtrees as they are, see ``Refinement.hold``."""
+        if self._opened and self.lightmap.refinement is not None:
+            self.lightmap.refinement.hold()
+            self.run.progress = self.solver.poll()
+
     @property
     def materials(self) -> tuple[Material, ...]:
         """Of ``edited_scene``."""

@@ -30,6 +30,7 @@ class Stats:
     per_second: float
     converged: bool
     refining: bool  # whether leaves come and go
+    leaves: str  # what is being done for them
     note: str | None
     edit_work: int | None  # since the materials were last edited
     fresh_work: int | None  # that it took from nothing until converged
@@ -65,6 +66,7 @@ def stats_of(run: Run, lightmap: Lightmap) -> Stats:
         else run.history.work_per_second(run.seconds),
         converged=done,
         refining=progress.refining,
+        leaves=progress.leaves,
         note=progress.note,
         edit_work=run.effort.edit_work(progress.done),
         fresh_work=run.effort.fresh_work,

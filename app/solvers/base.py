@@ -39,7 +39,8 @@ class Progress:
     done: work done so far, in the family's unit. remaining: share of the emitted power that is still to be distributed, or
     the noise that is left, over the mean [-]; 1 before any work, and not finite where the light is not. escaped: power that left
     the scene, RGB [W]. converged: whether what remains is as little as the options ask for, and nothing else changes any more.
-    refining: whether leaves of a quadtree come or go, or do not yet hold all of their light. note: what the user should know of
+    refining: whether leaves of a quadtree come or go, or do not yet hold all of their light. leaves: what is being done for them
+    then, in a few words. note: what the user should know of
     the solution, if anything.
     """
 
@@ -48,6 +49,7 @@ class Progress:
     escaped: F64
     converged: bool = False
     refining: bool = False
+    leaves: str = ""
     note: str | None = None
 
     @property

@@ -101,6 +101,9 @@ def status_bar(view: View, state: State) -> None:
             imgui.separator()
         if state.stats is not None:
             _pace(view, state)
+            if state.stats.refining and state.stats.leaves:
+                widgets.dim(f"quadtrees: {state.stats.leaves}")
+                imgui.separator()
         if view.session.message:
             message = plain(view.session.message)
             imgui.text_unformatted(message)

@@ -186,6 +186,19 @@ def copied_by_click(text: str) -> None:
         imgui.set_tooltip("copied")
 
 
+def one_line(text: str, colour: theme.RGBA = theme.TEXT) -> None:
+    """As much of a text as fits, the whole in its tooltip: nothing moves when it comes or goes."""
+    room, shown = imgui.get_content_region_avail().x, text
+    if imgui.calc_text_size(text).x > room:
+        kept = len(text)
+        while kept > 0 and imgui.calc_text_size(shown).x > room:
+            kept -= 1
+            shown = f"{text[:kept].rstrip()} ..."
+    imgui.text_colored(imgui.ImVec4(*colour), shown)
+    if shown != text:
+        tooltip(text)
+
+
 def dim(text: str) -> None:
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.DIM))
     imgui.text_unformatted(text)

@@ -197,6 +197,7 @@ class FakeSession:
             "remains": "unshot",
             "done": 60,
             "refining": False,
+            "leaves": "",
             "note": None,
             "uniform_texels": 40000,
             "figures": {},

@@ -251,7 +251,8 @@ class Gathering:
         known = not self.lightmap.scene.emits or (self._progress.done >= JUDGED and self.direct.known)
         converged = known and self._progress.remaining <= self.options.noise and not self._edited and not refining
         note = None if refinement is None else refinement.note
-        return replace(self._progress, converged=converged, refining=refining, note=note)
+        leaves = f"{refinement.wanted:,} more to split" if refining and refinement is not None else ""
+        return replace(self._progress, converged=converged, refining=refining, leaves=leaves, note=note)
 
     def settle(self) -> Progress:
         """End the work under way, and wait for the GPU."""
@@ -359,6 +360,9 @@ class Gathering:
     def leaves_changed(self, change: Change) -> None:
         old, new = (change.parents, change.children) if change.split else (change.children, change.parents)
         self._fresh = self._fresh - set(old.tolist()) | set(new.tolist())
+
+    def give_up(self) -> None:
+        """Rays of new leaves are one piece of work: it is done."""
 
     def slots_will_move(self) -> None:
         self.poll(wait=True)

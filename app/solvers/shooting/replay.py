@@ -84,6 +84,12 @@ class Replay:
             self.under_way.release()
             self.under_way = None
 
+    def give_up(self) -> None:
+        """Make no earlier shots again: fresh leaves keep what they inherited."""
+        self.stop()
+        self.fresh.clear()
+        self.all_again = False
+
     def release(self) -> None:
         self.stop()
         self.forget_strong()

@@ -167,7 +167,19 @@ class Shooting:
         refinement = self.lightmap.refinement
         refining, note = (False, None) if refinement is None else (self._refining, refinement.note)
         converged = bool(self._all_shot) and not refining
-        return replace(self._progress, converged=converged, refining=refining, note=note)
+        leaves = self._leaves_say if refining else ""
+        return replace(self._progress, converged=converged, refining=refining, leaves=leaves, note=note)
+
+    @property
+    def _leaves_say(self) -> str:
+        """What is being done for leaves."""
+        refinement, replay = self.lightmap.refinement, self.batch.replay
+        assert refinement is not None and replay is not None
+        pending = replay.under_way
+        if pending is not None:
+            share = pending.next / max(pending.end, 1)
+            return f"light of {len(pending.slots):,} new leaves: {share:.0%}"
+        return f"{refinement.wanted:,} more to split" if refinement.wanted else "looking at leaves"
 
     def _follow_report(self, report: Report) -> None:
         """Take in what became of a batch."""
@@ -296,6 +308,11 @@ class Shooting:
 
     def leaves_changed(self, change: Change) -> None:
         self.batch.leaves_changed(change)
+
+    def give_up(self) -> None:
+        self._under_way.finish()
+        if self.batch.replay is not None:
+            self.batch.replay.give_up()
 
     def slots_will_move(self) -> None:
         self.poll(wait=True)

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 CUT = ("texels", "density", "tile")  # in the order that a newcomer needs them
 FIRST = ("depth", "gradient")  # of a quadtree's options: always in sight
 MORE = ("criterion", "shadow", "budget", "storage")
+STOP = (
+    "Leave the leaves as they are; new ones still get the light of earlier shots. Pressed again, they keep what they have from "
+    "the leaves before them"
+)
 
 
 def draw(view: View, state: State) -> None:
@@ -24,7 +28,7 @@ def draw(view: View, state: State) -> None:
     session = view.session
     light = session.light
     if light.adaptive:
-        _leaves(state)
+        _leaves(view, state)
     light = widgets.edit_options(light, only=FIRST)
     if imgui.tree_node("More###more detail"):
         light = widgets.edit_options(light, only=MORE)
@@ -56,8 +60,8 @@ def _cut(view: View, state: State) -> None:
     )
 
 
-def _leaves(state: State) -> None:
-    """How many leaves there are, and what they spare."""
+def _leaves(view: View, state: State) -> None:
+    """How many leaves there are, what they spare, and what is being done for them; as high whether something is or not."""
     stats = state.stats
     assert stats is not None
     share = stats.texels / max(stats.uniform_texels, 1)
@@ -65,5 +69,15 @@ def _leaves(state: State) -> None:
     imgui.same_line()
     widgets.right(widgets.percent(share), theme.DIM)
     widgets.tooltip(f"Of the {stats.uniform_texels:,} texels that the finest level everywhere would take")
-    if stats.refining:
-        widgets.dim("leaves are changing")
+    imgui.align_text_to_frame_padding()
+    if not stats.refining:
+        widgets.one_line(stats.note or "", theme.AMBER)
+        return
+    widgets.dim(stats.leaves)
+    imgui.same_line()
+    style, width = imgui.get_style(), imgui.calc_text_size("Stop").x
+    left = imgui.get_content_region_avail().x - width - 2 * style.frame_padding.x
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(left, 0.0))
+    if imgui.button("Stop###stop leaves"):
+        state.act(view.session.hold_leaves)
+    widgets.tooltip(STOP)

@@ -86,12 +86,14 @@ def _progress(view: View, state: State) -> None:
     rate = f", {widgets.number(stats.per_second, 3)}/s" if state.measured and not stats.converged else ""
     imgui.same_line()
     widgets.right(f"{stats.done:,} {stats.unit}{rate}", theme.DIM)
-    if stats.note is not None and not stats.refining:
-        widgets.wrapped(plain(stats.note), theme.AMBER)
-    if stats.edit_work is not None:
+    if stats.note is not None and not view.session.light.adaptive:
+        widgets.one_line(plain(stats.note), theme.AMBER)
+    elif stats.edit_work is not None:
         fresh = "" if stats.fresh_work is None else f", from nothing {stats.fresh_work:,}"
-        widgets.dim(f"the edit: {stats.edit_work:,} {stats.unit}{fresh}")
+        widgets.one_line(f"the edit: {stats.edit_work:,} {stats.unit}{fresh}", theme.DIM)
         widgets.tooltip("Only the difference that an edit makes is solved for, negative where light goes")
+    else:
+        imgui.text_unformatted("")  # as high as with something to say
 
 
 def _figures(state: State) -> None:
