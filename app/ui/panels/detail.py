@@ -69,7 +69,6 @@ def _leaves(view: View, state: State) -> None:
     imgui.same_line()
     widgets.right(widgets.percent(share), theme.DIM)
     widgets.tooltip(f"Of the {stats.uniform_texels:,} texels that the finest level everywhere would take")
-    imgui.align_text_to_frame_padding()
     if not stats.refining:
         widgets.one_line(stats.note or "", theme.AMBER)
         return
@@ -78,6 +77,6 @@ def _leaves(view: View, state: State) -> None:
     style, width = imgui.get_style(), imgui.calc_text_size("Stop").x
     left = imgui.get_content_region_avail().x - width - 2 * style.frame_padding.x
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(left, 0.0))
-    if imgui.button("Stop###stop leaves"):
+    if imgui.small_button("Stop###stop leaves"):
         state.act(view.session.hold_leaves)
     widgets.tooltip(STOP)
