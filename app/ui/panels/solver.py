@@ -25,10 +25,10 @@ def draw(view: View, state: State) -> None:
     assert stats is not None
     _choice(view, state)
     _buttons(view, state, done=stats.converged)
-    state.pace = widgets.edit_options(state.pace)
     _progress(view, state)
     _figures(state)
     detail.draw(view, state)
+    state.pace = widgets.edit_options(state.pace)
     energy.draw(view, state)
     widgets.section(session.family.title)
     options = widgets.edit_options(session.options, starts=stats.resolved)
