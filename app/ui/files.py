@@ -71,7 +71,7 @@ class Files:
         if (folder := self._folders.poll()) is not None and state.order is not None:
             state.order = replace(state.order, folder=folder)
         for dialog in (self._scenes, self._bakes):
-            if (chosen := dialog.poll()) is not None:
+            if (chosen := dialog.poll((lambda: state.recent.paths) if dialog is self._scenes else tuple)) is not None:
                 open_file(view, state, chosen)
         if (chosen := self._settings.poll()) is not None:
             state.act(partial(_put_settings, view, state, chosen))

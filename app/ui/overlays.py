@@ -182,14 +182,23 @@ def help_overlay(state: State) -> None:
 
 
 def invitation(view: View, state: State) -> None:
-    """What to do while no scene is open."""
-    if view.session.opened or view.session.loading is not None:
+    """What to do while no scene is open, and where one is dark because it was opened while paused."""
+    session, stats = view.session, state.stats
+    if session.on_its_way is not None:
         return
-    text = "Drop a scene here, or press Ctrl+O"
+    if stats is None:
+        _in_the_middle("Drop a scene here, or press Ctrl+O", state)
+    elif stats.done == 0 and not session.run.running and not stats.converged and new_lamps.is_lit(view, state):
+        _in_the_middle("Paused: press Space to let light in", state)
+
+
+def _in_the_middle(text: str, state: State) -> None:
+    """A line in the view, legible on whatever is behind it."""
     left, top, width, height = state.view_px
-    size = imgui.calc_text_size(text)
-    at = imgui.ImVec2(left + (width - size.x) / 2, top + (height - size.y) / 2)
-    imgui.get_background_draw_list().add_text(at, theme.colour_u32(theme.DIM), text)
+    size, lines = imgui.calc_text_size(text), imgui.get_background_draw_list()
+    x, y = left + (width - size.x) / 2, top + (height - size.y) / 2
+    lines.add_text(imgui.ImVec2(x + 1, y + 1), theme.colour_u32((0, 0, 0, 0.6)), text)
+    lines.add_text(imgui.ImVec2(x, y), theme.colour_u32(theme.TEXT), text)
 
 
 def no_lamps(view: View, state: State) -> None:

@@ -132,6 +132,7 @@ class FakeSession:
         self.image, self.imbalance = None, 0.0002
         self.flickers = False
         self.picked = None
+        self.done = 60
         self.scale: tuple[float, float] | None = None
         self.insets: list[tuple[tuple[int, int], bool]] = []
 
@@ -195,7 +196,7 @@ class FakeSession:
             "memory_mib": 7.3,
             "unit": "shots",
             "remains": "unshot",
-            "done": 60,
+            "done": self.done,
             "refining": False,
             "leaves": "",
             "note": None,

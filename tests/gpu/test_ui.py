@@ -25,7 +25,7 @@ from app.session.keeping import WORTH_SECONDS
 from app.solvers import SOLVERS, ShootingOptions
 from app.ui import overlays, slider, widgets
 from app.ui.app import Ui
-from app.ui.file_dialog import readable
+from app.ui.file_list import readable
 from app.ui.keys import ANY_POPUP, SHORTCUTS
 from app.ui.picture_dialog import free_name
 from app.ui.state import WATCH_SECONDS, Legend, Pace, Request
