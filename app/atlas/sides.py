@@ -127,7 +127,7 @@ def _packed(columns: tuple[NDArray[Any], ...]) -> tuple[NDArray[Any], ...]:
         return columns
     least = [int(column.min()) for column in columns]
     spans = [int(column.max()) - low + 1 for column, low in zip(columns, least, strict=True)]
-    if math.prod(spans) >= 1 << 63:
+    if math.prod(spans) >= 1 << 63 or max(map(abs, least)) >= 1 << 62:
         return columns
     key = np.zeros(len(columns[0]), np.int64)
     for column, low, span in zip(columns, least, spans, strict=True):
