@@ -48,6 +48,7 @@ SOLVER_OF = {"bake": "gathering", "bench edits": "gathering"}
 CURVES_END = {"noise": 1e-3}  # of `bench error`: later than a bake, for what a method comes to
 EDIT_SCENES = ("cornell-box", "museum")
 RAY_SCENES = ("cornell-box", "museum", "grotto")
+PRESET_SCENES = ("cornell-box", "textured-room")
 HARD_SIZES = ("small", "large")
 
 
@@ -128,6 +129,7 @@ def _bench_flags(parser: Parser, family: Family) -> None:
         "frames": Command("milliseconds per frame of the viewer, by part", _frames_flags, _bench_frames),
         "tables": Command("the papers' tables, ours beside theirs; minutes", _tables_flags, _bench_tables),
         "error": Command("error against time and shots, of each method; minutes", _error_flags, _bench_error),
+        "presets": Command("time and error of the settings that come along; minutes", _presets_flags, _bench_presets),
         "hard": Command(
             "scenes that are hard on a light solver, against the answers they must give", _hard_flags, _bench_hard
         ),
@@ -273,6 +275,13 @@ def _tables_flags(tables: Parser, family: Family) -> None:
     )
     tables.add_argument("--plots", action="store_true", help="draw PNGs too (needs matplotlib)")
     json_flag(tables)
+
+
+def _presets_flags(presets: Parser, family: Family) -> None:
+    _scenes_flag(presets, PRESET_SCENES)
+    help = "from each point of a path-traced reference (default %(default)s)"
+    presets.add_argument("--paths", type=positive(int), default=16384, metavar="N", help=help)
+    json_flag(presets)
 
 
 def _hard_flags(hard: Parser, family: Family) -> None:
@@ -422,6 +431,12 @@ def _bench_error(flags: argparse.Namespace) -> int:
     from app.bench.accuracy.error import bench_error
 
     return bench_error(flags)
+
+
+def _bench_presets(flags: argparse.Namespace) -> int:
+    from app.bench.accuracy.presets import bench_presets
+
+    return bench_presets(flags)
 
 
 def _bench_hard(flags: argparse.Namespace) -> int:

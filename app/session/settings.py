@@ -59,11 +59,11 @@ TABLES: Mapping[str, type[Options]] = {
     "display": DisplayOptions,
 }
 
-# Good is what a bake is without settings; Draft for a look, Final for what is shipped. `glowtree bench presets` measures them.
+# Good is what a bake is without settings; Draft is for a look, Final for what is shipped. `glowtree bench presets` measures them.
 PRESETS: Mapping[str, Mapping[str, Any]] = {
-    "draft": {"solver": "gathering", "gathering": {"noise": 0.03}, "stop": {"error": 5.0}},
-    "good": {"solver": "gathering", "gathering": {"noise": 0.01}, "stop": {"error": 2.0}},
-    "final": {"solver": "gathering", "gathering": {"noise": 0.003}, "stop": {"error": 0.5}},
+    "draft": {"solver": "gathering", "gathering": {"noise": 0.05}},
+    "good": {"solver": "gathering", "gathering": {"noise": 0.01}},
+    "final": {"solver": "gathering", "gathering": {"noise": 0.003}},
 }
 
 
