@@ -1,7 +1,8 @@
 """A document is what of an open session is kept in a .glow file: its scene by name and hash, edits, settings, camera, bookmarks.
 
 Plain values (JSON), checked when they are read: a file may come from anywhere. Materials are edited by name, so that edits find
-their materials again in a scene whose file has changed. The light beside it is ``light_state``'s.
+their materials again in a scene whose file has changed. Surfaces that were added or removed are not kept. The light beside it is
+``light_state``'s.
 """
 
 from __future__ import annotations

@@ -64,7 +64,8 @@ class Session:
     options: of the solver that is at work. atlas, light: how scenes are cut, and how their light is held. expose_on_open:
     whether the exposure is forecast of a scene that opens. unedited: the open scene as it was read, the same through edits and
     however it is cut. edited: what edits are of: another object where those of before are not edits of what is open now.
-    reading: how it was read. load_seconds: of each stage of opening. message: what the user should know.
+    reading: how it was read. has_own_surfaces: whether it has others than its file. load_seconds: of each stage of opening.
+    message: what the user should know.
     """
 
     def __init__(
@@ -95,6 +96,7 @@ class Session:
         self._on_open: Opened | None = None
         self._opened = self._busy = False
         self.edited: object = None
+        self.has_own_surfaces = False
         self._steady: Scene | None = None  # as it was edited, while its lamps flicker
         self._then_reference: Path | None = None
         self.reading = self._reading = Reading()
@@ -218,7 +220,7 @@ class Session:
         same_scene = self._opened and (scene is self.unedited or version is not None)
         flickers = same_scene and self.flickers
         if not same_scene or (version is not None and not version.keeps_materials):
-            self.edited = object()
+            self.edited, self.has_own_surfaces = object(), same_scene
         if same_scene and self.scene is not scene:
             lightmap.set_materials(self.materials if version is None else version.materials(scene, self.materials))
             lightmap.set_sky(self.scene.sky)

@@ -101,6 +101,7 @@ class FakeSession:
         self.gpu, self.opened, self.running, self.name, self.message = gpu, opened, True, "fake box", None
         self.loading: SimpleNamespace | None = None
         self.seconds = 0.3  # of solving
+        self.has_own_surfaces = False
         self.calls: list[tuple[object, ...]] = []
         self.session = self.run = self
         self.seconds = 0.3

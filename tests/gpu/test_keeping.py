@@ -22,6 +22,7 @@ from app.session.keeping import Keeping, check_session, drop
 from app.session.session import Session
 from app.session.view import View
 from app.ui import settings as ui_settings
+from app.ui.new_lamps import duplicate_surfaces
 from app.ui.state import State
 from app.util.state_file import read_state, write_state
 
@@ -169,6 +170,18 @@ def test_edits_find_their_materials_in_a_scene_that_has_changed(place: Callable[
     changed, lost, light = second.notes
     assert "room.toml has changed" in changed and "no green any more" in lost and "another scene" in light
     assert second.session.solver.issued == 0
+
+
+def test_a_lamp_with_area_is_a_surface_of_its_own(place: Callable[..., Place]) -> None:
+    one = place().open("cornell-box")
+    assert not one.session.has_own_surfaces
+    duplicate_surfaces(one.view, next(i for i, m in enumerate(one.session.materials) if m.emits))
+    one.frames_until(lambda: one.session.on_its_way is None)
+    assert one.session.has_own_surfaces
+    one.session.cut_anew(AtlasOptions(texels=1500))
+    one.frames_until(lambda: one.session.on_its_way is None)
+    assert one.session.has_own_surfaces, "of another cut of it, too"
+    assert not one.open("furnace").session.has_own_surfaces
 
 
 def test_a_failed_scene_leaves_all_as_it_was(place: Callable[..., Place], tmp_path: Path) -> None:
