@@ -82,7 +82,8 @@ def _progress(view: View, state: State) -> None:
     left = f"{widgets.percent(stats.remaining)} {stats.remains}"
     least = widgets.percent(float(getattr(view.session.options, view.session.family.threshold)))
     widgets.tooltip(f"How far it is on the way, in powers of ten, down to the {least} {stats.remains} that may remain")
-    imgui.text_unformatted(f"converged, {left}" if stats.converged else left)
+    dark = stats.emitted <= 0 and stats.remaining <= 0
+    imgui.text_unformatted("nothing shines" if dark else f"converged, {left}" if stats.converged else left)
     rate = f", {widgets.number(stats.per_second, 3)}/s" if state.measured and not stats.converged else ""
     imgui.same_line()
     widgets.right(f"{stats.done:,} {stats.unit}{rate}", theme.DIM)
