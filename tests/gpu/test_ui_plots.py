@@ -149,3 +149,10 @@ def test_ticks_do_not_collide(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None
         desk = Desk(gpu, FakeSession(), (1400, height))
         desk.release()
     assert counts[1440] == 6 and counts[600] <= counts[720] <= 3
+
+
+def test_a_curve_of_one_point_has_an_axis_of_whole_numbers(desk: Desk, ends: dict[str, Any]) -> None:
+    column = desk.session.history.column
+    desk.session.history.column = lambda name: column(name)[:1]  # type: ignore[method-assign]
+    desk.frames(2)
+    assert ends["energy"][1][:2] == (0.0, 1.0)
