@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import Charts
+from app.atlas.charts import GAP, Charts
 from app.bake.embedded import embedded_glb
 from app.bake.exr import IRRADIANCE, fits_half, write_exr
 from app.bake.gltf_edit import edited_glb_bytes, is_of_gltf
 from app.bake.gltf_writer import glb_bytes
 from app.bake.options import BakeOptions
+from app.bake.padding import padded
 from app.bake.rgbe import write_hdr, write_rgbe_png
 from app.bake.sky_file import write_sky
 from app.bake.staged import Staged
@@ -107,7 +108,11 @@ def write_bake(
     assert np.isfinite(irradiance[covered]).all(), "irradiance that is not finite"
     options = options or BakeOptions()
     prepare_directory(directory)
-    light = finished(irradiance, covered, charts)
+    solved, solved_light = charts, finished(irradiance, covered, charts)
+    light = solved_light
+    if options.padding > GAP:
+        charts, light = padded(scene, solved, light, options.padding)
+        report = {**report, "atlas": list(charts.size)}
     try:
         with Staged(directory) as staged:
             notes = _write_light(staged, light, options)
@@ -117,7 +122,7 @@ def write_bake(
             if scene.sky is not None and scene.sky.emits:
                 write_sky(staged(SKY_NAME), scene.sky)
             if options.embed:
-                embedded = embedded_glb(scene, charts, light, report.get("exposure", 0.0))
+                embedded = embedded_glb(scene, solved, solved_light, report.get("exposure", 0.0))
                 staged(EMBEDDED_NAME).write_bytes(embedded)
             if options.web:
                 shown = staged.read(SCENE_NAME, IRRADIANCE_NAME, SKY_NAME)

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from app.atlas.charts import GAP
 from app.options import Options, option
 
 
 @dataclass(frozen=True)
 class BakeOptions(Options):
+    padding: int = option(
+        GAP,
+        "empty texels between charts: 6 and 14 keep them apart in mip levels 1 and 2; more than 2 moves those of a file's layout",
+        unit="texels",
+        minimum=GAP,
+        maximum=32,
+    )
     exr_float: bool = option(
         False, "write 32-bit floats: three times the size, for what is computed on; half floats are right to 0.05 %"
     )

@@ -18,12 +18,12 @@ from app.scene.model import F32
 GUTTER = 4  # texels; one is needed at full size, others lessen what mip levels take from where there is nothing
 
 
-def fill_gutter(values: F32, covered: NDArray[np.bool_]) -> F32:
-    """(H, W, 3): uncovered texels within GUTTER of a covered one get the nearest one's value, those beyond 0."""
+def fill_gutter(values: F32, covered: NDArray[np.bool_], reach: float = GUTTER) -> F32:
+    """(H, W, c): uncovered texels within ``reach`` of a covered one get the nearest one's value, those beyond 0."""
     filled: F32 = np.where(covered[:, :, None], values, np.float32(0.0))
     height, width = covered.shape
     y, x = np.nonzero(~covered)
-    for dy, dx in _offsets():
+    for dy, dx in _offsets(reach):
         source_y, source_x = y + dy, x + dx
         found = (source_y >= 0) & (source_y < height) & (source_x >= 0) & (source_x < width)
         found[found] = covered[source_y[found], source_x[found]]
@@ -32,8 +32,8 @@ def fill_gutter(values: F32, covered: NDArray[np.bool_]) -> F32:
     return filled
 
 
-def _offsets() -> list[tuple[int, int]]:
-    """All steps (dy, dx) no longer than GUTTER, nearest first."""
-    reach = range(-GUTTER, GUTTER + 1)
-    steps = [(dy, dx) for dy in reach for dx in reach if 0 < dy * dy + dx * dx <= GUTTER * GUTTER]
+def _offsets(reach: float) -> list[tuple[int, int]]:
+    """All steps (dy, dx) no longer than that, nearest first."""
+    way = range(-int(reach), int(reach) + 1)
+    steps = [(dy, dx) for dy in way for dx in way if 0 < dy * dy + dx * dx <= reach * reach]
     return sorted(steps, key=lambda step: step[0] ** 2 + step[1] ** 2)
