@@ -50,8 +50,9 @@ def edit_options(
     for spec in (declared[name] for name in only or declared):
         if spec.name not in skip:
             value = getattr(options, spec.name)
-            unit = (units or {}).get(spec.name, spec.unit)
-            shown_as = dataclasses.replace(spec, unit=unit, choices=(choices or {}).get(spec.name, spec.choices))
+            unit, offered = (units or {}).get(spec.name, spec.unit), (choices or {}).get(spec.name, spec.choices)
+            same = (unit, offered) == (spec.unit, spec.choices)
+            shown_as = spec if same else dataclasses.replace(spec, unit=unit, choices=offered)
             reason = (off or {}).get(spec.name) or (spec.off(options) if spec.off is not None else None)
             edited = edit_option(shown_as, value, (starts or {}).get(spec.name), off=reason)
             if edited != value:
@@ -75,7 +76,8 @@ def edit_option(spec: Spec, value: Any, start: Any = None, *, off: str | None = 
     edited = value if value is None else _editor(spec, value, start)
     imgui.end_disabled()
     edited = edited if off is not None else put_back(edited, spec.default)
-    tooltip(meaning(spec, off))
+    if imgui.is_item_hovered(TOOLTIP):
+        tooltip(meaning(spec, off))
     imgui.pop_id()
     return edited
 
