@@ -98,6 +98,7 @@ def test_a_grey_control_does_nothing_and_tells(
     desk.drag((x, y), (x + 40, y))
     desk.click(x, y, button=1)
     assert not any(call[0] == "set_light" for call in desk.session.calls)
+    desk.frames(60)  # the pointer rests
     assert any("No effect now: texels are uniform" in text for text in told)
     desk.session.light = desk.session.light.replace(adaptive=True)
     desk.frames(2)
