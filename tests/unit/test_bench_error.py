@@ -24,8 +24,9 @@ from app.atlas.options import AtlasOptions
 from app.bench.accuracy import error, error_report
 from app.bench.accuracy.error_report import TITLE
 from app.bench.accuracy.methods import DEFAULT_METHODS, METHODS, Method, Setup, method_names
+from app.bench.commands import ERROR_SCENES
 from app.bench.peers.peers import PEERS
-from app.cli import ERROR_SCENES, build_parser, run
+from app.cli import build_parser, run
 from app.errors import UserError
 from app.lightmap.options import LightmapOptions
 from app.options import Options, specs
