@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 
 from app.atlas.charts import GAP, Charts
 from app.bake.embedded import embedded_glb
-from app.bake.exr import IRRADIANCE, fits_half, write_exr
 from app.bake.gltf_edit import edited_glb_bytes, is_of_gltf
 from app.bake.gltf_writer import glb_bytes
+from app.bake.light_files import IRRADIANCE_NAME, LIGHT_NAMES, write_light
 from app.bake.options import BakeOptions
 from app.bake.padding import padded
-from app.bake.rgbe import write_hdr, write_rgbe_png
 from app.bake.sky_file import write_sky
 from app.bake.staged import Staged
 from app.bake.web_page import find_three, web_page
@@ -41,15 +40,12 @@ __all__ = [
     "write_bake",
 ]
 
-IRRADIANCE_NAME = "irradiance.exr"
 SCENE_NAME = "scene.glb"
 REPORT_NAME = "report.json"
-HDR_NAME = "irradiance.hdr"
-RGBE_NAME = "irradiance.rgbe.png"
 SKY_NAME = "sky.exr"
 EMBEDDED_NAME = "embedded.glb"
 PAGE_NAME = "index.html"
-OPTIONAL = (EMBEDDED_NAME, HDR_NAME, RGBE_NAME, SKY_NAME, PAGE_NAME)
+OPTIONAL = (LIGHT_NAMES - {IRRADIANCE_NAME}) | {EMBEDDED_NAME, SKY_NAME, PAGE_NAME}
 
 
 @dataclass(frozen=True)
@@ -98,12 +94,16 @@ def write_bake(
 ) -> BakeFiles:
     """Write the lightmap, the scene that uses it and the report into ``directory``, which is made if need be.
 
-    irradiance (H, W, 3) f32 [W/m²] over the virtual atlas, row 0 at v = 0, finite wherever ``covered`` (H, W).
+    irradiance (H, W, 3) f32 [W/m²] over the virtual atlas, row 0 at v = 0, finite wherever ``covered`` (H, W); (H, W, 6) where it
+    is followed by its direct part: then that and the rest are files of their own, too.
     unedited: the scene as it was read; of a glTF file, its document is kept then, see gltf_edit.py. In the report, numbers
     that are not finite become null. UserError if the folder cannot be written.
     """
     finer = irradiance.shape[0] // charts.size[1]
-    assert irradiance.shape == (charts.size[1] * finer, charts.size[0] * finer, 3), f"{irradiance.shape}, {charts.size}"
+    assert irradiance.shape[:2] == (charts.size[1] * finer, charts.size[0] * finer), (
+        f"{irradiance.shape}, {charts.size}"
+    )
+    assert irradiance.shape[2] in (3, 6)
     assert covered.shape == irradiance.shape[:2]
     assert np.isfinite(irradiance[covered]).all(), "irradiance that is not finite"
     options = options or BakeOptions()
@@ -115,39 +115,26 @@ def write_bake(
         report = {**report, "atlas": list(charts.size)}
     try:
         with Staged(directory) as staged:
-            notes = _write_light(staged, light, options)
+            notes = write_light(staged, light, options)
             glb, more = _scene_bytes(scene, unedited, charts, options)
             notes += more
             staged(SCENE_NAME).write_bytes(glb)
             if scene.sky is not None and scene.sky.emits:
                 write_sky(staged(SKY_NAME), scene.sky)
             if options.embed:
-                embedded = embedded_glb(scene, solved, solved_light, report.get("exposure", 0.0))
+                embedded = embedded_glb(scene, solved, solved_light[..., :3], report.get("exposure", 0.0))
                 staged(EMBEDDED_NAME).write_bytes(embedded)
             if options.web:
                 shown = staged.read(SCENE_NAME, IRRADIANCE_NAME, SKY_NAME)
                 page = web_page(scene.name, shown, report, find_three(options.three))
                 staged(PAGE_NAME).write_text(page, encoding="utf-8")
             staged(REPORT_NAME).write_text(json_text(_with_notes(report, notes)), encoding="utf-8")
-        for name in set(OPTIONAL) - {path.name for path in staged.paths}:  # of another bake
+        for name in OPTIONAL - {path.name for path in staged.paths}:  # of another bake
             (directory / name).unlink(missing_ok=True)
     except OSError as error:
         raise UserError(f"{directory}: cannot write the bake ({error.strerror or error})") from error
     usual = directory / IRRADIANCE_NAME, directory / SCENE_NAME, directory / REPORT_NAME
     return BakeFiles(*usual, more=tuple(path for path in staged.paths if path not in usual), notes=notes)
-
-
-def _write_light(staged: Staged, light: F32, options: BakeOptions) -> tuple[str, ...]:
-    """The lightmap in the formats that are asked for; what the user should know of it."""
-    fits = fits_half(light)
-    write_exr(staged(IRRADIANCE_NAME), light, IRRADIANCE, half=fits and not options.exr_float)
-    if options.hdr:
-        write_hdr(staged(HDR_NAME), light)
-    if options.rgbe_png:
-        write_rgbe_png(staged(RGBE_NAME), light)
-    if fits or options.exr_float:
-        return ()
-    return (f"half floats do not hold light of {light.max():.3g} W/m² well: {IRRADIANCE_NAME} has 32-bit floats",)
 
 
 def _scene_bytes(

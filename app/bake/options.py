@@ -20,6 +20,13 @@ class BakeOptions(Options):
     exr_float: bool = option(
         False, "write 32-bit floats: three times the size, for what is computed on; half floats are right to 0.05 %"
     )
+    parts: bool = option(
+        False,
+        "write the light straight from lamps, sun and sky and that which came by reflections apart, too: "
+        "irradiance-direct.exr and irradiance-indirect.exr, whose sum is irradiance.exr",
+        tip="Write direct and indirect light apart, too: what comes straight from lamps, sun and sky, and what comes by "
+        "reflections",
+    )
     hdr: bool = option(False, "write the lightmap as irradiance.hdr, too (Radiance RGBE, right to 0.4 %)")
     rgbe_png: bool = option(False, "write the lightmap as irradiance.rgbe.png, too: RGBE in the channels of a PNG")
     embed: bool = option(

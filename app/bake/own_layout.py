@@ -35,8 +35,9 @@ SHARED = 1e-2  # of the smaller of two triangles: less is no overlap but roundin
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Laid:
-    """Light in a layout, as ``write_bake`` takes them: irradiance (H, W, 3) f32 [W/m²] over the atlas of the charts, and whether
-    each of its texels covers a surface. squares: of how many objects were placed side by side."""
+    """Light in a layout, as ``write_bake`` takes them: irradiance (H, W, 3) f32 [W/m²] over the atlas of the charts, or
+    (H, W, 6), followed by its direct part, and whether each of its texels covers a surface. squares: of how many objects were
+    placed side by side."""
 
     charts: Charts
     irradiance: F32
@@ -90,7 +91,7 @@ def laid_out(scene: Scene, solved: Laid) -> Laid:
     triangle = own.face_triangle[face]
     weights = np.clip(barycentric(surfaces.position[there], scene.corners[triangle]), 0.0, 1.0)
     points = Points(triangle, own.face_back[face], weights / weights.sum(axis=1, keepdims=True))
-    image, known = np.zeros((*size[::-1], 3), np.float32), np.zeros(size[::-1], bool)
+    image, known = np.zeros((*size[::-1], solved.irradiance.shape[2]), np.float32), np.zeros(size[::-1], bool)
     tile, row, column = np.nonzero(there)
     where = leaves.y[tile] * charts.tile + row, leaves.x[tile] * charts.tile + column
     image[where] = light_at(solved.image, charts, points)
@@ -114,7 +115,8 @@ def _shown(scene: Scene, solved: Laid) -> NDArray[np.int64]:
     twice = (np.bincount(triangle, minlength=len(scene.triangles)) == 2)[triangle]
     if not twice.any():
         return faces
-    light = light_at(solved.image, charts, Points(triangle, back, np.full((len(faces), 3), 1 / 3))).sum(axis=1)
+    middles = Points(triangle, back, np.full((len(faces), 3), 1 / 3))
+    light = light_at(solved.image[..., :3], charts, middles).sum(axis=1)
     dark = twice & (light < DARK * light.mean())
     back_dark = np.zeros(len(scene.triangles), bool)
     back_dark[triangle[dark & back]] = True

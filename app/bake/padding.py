@@ -23,7 +23,7 @@ BESIDE = 1.5  # texels: all eight neighbours
 
 
 def padded(scene: Scene, charts: Charts, light: F32, padding: int) -> tuple[Charts, F32]:
-    """The charts ``padding`` texels apart, and light (H, W, 3) of the same atlas, with filled gutters, as it lies there."""
+    """The charts ``padding`` texels apart, and light (H, W, c) of the same atlas, with filled gutters, as it lies there."""
     finer = light.shape[0] // charts.size[1]
     apart, moved = _apart(charts, finer, padding)
     leaves = uniform_leaves(apart)
@@ -35,7 +35,7 @@ def padded(scene: Scene, charts: Charts, light: F32, padding: int) -> tuple[Char
     known[y, x] = True
     owner = fill_gutter(owner, known, BESIDE)  # what lies there has light of the other side of a seam
     y, x = np.nonzero(owner[..., 0])
-    image = np.zeros((*known.shape, 3), np.float32)
+    image = np.zeros((*known.shape, light.shape[2]), np.float32)
     chart = owner[y, x, 0].astype(np.int64) - 1
     image[y, x] = bilinear(light, np.column_stack([x, y]) + 0.5 - moved[chart])
     return apart, fill_gutter(image, owner[..., 0] > 0, padding)

@@ -14,7 +14,7 @@ from app.commands.steps import estimate, open_scene, session_options, solve
 from app.errors import UserError
 from app.gpu import gpu_context
 from app.options import from_flags
-from app.session.bake import Baked, bake_folder, write_light
+from app.session.bake import Baked, bake_folder, check_parts, write_light
 from app.session.checkpoint import CHECKPOINT_NAME, Checkpoint, CheckpointOptions
 from app.session.session import Session
 from app.solvers import SOLVERS
@@ -32,6 +32,7 @@ def bake(flags: argparse.Namespace) -> int:
             f"--solver {flags.solver}: it lights what is around an observer, and a bake is seen from everywhere"
         )
     check_options(from_flags(BakeOptions, flags))
+    check_parts(SOLVERS[flags.solver], from_flags(BakeOptions, flags))
     console = Console(quiet=flags.json)
     if len(flags.scenes) > 1:
         return _all(flags, console)

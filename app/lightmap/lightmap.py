@@ -112,7 +112,7 @@ class Lightmap(LightTextures):
     def irradiance(self, *, ambient: bool = False) -> F32:
         """H of every tile (tiles, t, t, 3) f32 [W/m²]; ``ambient``: H + a, with what is still to come, see common/ambient.glsl.
         Waits for the GPU."""
-        H = self._read("t_irradiance")
+        H = self.light_of(self._textures["t_irradiance"])
         return self.with_ambient(H) if ambient else H
 
     def with_ambient(self, H: F32) -> F32:
@@ -123,7 +123,7 @@ class Lightmap(LightTextures):
 
     def residual(self) -> F32:
         """r of every tile (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""
-        return self._read("t_residual")
+        return self.light_of(self._textures["t_residual"])
 
     def light_at(self, texel: tuple[int, int]) -> tuple[F64, F64]:
         """H and r [W/m²] of one texel (column, row) of the tile pool, RGB. Waits for the GPU."""
@@ -156,8 +156,9 @@ class Lightmap(LightTextures):
         """B = E + ρH of every texel (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""
         return self.emission() + self.albedo() * self.irradiance()
 
-    def _read(self, name: str) -> F32:
-        texture = self._textures[name]
+    def light_of(self, texture: Texture) -> F32:
+        """What an RGBA texture of the tile pool holds in stored units, of every tile (tiles, t, t, 3) f32 [W/m²]. Waits for the
+        GPU."""
         raw = np.frombuffer(texture.read(), _DTYPES[texture.dtype]).reshape(*self.size[::-1], 4)
         scale = self.unit / (255 if texture.dtype == "f1" else 1)
         return self.pool.tiles_from_image(raw)[..., :3].astype(np.float32) * np.float32(scale)

@@ -15,14 +15,16 @@ import numpy as np
 from app.bake import BakeFiles, prepare_directory, write_bake
 from app.bake.options import BakeOptions
 from app.bake.own_layout import Laid, laid_out, why_not_kept
+from app.errors import UserError
 from app.lightmap.collapse import collapse
 from app.lightmap.gutter import fill_gutter
 from app.lightmap.seams import jumps
 from app.scene.model import Scene
 from app.session.report import picture, report, summary
 from app.session.session import Session
+from app.solvers import SOLVERS, Family
 
-__all__ = ["Baked", "Taken", "bake_folder", "take_light", "write_light", "write_taken"]
+__all__ = ["Baked", "Taken", "bake_folder", "check_parts", "take_light", "write_light", "write_taken"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,14 +54,24 @@ class Baked:
 def write_light(session: Session, folder: Path, how: BakeOptions, *, unwrap: bool = False) -> Baked:
     """Write the light as it is now, with the scene as it was edited. unwrap: not by the file's own layout. Waits for the GPU.
     Raises UserError."""
-    return write_taken(take_light(session), folder, how, unwrap=unwrap)
+    return write_taken(take_light(session, parts=how.parts), folder, how, unwrap=unwrap)
 
 
-def take_light(session: Session) -> Taken:
-    """The light as it is now, with the scene as it was edited. Waits for the GPU."""
+def check_parts(family: Family, options: BakeOptions) -> None:
+    """Raise UserError where the parts of the light are asked for that the solver does not know."""
+    if options.parts and "direct" not in family.layers:
+        able = " or ".join(other.title for other in SOLVERS.values() if other.everywhere and "direct" in other.layers)
+        raise UserError(f"--parts: {family.title} does not know direct and indirect light apart, {able} does")
+
+
+def take_light(session: Session, *, parts: bool = False) -> Taken:
+    """The light as it is now, with the scene as it was edited. parts: its direct part, too. Waits for the GPU."""
     clock = time.perf_counter()
     lightmap = session.lightmap
-    irradiance, covered = collapse(lightmap.pool, lightmap.irradiance(ambient=True))
+    light = [lightmap.irradiance(ambient=True)]
+    if parts:
+        light.append(np.clip(lightmap.light_of(session.solver.layers["direct"]), 0, light[0]))
+    irradiance, covered = collapse(lightmap.pool, np.concatenate(light, axis=-1))
     session.load_seconds["read back"] = time.perf_counter() - clock
     finite = np.asarray(np.isfinite(irradiance).all(-1))
     lost = int((covered & ~finite).sum())
@@ -99,8 +111,8 @@ def _seams(laid: Laid) -> dict[str, Any]:
     median and 90 % quantile. Nothing where there are none."""
     if not len(laid.charts.seams):
         return {}
-    before = jumps(fill_gutter(laid.irradiance, laid.covered), laid.charts)
-    after = jumps(laid.image, laid.charts)
+    before = jumps(fill_gutter(laid.irradiance[..., :3], laid.covered), laid.charts)
+    after = jumps(laid.image[..., :3], laid.charts)
     return {"seams": {"places": after.places, "before": before.across, "after": after.across, "beside": before.within}}
 
 

@@ -15,7 +15,7 @@ from app.bake import check_options, prepare_directory
 from app.bake.options import BakeOptions
 from app.errors import UserError
 from app.options import Options, option
-from app.session.bake import Baked, take_light, write_taken
+from app.session.bake import Baked, check_parts, take_light, write_taken
 from app.session.checkpoint import CHECKPOINT_NAME, Checkpoint, CheckpointOptions
 from app.session.error_estimate import SECONDS
 from app.session.goal import options_for_error
@@ -87,6 +87,7 @@ class Baking:
         if why is not None:
             raise UserError(why)
         check_options(order.files)
+        check_parts(session.family, order.files)
         prepare_directory(order.folder)
         path = order.folder / CHECKPOINT_NAME
         self._checkpoint = Checkpoint(session, path, order.keep.checkpoint, self._say, aside=True)
@@ -184,7 +185,7 @@ class Baking:
         self._write()
 
     def _write(self) -> None:
-        taken, order = take_light(self._session), self.order
+        taken, order = take_light(self._session, parts=self.order.files.parts), self.order
         self._writing = BackgroundTask("this bake", lambda tell: write_taken(taken, order.folder, order.files))
         self.stage = WRITING
 

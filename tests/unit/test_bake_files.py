@@ -17,6 +17,7 @@ from app.atlas.charts import GAP
 from app.bake import prepare_directory, write_bake
 from app.bake.exr import IRRADIANCE, write_exr
 from app.bake.options import BakeOptions
+from app.bake.read import read_irradiance
 from app.bake.rgbe import rgbe
 from app.errors import UserError
 from app.lightmap.gutter import GUTTER, fill_gutter
@@ -111,6 +112,25 @@ def test_half_floats_are_right_to_a_twentieth_of_a_per_cent(tmp_path, inputs):
     assert sizes[0] < 0.6 * sizes[1]
 
 
+def test_parts_add_up_to_the_whole(tmp_path, inputs):
+    scene, charts, irradiance, covered = inputs
+    whole = np.clip(np.nan_to_num(irradiance), 1e-3, 100.0).astype(np.float32)
+    direct = whole * np.random.default_rng(3).random(whole.shape).astype(np.float32)
+    light = np.concatenate([whole, direct], axis=2)
+    files = write_bake(tmp_path, scene, charts, light, covered, {}, BakeOptions(hdr=True, padding=6))
+    names = {f"irradiance{part}{ending}" for part in ("-direct", "-indirect") for ending in (".exr", ".hdr")}
+    assert {path.name for path in files.more} == names | {"irradiance.hdr"}
+    read = [read_irradiance(tmp_path / f"irradiance{part}.exr") for part in ("", "-direct", "-indirect")]
+    np.testing.assert_allclose(
+        read[1] + read[2], read[0], rtol=2.0**-10
+    )  # each is rounded by half of the last of 11 bits
+    assert 0.4 < read[1].sum() / read[0].sum() < 0.6
+    header = OpenEXR.File(str(tmp_path / "irradiance-direct.exr")).header()
+    assert header["quantity"] == "direct irradiance"
+    write_bake(tmp_path, scene, charts, whole, covered, {})
+    assert sorted(path.name for path in tmp_path.iterdir()) == NAMES  # none of another bake is left
+
+
 def test_rgbe_is_right_to_8_bits_of_the_brightest_colour(tmp_path, inputs):
     scene, charts, irradiance, covered = inputs
     files = write_bake(tmp_path, scene, charts, irradiance, covered, {}, BakeOptions(hdr=True, rgbe_png=True))
@@ -146,7 +166,7 @@ def test_image_of_another_size_is_refused(tmp_path, inputs):
         write_bake(tmp_path, scene, charts, irradiance[1:], covered[1:], {})
 
 
-@pytest.mark.parametrize("step", ["write_exr", "glb_bytes", "json_text"])
+@pytest.mark.parametrize("step", ["light_files.write_exr", "glb_bytes", "json_text"])
 def test_failing_half_way_keeps_the_files_of_the_last_bake(tmp_path, inputs, monkeypatch, step):
     files = write_bake(tmp_path, *inputs, {"shots": 1})
     before = {path: path.read_bytes() for path in files.paths}
@@ -154,7 +174,7 @@ def test_failing_half_way_keeps_the_files_of_the_last_bake(tmp_path, inputs, mon
     def full(*args, **more):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(app.bake, step, full)
+    monkeypatch.setattr(f"app.bake.{step}", full)
     with pytest.raises(UserError, match=r"cannot write the bake .No space left on device"):
         write_bake(tmp_path, *inputs, {"shots": 2})
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
