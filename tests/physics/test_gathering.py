@@ -19,7 +19,8 @@ from app.scene.shapes import box, merged
 from app.session.run import Stop
 from app.session.session import Session
 from app.solvers import ShootingOptions
-from app.solvers.gathering.solver import BATCH, FIRST, JUDGED, SHADOW_RAYS, SOLVED, Gathering
+from app.solvers.gathering.judging import FIRST, SHADOW_RAYS, Judging
+from app.solvers.gathering.solver import BATCH, JUDGED, SOLVED
 from app.util.parts import run_to_end
 from app.validation.scenes import across, furnace, scene_of
 
@@ -31,7 +32,7 @@ ROUNDING = 1e-5  # of sums of some hundred f32
 @pytest.fixture
 def same_rays(monkeypatch: pytest.MonkeyPatch) -> None:
     """As many shadow rays whatever the light: how many suit it best depends on materials."""
-    monkeypatch.setattr(Gathering, "_shadow_rays", lambda self, count: SHADOW_RAYS * count // FIRST)
+    monkeypatch.setattr(Judging, "shadow_rays", lambda self, more, rays, direct: SHADOW_RAYS * more // FIRST)
 
 
 def gathered(gpu: Gpu, scene: Scene, rays: int = RAYS, **options: object) -> Solution:
@@ -165,10 +166,10 @@ def test_a_lamp_that_goes_on_while_leaves_get_their_shadow_rays_lights_all_of_th
     for mid in (True, False):
         lit = gathered(gpu, table_room(), adaptive=True, **(GROWS | {"gradient": 0.05}))
         lit.refine(gradient=0.02)
-        while not lit.rays._fresh:
+        while not lit.rays._leaves.slots:
             lit.step(4)
         under_way = lit.rays.work(16)
-        assert lit.rays._leaves_wait
+        assert lit.rays._leaves.wait(lit.rays.issued)
         if mid:
             next(under_way)
         lit.rays.set_materials(edited(lit.lightmap.scene, wall=(RED, {"emission": (9.0, 9.0, 9.0)})))
