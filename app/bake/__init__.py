@@ -7,7 +7,7 @@ writing leaves the previous files as they were.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import GAP, Charts
+from app.atlas.charts import Charts
+from app.bake.arrange import Arranged, arranged
 from app.bake.embedded import embedded_glb
 from app.bake.gltf_edit import edited_glb_bytes, is_of_gltf
 from app.bake.gltf_writer import glb_bytes
-from app.bake.light_files import IRRADIANCE_NAME, LIGHT_NAMES, write_light
+from app.bake.light_files import IRRADIANCE_NAME, LIGHT_NAME, page_names, write_light
 from app.bake.options import BakeOptions
-from app.bake.padding import padded
 from app.bake.sky_file import write_sky
 from app.bake.staged import Staged
 from app.bake.web_page import find_three, web_page
@@ -45,16 +45,19 @@ REPORT_NAME = "report.json"
 SKY_NAME = "sky.exr"
 EMBEDDED_NAME = "embedded.glb"
 PAGE_NAME = "index.html"
-OPTIONAL = (LIGHT_NAMES - {IRRADIANCE_NAME}) | {EMBEDDED_NAME, SKY_NAME, PAGE_NAME}
+OPTIONAL = (EMBEDDED_NAME, SKY_NAME, PAGE_NAME)
 
 
 @dataclass(frozen=True)
 class BakeFiles:
-    """Where the files of a bake are. more: what was asked for beside these; notes: what the user should know."""
+    """Where the files of a bake are. irradiance: its first page; more: what was asked for beside these; atlas: width and
+    height of a page [texels], of so many pages; notes: what the user should know."""
 
     irradiance: Path
     scene: Path
     report: Path
+    atlas: tuple[int, int]
+    pages: int = 1
     more: tuple[Path, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -109,15 +112,14 @@ def write_bake(
     options = options or BakeOptions()
     prepare_directory(directory)
     solved, solved_light = charts, finished(irradiance, covered, charts)
-    light = solved_light
-    if options.padding > GAP:
-        charts, light = padded(scene, solved, light, options.padding)
-        report = {**report, "atlas": list(charts.size)}
+    placed = arranged(scene, solved, solved_light, options.padding, options.max_size)
+    report = {**report, "atlas": list(placed.page_size), "pages": placed.pages}
+    lightmaps = page_names(placed.pages)
     try:
         with Staged(directory) as staged:
-            notes = write_light(staged, light, options)
-            glb, more = _scene_bytes(scene, unedited, charts, options)
-            notes += more
+            notes = _too_large(placed, options) + write_light(staged, placed.light, placed.pages, options)
+            glb, of_scene = _scene_bytes(scene, unedited, placed.charts, lightmaps, options)
+            notes += of_scene
             staged(SCENE_NAME).write_bytes(glb)
             if scene.sky is not None and scene.sky.emits:
                 write_sky(staged(SKY_NAME), scene.sky)
@@ -125,30 +127,40 @@ def write_bake(
                 embedded = embedded_glb(scene, solved, solved_light[..., :3], report.get("exposure", 0.0))
                 staged(EMBEDDED_NAME).write_bytes(embedded)
             if options.web:
-                shown = staged.read(SCENE_NAME, IRRADIANCE_NAME, SKY_NAME)
+                shown = staged.read(SCENE_NAME, *lightmaps, SKY_NAME)
                 page = web_page(scene.name, shown, report, find_three(options.three))
                 staged(PAGE_NAME).write_text(page, encoding="utf-8")
             staged(REPORT_NAME).write_text(json_text(_with_notes(report, notes)), encoding="utf-8")
-        for name in OPTIONAL - {path.name for path in staged.paths}:  # of another bake
-            (directory / name).unlink(missing_ok=True)
+        for path in set(directory.iterdir()).difference(staged.paths):
+            if path.name in OPTIONAL or LIGHT_NAME.fullmatch(path.name):  # of another bake
+                path.unlink()
     except OSError as error:
         raise UserError(f"{directory}: cannot write the bake ({error.strerror or error})") from error
-    usual = directory / IRRADIANCE_NAME, directory / SCENE_NAME, directory / REPORT_NAME
-    return BakeFiles(*usual, more=tuple(path for path in staged.paths if path not in usual), notes=notes)
+    usual = directory / lightmaps[0], directory / SCENE_NAME, directory / REPORT_NAME
+    more = tuple(path for path in staged.paths if path not in usual)
+    return BakeFiles(*usual, placed.page_size, placed.pages, more, notes)
+
+
+def _too_large(placed: Arranged, options: BakeOptions) -> tuple[str, ...]:
+    """What to say of pages that are larger than was asked for."""
+    if options.max_size is None or max(placed.page_size) <= options.max_size:
+        return ()
+    width, height = placed.page_size
+    return (f"--max-size {options.max_size}: pages are {width} x {height} texels, as large as the largest chart",)
 
 
 def _scene_bytes(
-    scene: Scene, unedited: Scene | None, charts: Charts, options: BakeOptions
+    scene: Scene, unedited: Scene | None, charts: Charts, lightmaps: Sequence[str], options: BakeOptions
 ) -> tuple[bytes, tuple[str, ...]]:
     """scene.glb, and what the user should know of it."""
     notes: tuple[str, ...] = ()
     if unedited is not None and is_of_gltf(scene):
         try:
             moz = options.moz_lightmap
-            return edited_glb_bytes(scene, unedited, charts, IRRADIANCE_NAME, moz_lightmap=moz), notes
+            return edited_glb_bytes(scene, unedited, charts, lightmaps, moz_lightmap=moz), notes
         except SceneError as error:  # it was there when it was opened: the light is not lost for it
             notes = (f"{error}: {SCENE_NAME} has what light depends on, not all that the file had",)
-    return glb_bytes(scene, charts, IRRADIANCE_NAME, moz_lightmap=options.moz_lightmap), notes
+    return glb_bytes(scene, charts, lightmaps, moz_lightmap=options.moz_lightmap), notes
 
 
 def _with_notes(report: Mapping[str, Any], notes: tuple[str, ...]) -> dict[str, Any]:

@@ -53,11 +53,11 @@ class _Shining(MaterialWriter):
             red, green, blue = (min(1.0, gain * c) for c in material.emission)
             plain = dataclasses.replace(material, albedo_texture=None, emission_texture=None)
             materials.append(dataclasses.replace(plain, albedo=(0.0, 0.0, 0.0), emission=(red, green, blue)))
-        super().__init__(glb, tuple(materials), "", None)
+        super().__init__(glb, tuple(materials), (), ())
         self._picture = picture
 
-    def _material(self, material: int, double_sided: bool, lit: bool) -> dict[str, Any]:
-        item = super()._material(material, double_sided, False)
+    def _material(self, material: int, double_sided: bool, lit: bool, page: int) -> dict[str, Any]:
+        item = super()._material(material, double_sided, False, page)
         if lit:
             item |= {"emissiveFactor": [1.0, 1.0, 1.0], "emissiveTexture": {"index": self._picture, "texCoord": 1}}
         return item

@@ -8,7 +8,8 @@ of EXT_mesh_gpu_instancing become children of their node. What the file has not,
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,25 +47,42 @@ def is_of_gltf(scene: Scene) -> bool:
 
 
 @np.errstate(all="ignore")
-def edited_glb_bytes(scene: Scene, unedited: Scene, charts: Charts, lightmap: str, *, moz_lightmap: bool) -> bytes:
-    """The whole GLB file. unedited: the scene as it was read. Raises SceneError where its file is another one by now."""
+def edited_glb_bytes(
+    scene: Scene, unedited: Scene, charts: Charts, lightmaps: Sequence[str], *, moz_lightmap: bool
+) -> bytes:
+    """The whole GLB file. unedited: the scene as it was read; lightmaps: see gltf_writer.py. Raises SceneError where its file is
+    another one by now."""
     assert scene.source is not None
     reader = GltfReader(GltfFile(scene.source))
     reader.walk()
-    return _Editor(reader, scene, unedited, charts, lightmap, moz_lightmap).to_bytes()
+    return _Editor(reader, scene, unedited, charts, lightmaps, moz_lightmap).to_bytes()
+
+
+class _How(TypedDict):
+    """Which of the glTF materials that a material becomes."""
+
+    double_sided: bool
+    lit: bool
+    page: int
 
 
 class _Editor:
     def __init__(
-        self, reader: GltfReader, scene: Scene, unedited: Scene, charts: Charts, lightmap: str, moz_lightmap: bool
+        self,
+        reader: GltfReader,
+        scene: Scene,
+        unedited: Scene,
+        charts: Charts,
+        lightmaps: Sequence[str],
+        moz_lightmap: bool,
     ) -> None:
         self._reader, self._file, self._scene, self._unedited = reader, reader.file, scene, unedited
-        self._lightmap = lightmap
+        self._lightmaps = lightmaps
         self._glb = CarriedGlb(self._file)
-        texture = lightmap_texture(self._glb, lightmap) if moz_lightmap else None
-        self._own = OwnMaterials(self._glb, unedited.materials, scene.materials, lightmap, texture)
-        self._added = MaterialWriter(self._glb, scene.materials, lightmap, texture)
-        self._sides = sides_of(scene, charts)
+        textures = [lightmap_texture(self._glb, name) for name in lightmaps] if moz_lightmap else ()
+        self._own = OwnMaterials(self._glb, unedited.materials, scene.materials, lightmaps, textures)
+        self._added = MaterialWriter(self._glb, scene.materials, lightmaps, textures)
+        self._sides = sides_of(scene, charts, len(lightmaps))
 
     def to_bytes(self) -> bytes:
         assert self._scene.listed is not None
@@ -87,7 +105,7 @@ class _Editor:
         roots += add_objects(glb, scene, self._sides.only(order[: bounds[0]]), self._added, np.zeros(3))
         roots += self._cameras_and_lights()
         extras = glb.scene.get("extras")
-        about = {**(extras if isinstance(extras, dict) else {}), "lightmap": about_lightmap(self._lightmap)}
+        about = {**(extras if isinstance(extras, dict) else {}), "lightmap": about_lightmap(self._lightmaps)}
         glb.add("scenes", {"name": scene.name, **glb.scene, "nodes": roots, "extras": about})
         glb.document["scene"] = 0
         return glb.to_bytes()
@@ -120,19 +138,19 @@ class _Editor:
             raise self._changed()
         mirrored = np.linalg.det(placed.worlds[:, :3, :3]) < 0
         material = scene.material_ids[sides.triangle]
-        keys = np.stack([instance, material, sides.double_sided, sides.lit], axis=1)
-        for (one, painted, double_sided, lit), mine in grouped(keys):
+        keys = np.stack([instance, material, sides.double_sided, sides.lit, sides.page], axis=1)
+        for (one, painted, double_sided, lit, page), mine in grouped(keys):
             # a mirrored instance is wound the other way in its own space
             flat = placed.shape.triangles[triangle[mine]]
             vertex = flat[:, [0, 2, 1]] if mirrored[one] else flat
             back = sides.back[mine]
             at = _Corners(vertex, weights[mine], np.where((back != mirrored[one])[:, None], [0, 2, 1], [0, 1, 2]), back)
-            item = self._primitive(placed, at, sides.uv[mine], painted, bool(double_sided), bool(lit))
+            item = self._primitive(placed, at, sides.uv[mine], painted, bool(double_sided), bool(lit), page)
             primitives.setdefault((placed.node, one), []).append(item)
             frames[placed.node, one] = placed.worlds[one]
 
     def _primitive(
-        self, placed: Placed, at: _Corners, uv: F64, material: int, double_sided: bool, lit: bool
+        self, placed: Placed, at: _Corners, uv: F64, material: int, double_sided: bool, lit: bool, page: int
     ) -> dict[str, Any]:
         given = self._given_primitive(placed)
         shape = placed.shape
@@ -158,9 +176,9 @@ class _Editor:
         item = add_primitive(self._glb, attributes)
         item |= {name: given[name] for name in ("extras",) if name in given}
         if not own:
-            item["material"] = self._added.index(material, double_sided=double_sided, lit=lit)
+            item["material"] = self._added.index(material, double_sided=double_sided, lit=lit, page=page)
             return item
-        how = {"double_sided": double_sided, "lit": lit}
+        how: _How = {"double_sided": double_sided, "lit": lit, "page": page}
         item["material"] = self._own.index(material, **how, moved=moved)
         variants = given.get("extensions", {}).get("KHR_materials_variants")
         if variants is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,12 +20,14 @@ NEAREST, LINEAR, LINEAR_MIPMAP_LINEAR = 9728, 9729, 9987
 
 
 class MaterialWriter:
-    """Adds materials to a GLB on demand. lightmap: the file that holds the irradiance; texture: the glTF texture that names it,
-    if there is one."""
+    """Adds materials to a GLB on demand. lightmaps: the files that hold the irradiance, one for each page; textures: the glTF
+    textures that name them, if there are any."""
 
-    def __init__(self, glb: GlbBuilder, materials: tuple[Material, ...], lightmap: str, texture: int | None) -> None:
-        self._glb, self._materials, self._lightmap, self._lightmap_texture = glb, materials, lightmap, texture
-        self._written: dict[tuple[int, bool, bool], int] = {}
+    def __init__(
+        self, glb: GlbBuilder, materials: tuple[Material, ...], lightmaps: Sequence[str], textures: Sequence[int]
+    ) -> None:
+        self._glb, self._materials, self._lightmaps, self._lightmap_textures = glb, materials, lightmaps, textures
+        self._written: dict[tuple[int, bool, bool, int], int] = {}
         self._images: dict[int, int] = {}
         self._with_alpha = [_with_alpha(material) for material in materials]
         self._samplers: dict[tuple[int, int, bool], int] = {}
@@ -41,14 +44,14 @@ class MaterialWriter:
             return {1: 0}
         return {0: 0, 1: 2 if lit else 1} if 1 in used else {0: 0}
 
-    def index(self, material: int, *, double_sided: bool, lit: bool) -> int:
-        """The glTF material of a scene's material, as it is or one-sided, with or without the lightmap."""
-        key = (material, double_sided, lit)
+    def index(self, material: int, *, double_sided: bool, lit: bool, page: int) -> int:
+        """The glTF material of a scene's material, as it is or one-sided, with or without a page of the lightmap."""
+        key = (material, double_sided, lit, page)
         if key not in self._written:
             self._written[key] = self._glb.add("materials", self._material(*key))
         return self._written[key]
 
-    def _material(self, material: int, double_sided: bool, lit: bool) -> dict[str, Any]:
+    def _material(self, material: int, double_sided: bool, lit: bool, page: int) -> dict[str, Any]:
         m, slots = self._materials[material], self.texcoords(material, lit=lit)
         texture, opacity = self._with_alpha[material]
         surface: dict[str, Any] = {
@@ -72,10 +75,10 @@ class MaterialWriter:
             if m.emission_texture is not None:
                 item["emissiveTexture"] = self._texture_info(m.emission_texture, slots)
         if lit:
-            item["extras"] = {"lightmap": self._lightmap}
+            item["extras"] = {"lightmap": self._lightmaps[page]}
             extensions["KHR_materials_specular"] = {"specularFactor": 0.0}
-            if self._lightmap_texture is not None:
-                extensions["MOZ_lightmap"] = {"index": self._lightmap_texture, "texCoord": 1, "intensity": 1.0}
+            if self._lightmap_textures:
+                extensions["MOZ_lightmap"] = {"index": self._lightmap_textures[page], "texCoord": 1, "intensity": 1.0}
         if extensions:
             item["extensions"] = extensions
         for name in extensions:

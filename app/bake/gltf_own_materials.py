@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from typing import Any
 
 from app.bake.gltf_carry import CarriedGlb, drop
@@ -20,8 +21,8 @@ GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 class OwnMaterials:
     """The materials of a document, each in its place as it is needed first; others of the same name follow behind all.
 
-    before, now: the scene's materials as they were read, and as they are. texture: the glTF texture of the lightmap, if there is
-    one.
+    before, now: the scene's materials as they were read, and as they are. lightmaps: the files of
+    its pages; textures: the glTF textures of these, if there are any.
     """
 
     def __init__(
@@ -29,12 +30,12 @@ class OwnMaterials:
         glb: CarriedGlb,
         before: tuple[Material, ...],
         now: tuple[Material, ...],
-        lightmap: str,
-        texture: int | None,
+        lightmaps: Sequence[str],
+        textures: Sequence[int],
     ) -> None:
-        self._glb, self._before, self._now, self._lightmap, self._texture = glb, before, now, lightmap, texture
+        self._glb, self._before, self._now, self._lightmaps, self._textures = glb, before, now, lightmaps, textures
         self._given: list[dict[str, Any]] = glb.given.get("materials", [])
-        self._written: dict[tuple[int, bool, bool, int | None], int] = {}
+        self._written: dict[tuple[int, bool, bool, int, int | None], int] = {}
         self._placed: set[int] = set()
 
     def __len__(self) -> int:
@@ -44,9 +45,9 @@ class OwnMaterials:
         """Whether any of its textures lies in TEXCOORD_1."""
         return bool(_second_uses(self._given[material]))
 
-    def index(self, material: int, *, double_sided: bool, lit: bool, moved: int | None) -> int:
-        """The glTF material. moved: the set of texture coordinates that TEXCOORD_1 has become, if it has."""
-        key = material, double_sided, lit, moved
+    def index(self, material: int, *, double_sided: bool, lit: bool, page: int, moved: int | None) -> int:
+        """The glTF material. page: of the lightmap; moved: the set of texture coordinates that TEXCOORD_1 is now, if it moved."""
+        key = material, double_sided, lit, page, moved
         if key not in self._written:
             item = self._item(*key)
             if material in self._placed:
@@ -57,7 +58,7 @@ class OwnMaterials:
                 self._written[key] = material
         return self._written[key]
 
-    def _item(self, material: int, double_sided: bool, lit: bool, moved: int | None) -> dict[str, Any]:
+    def _item(self, material: int, double_sided: bool, lit: bool, page: int, moved: int | None) -> dict[str, Any]:
         item = copy.deepcopy(self._given[material])
         item.pop("doubleSided", None)
         if double_sided:
@@ -68,13 +69,13 @@ class OwnMaterials:
         self._edit(item, self._before[material], self._now[material])
         if lit:
             extras = item.get("extras")
-            item["extras"] = {**(extras if isinstance(extras, dict) else {}), "lightmap": self._lightmap}
+            item["extras"] = {**(extras if isinstance(extras, dict) else {}), "lightmap": self._lightmaps[page]}
             extensions = item.setdefault("extensions", {})
             if not any(name in extensions for name in WITHOUT_SPECULAR):
                 extensions.setdefault(SPECULAR, {"specularFactor": 0.0})
                 self._glb.use_extension(SPECULAR)
-            if self._texture is not None:
-                extensions["MOZ_lightmap"] = {"index": self._texture, "texCoord": 1, "intensity": 1.0}
+            if self._textures:
+                extensions["MOZ_lightmap"] = {"index": self._textures[page], "texCoord": 1, "intensity": 1.0}
                 self._glb.use_extension("MOZ_lightmap")
             if not extensions:
                 item.pop("extensions")

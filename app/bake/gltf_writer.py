@@ -19,7 +19,7 @@ Every triangle has its own lightmap area:
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,28 +42,31 @@ NEAR_PLANE = 1e-3  # of the scene's radius: glTF cameras must have one, the scen
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """The triangle sides to write, (k,) each. uv (k, 3, 2) in [0, 1], in the triangle's corner order; 0 if not lit."""
+    """The triangle sides to write, (k,) each. uv (k, 3, 2) in [0, 1] of a page of the lightmap, in the triangle's corner order; 0
+    if not lit. page: the number of that."""
 
     triangle: NDArray[np.int64]
     back: NDArray[np.bool_]
     lit: NDArray[np.bool_]
     double_sided: NDArray[np.bool_]
     uv: F64
+    page: NDArray[np.int64]
 
     def only(self, rows: NDArray[np.int64]) -> Sides:
         return Sides(**{name: values[rows] for name, values in vars(self).items()})
 
 
-def glb_bytes(scene: Scene, charts: Charts, lightmap: str, *, moz_lightmap: bool = False) -> bytes:
-    """The whole GLB file. lightmap: the EXR's file name beside it. moz_lightmap: name it as a texture, too."""
+def glb_bytes(scene: Scene, charts: Charts, lightmaps: Sequence[str], *, moz_lightmap: bool = False) -> bytes:
+    """The whole GLB file. lightmaps: the names of the EXR files beside it, one for each page that the charts' atlas is cut into.
+    moz_lightmap: name them as textures, too."""
     glb = GlbBuilder(f"glowtree {__version__}")
-    texture = lightmap_texture(glb, lightmap) if moz_lightmap else None
-    materials = MaterialWriter(glb, scene.materials, lightmap, texture)
+    textures = [lightmap_texture(glb, name) for name in lightmaps] if moz_lightmap else ()
+    materials = MaterialWriter(glb, scene.materials, lightmaps, textures)
 
-    nodes = add_objects(glb, scene, sides_of(scene, charts), materials, offset_of(scene))
+    nodes = add_objects(glb, scene, sides_of(scene, charts, len(lightmaps)), materials, offset_of(scene))
     nodes += add_cameras(glb, scene)
     nodes += [add_light(glb, light) for light in scene.lights if light.emits]
-    glb.add("scenes", {"name": scene.name, "nodes": nodes, "extras": {"lightmap": about_lightmap(lightmap)}})
+    glb.add("scenes", {"name": scene.name, "nodes": nodes, "extras": {"lightmap": about_lightmap(lightmaps)}})
     glb.document["scene"] = 0
     return glb.to_bytes()
 
@@ -79,9 +82,10 @@ def _middle(scene: Scene) -> tuple[F64, float]:
     return (lower + upper) / 2, float(np.linalg.norm(upper - lower)) / 2
 
 
-def about_lightmap(file: str) -> dict[str, Any]:
+def about_lightmap(files: Sequence[str]) -> dict[str, Any]:
     """What the glTF scene says of the lightmap."""
-    return {"file": file, "quantity": "irradiance", "unit": "W/m2", "texCoord": 1, "firstRow": "v = 0"}
+    named = {"file": files[0]} if len(files) == 1 else {"files": list(files)}
+    return {**named, "quantity": "irradiance", "unit": "W/m2", "texCoord": 1, "firstRow": "v = 0"}
 
 
 def lightmap_texture(glb: GlbBuilder, uri: str) -> int:
@@ -91,8 +95,8 @@ def lightmap_texture(glb: GlbBuilder, uri: str) -> int:
     return glb.add("textures", {"source": image, "sampler": sampler, "name": "irradiance"})
 
 
-def sides_of(scene: Scene, charts: Charts) -> Sides:
-    """Which sides of which triangles are written, front before back: see above."""
+def sides_of(scene: Scene, charts: Charts, pages: int = 1) -> Sides:
+    """Which sides of which triangles are written, front before back: see above. pages: that the atlas is cut into."""
     face = np.full((len(scene.triangles), 2), -1)
     face[charts.face_triangle, charts.face_back.astype(int)] = np.arange(len(charts.face_triangle))
     front_lit, back_lit = face[:, 0] >= 0, face[:, 1] >= 0
@@ -103,26 +107,36 @@ def sides_of(scene: Scene, charts: Charts) -> Sides:
     written = face[triangle, side]
     lit = written >= 0
     uv = np.zeros((len(triangle), 3, 2))
-    uv[lit] = charts.face_uv[written[lit]] / np.array(charts.size)
+    uv[lit] = charts.face_uv[written[lit]] / np.array(charts.size) * (1, pages)
+    page = np.floor(uv[..., 1].mean(axis=1)).astype(np.int64)
+    uv[..., 1] -= page[:, None]
     return Sides(
         triangle=triangle,
         back=side == 1,
         lit=lit,
         double_sided=scene.sides[triangle] & ~(front_lit & back_lit)[triangle],
         uv=uv,
+        page=page,
     )
 
 
 def add_objects(glb: GlbBuilder, scene: Scene, sides: Sides, materials: MaterialWriter, offset: F64) -> list[int]:
     """One node and mesh for each object that has triangles, one primitive for each glTF material; returns the nodes."""
     keys = np.stack(
-        [scene.object_ids[sides.triangle], scene.material_ids[sides.triangle], sides.double_sided, sides.lit], axis=1
+        [
+            scene.object_ids[sides.triangle],
+            scene.material_ids[sides.triangle],
+            sides.double_sided,
+            sides.lit,
+            sides.page,
+        ],
+        axis=1,
     )
     primitives: dict[int, list[dict[str, Any]]] = {}
-    for (obj, material, double_sided, lit), rows in grouped(keys):
+    for (obj, material, double_sided, lit, page), rows in grouped(keys):
         vertices = _vertices(scene, sides, rows, materials.texcoords(material, lit=bool(lit)), bool(lit), offset)
         primitive = add_primitive(glb, vertices)
-        primitive["material"] = materials.index(material, double_sided=bool(double_sided), lit=bool(lit))
+        primitive["material"] = materials.index(material, double_sided=bool(double_sided), lit=bool(lit), page=page)
         primitives.setdefault(obj, []).append(primitive)
     nodes = []
     for obj, items in primitives.items():

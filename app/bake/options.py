@@ -17,6 +17,14 @@ class BakeOptions(Options):
         minimum=GAP,
         maximum=32,
     )
+    max_size: int | None = option(
+        None,
+        "cut the lightmap into pages, irradiance-1.exr and so on, none of them wider or higher; unset: one",
+        unit="texels",
+        minimum=64,
+        maximum=16384,
+        tip="Cut the lightmap into pages that are at most so wide and high, for renderers that take no larger pictures",
+    )
     exr_float: bool = option(
         False, "write 32-bit floats: three times the size, for what is computed on; half floats are right to 0.05 %"
     )

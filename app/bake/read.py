@@ -11,6 +11,7 @@ import numpy as np
 import OpenEXR
 
 from app.bake import IRRADIANCE_NAME, REPORT_NAME, SCENE_NAME
+from app.bake.light_files import page_names
 from app.errors import UserError
 from app.scene.load import load_scene
 from app.scene.model import F32, Scene
@@ -31,6 +32,8 @@ class Bake:
 def read_bake(path: Path) -> Bake:
     """Of a folder, or of one that a file of the bake is in. Raises UserError."""
     folder = path if path.is_dir() else path.parent
+    if (folder / page_names(2)[0]).is_file():
+        raise UserError(f"{path}: is a bake of several pages, a reference is one: bake it without --max-size")
     missing = [name for name in (IRRADIANCE_NAME, SCENE_NAME) if not (folder / name).is_file()]
     if missing:
         raise UserError(f"{path}: is no bake, {' and '.join(missing)} missing: 'glowtree bake' writes one")

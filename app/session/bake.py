@@ -88,11 +88,10 @@ def write_taken(taken: Taken, folder: Path, how: BakeOptions, *, unwrap: bool = 
     notes: tuple[str, ...] = ()
     if not unwrap and taken.scene.uv1 is not None:
         laid, notes = _own_layout(taken.scene, laid)
-        result["atlas"] = list(laid.charts.size)
         result["warnings"] = [*result["warnings"], *notes]
     light = laid.charts, laid.irradiance, laid.covered
     files = write_bake(folder, taken.scene, *light, result, how, unedited=taken.unedited)
-    result["warnings"] = [*result["warnings"], *files.notes]
+    result |= {"atlas": list(files.atlas), "pages": files.pages, "warnings": [*result["warnings"], *files.notes]}
     return Baked(files, result, taken.line + _at_seams(result), (*notes, *files.notes), taken.lost)
 
 

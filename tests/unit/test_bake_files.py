@@ -96,7 +96,12 @@ def test_writes_three_files_and_nothing_else(tmp_path, inputs):
     assert "half floats do not hold light of" in note
     np.testing.assert_array_equal(pixels[covered], irradiance[covered])
     assert np.isfinite(pixels).all()
-    assert json.loads(files.report.read_text()) == {"shots": 3, "warnings": [note]}
+    assert json.loads(files.report.read_text()) == {
+        "shots": 3,
+        "atlas": list(files.atlas),
+        "pages": 1,
+        "warnings": [note],
+    }
 
 
 def test_half_floats_are_right_to_a_twentieth_of_a_per_cent(tmp_path, inputs):

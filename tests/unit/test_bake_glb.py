@@ -76,7 +76,7 @@ def test_the_lightmap_as_a_texture_is_all_that_the_validator_does_not_know(tmp_p
 def test_khronos_validator_finds_errors(tmp_path):
     """The check itself can fail."""
     scene = sides_scene()
-    glb = glb_bytes(scene, sides_charts(scene), "missing.exr").replace(b'"VEC3"', b'"VEC2"', 1)
+    glb = glb_bytes(scene, sides_charts(scene), ["missing.exr"]).replace(b'"VEC3"', b'"VEC2"', 1)
     (tmp_path / "broken.glb").write_bytes(glb)
     assert any(m["severity"] == 0 for m in validator_messages(tmp_path / "broken.glb"))
 
@@ -175,7 +175,7 @@ def test_cameras_come_back(tmp_path):
 @pytest.mark.parametrize("moz_lightmap", [False, True])
 def test_lit_materials_name_the_lightmap_and_have_no_specular_lobe(moz_lightmap):
     scene = sides_scene()
-    document = document_of(glb_bytes(scene, sides_charts(scene), "irradiance.exr", moz_lightmap=moz_lightmap))
+    document = document_of(glb_bytes(scene, sides_charts(scene), ["irradiance.exr"], moz_lightmap=moz_lightmap))
     assert ("MOZ_lightmap" in document["extensionsUsed"]) == moz_lightmap
     assert moz_lightmap or all("uri" not in image for image in document["images"])  # only what glTF allows
     for mesh in document["meshes"]:
@@ -199,7 +199,7 @@ def test_lit_materials_name_the_lightmap_and_have_no_specular_lobe(moz_lightmap)
 def test_equal_vertices_are_written_once_and_pictures_too():
     scene = sides_scene()
     charts = parametrize(scene, texels=2000)
-    document = document_of(glb_bytes(scene, charts, "irradiance.exr"))
+    document = document_of(glb_bytes(scene, charts, ["irradiance.exr"]))
     for mesh in document["meshes"]:
         for primitive in mesh["primitives"]:
             vertices = document["accessors"][primitive["attributes"]["POSITION"]]["count"]
@@ -223,7 +223,7 @@ def test_many_vertices_get_wide_indices():
     charts = dataclasses.replace(
         sides_charts(scene), face_triangle=none, face_back=none.astype(bool), face_uv=np.zeros((0, 3, 2))
     )
-    document = document_of(glb_bytes(many, charts, "irradiance.exr"))
+    document = document_of(glb_bytes(many, charts, ["irradiance.exr"]))
     (primitive,) = document["meshes"][0]["primitives"]
     assert document["accessors"][primitive["indices"]]["componentType"] == 5125
 

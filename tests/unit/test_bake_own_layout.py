@@ -73,7 +73,7 @@ def test_the_layout_is_kept_and_holds_the_light(tmp_path: Path) -> None:
     # bilinear look-ups are exact for what is linear, but at rims, where what lies beyond repeats the last texel: half a texel
     assert off.max() <= 0.5 * np.abs(GRADIENT).sum(axis=0).max() / solved.charts.density
     assert np.median(off) < 1e-3
-    back = load_gltf(written(tmp_path, "b.glb", glb_bytes(scene, laid.charts, "x.exr")))
+    back = load_gltf(written(tmp_path, "b.glb", glb_bytes(scene, laid.charts, ["x.exr"])))
     assert back.uv1 is not None and scene.uv1 is not None and len(back.triangles) == 14
     for corners, uv in zip(scene.corners[:12], scene.uv1[:12], strict=True):
         same = np.flatnonzero(np.isclose(back.corners, corners, atol=1e-6).all(axis=(1, 2)))
@@ -115,7 +115,7 @@ def test_squares_of_objects_are_placed_side_by_side(tmp_path: Path) -> None:
     assert why_not_kept(scene, solved) is None
     laid = laid_out(scene, solved)
     assert laid.squares == 2
-    back = load_gltf(written(tmp_path, "b.glb", glb_bytes(scene, laid.charts, "x.exr")))
+    back = load_gltf(written(tmp_path, "b.glb", glb_bytes(scene, laid.charts, ["x.exr"])))
     assert back.uv1 is not None and back.uv1.min() >= 0.0 and back.uv1.max() <= 1.0
     assert why_not_kept(back, _solved(back, 500)) is None  # in one square now
     ratio = []

@@ -11,7 +11,7 @@ from app.atlas.charts_cache import charts_of
 from app.atlas.options import AtlasOptions
 from app.atlas.points import Points, SideIndex, bilinear, random_points
 from app.atlas.texels import texel_surfaces, uniform_leaves
-from app.bake.padding import padded
+from app.bake.arrange import arranged
 from app.lightmap.at_points import light_at
 from app.lightmap.gutter import fill_gutter
 from app.scene.load import load_scene
@@ -33,7 +33,8 @@ def off_by_level(name: str, texels: int, levels: int, padding: int = GAP) -> lis
     known[where] = True
     image = fill_gutter(image, known)
     if padding > GAP:
-        charts, image = padded(scene, charts, image, padding)
+        placed = arranged(scene, charts, image, padding, None)
+        charts, image = placed.charts, placed.light
     points = random_points(scene, POINTS, 3)
     face = SideIndex(charts.face_triangle, charts.face_back).find(points.triangle, points.back)
     place = np.einsum("nk,nkc->nc", points.weights, charts.face_uv[face])[face >= 0]
@@ -79,5 +80,7 @@ def test_padding_moves_light_and_does_not_change_it(finer):
     points = random_points(scene, POINTS, 3)
     there = SideIndex(charts.face_triangle, charts.face_back).find(points.triangle, points.back) >= 0
     points = Points(points.triangle[there], points.back[there], points.weights[there])
-    apart, moved = padded(scene, charts, light, 8)
-    np.testing.assert_allclose(light_at(moved, apart, points), light_at(light, charts, points), rtol=1e-5)
+    placed = arranged(scene, charts, light, 8, None)
+    np.testing.assert_allclose(
+        light_at(placed.light, placed.charts, points), light_at(light, charts, points), rtol=1e-5
+    )

@@ -79,7 +79,7 @@ def test_a_bake_gives_its_light_back_on_every_side(
 def test_any_file_of_a_bake_stands_for_it(tmp_path: Path) -> None:
     image = written(tmp_path, sheet_in_a_room())
     np.testing.assert_array_equal(read_bake(tmp_path / "irradiance.exr").irradiance, image)
-    assert read_bake(tmp_path / "report.json").report == {}
+    assert read_bake(tmp_path / "report.json").report["pages"] == 1
 
 
 def test_other_materials_are_named(tmp_path: Path) -> None:

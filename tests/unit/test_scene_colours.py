@@ -116,7 +116,7 @@ def test_the_reference_the_digest_and_the_bake_have_the_colours(tmp_path: Path) 
     patches = make_patches(scene, 100)
     red = (patches.corners.mean(axis=1)[:, 0] - scene.bounds[0][0]) / 4
     assert np.allclose(patches.albedo[:, 0], 0.8 * red, atol=1e-6)
-    back = load_gltf(written(tmp_path, "b.glb", glb_bytes(scene, parametrize(scene, texels=600), "x.exr")))
+    back = load_gltf(written(tmp_path, "b.glb", glb_bytes(scene, parametrize(scene, texels=600), ["x.exr"])))
     low = scene.bounds[0][0]
     assert back.colours is not None and np.allclose(back.colours[..., 0], (back.corners[..., 0] - low) / 4, atol=1e-6)
     lit = with_ceiling_light(scene)

@@ -96,7 +96,7 @@ def test_a_bake_has_its_lights(tmp_path: Path) -> None:
         Light("sun", "directional", (3, 2, 1), (0, 0, 0), (0, -1, 0), outer=math.pi / 4, angle=0.01),
     )
     scene = sides_scene().with_lights((*lights, replace(lights[0], on=False)))
-    written_file = written(tmp_path, "scene.glb", glb_bytes(scene, sides_charts(scene), "lightmap.exr"))
+    written_file = written(tmp_path, "scene.glb", glb_bytes(scene, sides_charts(scene), ["lightmap.exr"]))
     for light, back in zip(lights, load_scene(written_file).lights, strict=True):
         assert (light.name, light.kind) == (back.name, back.kind)
         for name in ("intensity", "position", "direction", "inner", "outer", "range", "radius", "angle"):

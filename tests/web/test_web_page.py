@@ -31,14 +31,17 @@ yfov_deg = 70
 """
 
 
-@pytest.mark.parametrize("scene", ["cornell-box", "loggia.toml --sky clear --sun 60,15"])
-def test_the_page_shows_what_the_viewer_shows(tmp_path, monkeypatch, scene):
+SCENES = ("cornell-box", "loggia.toml --sky clear --sun 60,15")
+
+
+@pytest.mark.parametrize(("scene", "pages"), [(SCENES[0], []), (SCENES[1], []), (SCENES[0], ["--max-size", "64"])])
+def test_the_page_shows_what_the_viewer_shows(tmp_path, monkeypatch, scene, pages):
     packages = npm_package(THREE)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "loggia.toml").write_text(LOGGIA)
     solve = [*scene.split(), "--solver", "gathering", "--texels", "4000", "--rays", "32"]
     web = ["--web", "--three", str(packages / "three")]
-    assert run(["bake", *solve, "-o", str(tmp_path / "baked"), *web]) == 0
+    assert run(["bake", *solve, "-o", str(tmp_path / "baked"), *web, *pages]) == 0
     assert run(["shot", *solve, "-o", str(tmp_path / "viewer.png"), "--size", "{}x{}".format(*SIZE)]) == 0
     (tmp_path / "alone").mkdir()
     shutil.copy(tmp_path / "baked" / "index.html", tmp_path / "alone")  # it needs no file beside it
