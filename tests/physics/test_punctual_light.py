@@ -88,6 +88,20 @@ def test_a_board_casts_its_shadow(gpu: Gpu, solver: str, kind: str) -> None:
     lit.release()
 
 
+def test_nothing_is_dark_where_a_lit_wall_stands_on_a_lit_floor(gpu: Gpu) -> None:
+    """Neither hides the other, down to their common edge, where samples of the map beside a texel show the other one, nearer to
+    the light than the texel's own plane is there."""
+    wall = [[2, 0, 2], [2, 1, 2], [2, 1, 0], [2, 0, 0]]
+    light = Light("sun", "directional", (1.0, 1.0, 1.0), direction=(0.5, -0.7, 0.51))
+    scene = quads_scene([FLOOR, wall], [grey(0.0)]).with_lights((light,))
+    lit = begin(gpu, scene, solver="shooting", density=100)
+    lit.settle()
+    expected = light.irradiance(lit.position, lit.normal)
+    assert expected.min() > 0.4  # all of it is lit
+    np.testing.assert_allclose(lit.H, expected, rtol=5e-3)
+    lit.release()
+
+
 @EVERY_SOLVER
 def test_in_a_closed_room_nothing_is_lost(gpu: Gpu, solver: str) -> None:
     """Albedo 1/2 all over: what a point light sends out is absorbed in the end, and its walls receive twice that."""

@@ -92,7 +92,7 @@ class DirectionShots:
 
     @property
     def _reads(self) -> dict[str, Texture]:
-        reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo"
+        reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_facets"
         return self._lightmap.textures(*reads) | {"t_items": self._items, "t_depth": self._depth}
 
     def _groups(self, shots: int) -> list[tuple[int, int]]:

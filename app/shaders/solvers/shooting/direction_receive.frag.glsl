@@ -1,6 +1,10 @@
 // The light of some directions is blended into H and r of every texel. A sample of a map sees the receiver if it shows its facet,
 // or nothing that lies nearer to the light than the receiver's own plane there: the four around it, weighted bilinearly. What it
 // shows below the sphere around the scene is the background.
+//
+// Where some of the four see it, what another shows hides it only if the receiver is behind the plane of that facet: at the foot
+// of a wall the floor is nearer than the plane of the wall goes on below it, but hides nothing of the wall, nor the wall of the
+// floor.
 #include "common/atlas.glsl"
 #include "common/albedo.glsl"
 #include "common/item.glsl"
@@ -11,6 +15,7 @@ uniform usampler2D t_normal_ids;
 uniform sampler2D t_materials;
 uniform sampler2D t_items;
 uniform sampler2D t_depth;
+uniform sampler2D t_facets;  // edges of their texels, see app/lightmap/textures.py
 uniform int u_shots;  // from u_first on
 uniform int u_maps;   // that t_items has room for
 
@@ -19,15 +24,35 @@ layout(location = 1) out vec4 out_residual;
 
 const float SLACK = 1.0 / 8192.0;  // of the scene's radius: rounding of depths, as in visibility/visible.glsl
 
-float visible(vec3 local, vec3 normal, float facet, int shot) {
+vec3 facet_tangent(int entry) {
+    int width = textureSize(t_facets, 0).x;
+    return texelFetch(t_facets, ivec2(entry % width, entry / width), 0).xyz;
+}
+
+// Whether the receiver is behind the plane of what a sample shows; to_shown: from the receiver to there, in the map's axes.
+bool behind(float item, vec3 to_shown, mat3 axes) {
+    if (item == OPEN || item == UNCHARTED) return true;
+    int entry = 2 * int(item);
+    vec3 normal = cross(facet_tangent(entry), facet_tangent(entry + 1)) * axes;
+    return dot(normal, to_shown) * normal.z > 0.0;  // what is shown faces the light
+}
+
+float visible(vec3 local, vec3 normal, float facet, mat3 axes, int shot) {
     vec2 at = px_of(local) - 0.5, base = floor(at), f = at - base;
     vec2 uv = (base + 1.0 + vec2(0.0, MAP * float(shot))) / vec2(MAP, MAP * float(u_maps));
     vec4 x = vec4(0.0, 1.0, 1.0, 0.0) - f.x, y = vec4(1.0, 1.0, 0.0, 0.0) - f.y;  // [px] from the receiver, as textureGather has them
     vec4 plane = local.z - (normal.x * x + normal.y * y) / normal.z * (2.0 / (WIDTH * MAP));
     vec4 shown = (0.5 - textureGather(t_depth, uv)) / DEPTH;
-    bvec4 same = equal(textureGather(t_items, uv), vec4(facet)), open = lessThanEqual(shown, max(plane + SLACK, -1.0));
-    vec4 seen = vec4(same.x || open.x, same.y || open.y, same.z || open.z, same.w || open.w);
-    return dot(seen, vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)));
+    vec4 items = textureGather(t_items, uv);
+    bvec4 same = equal(items, vec4(facet)), open = lessThanEqual(shown, max(plane + SLACK, -1.0));
+    bvec4 seen = bvec4(same.x || open.x, same.y || open.y, same.z || open.z, same.w || open.w);
+    if (any(seen) && !all(seen)) {
+        for (int i = 0; i < 4; ++i) {
+            vec3 to_shown = vec3(vec2(x[i], y[i]) * (2.0 / (WIDTH * MAP)), shown[i] - local.z);
+            if (!seen[i]) seen[i] = !behind(items[i], to_shown, axes);
+        }
+    }
+    return dot(vec4(seen), vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)));
 }
 
 void main() {
@@ -41,7 +66,7 @@ void main() {
         vec3 normal = texel.normal * axes;
         if (normal.z <= 0.0) continue;
         vec4 light = normal.z * vec4(s.exitance, dot(abs(s.exitance), vec3(1.0)));
-        out_irradiance += light * visible(texel.position * axes, normal, float(texel.facet), shot);
+        out_irradiance += light * visible(texel.position * axes, normal, float(texel.facet), axes, shot);
         out_residual.a += light.a;
     }
     out_residual.rgb = albedo_of(t_materials, texel.material, px) * out_irradiance.rgb;
