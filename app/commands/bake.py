@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.bake import check_options
+from app.bake import REPORT_NAME, check_options
 from app.bake.options import BakeOptions
 from app.commands.steps import estimate, open_scene, session_options, solve
 from app.errors import UserError
@@ -74,6 +75,13 @@ def _all(flags: argparse.Namespace, console: Console) -> int:
     rows: list[tuple[str, ...]] = [("scene", "texels", "seconds", "left", "expected error", "")]
     results, codes = [], []
     for scene, folder in zip(flags.scenes, folders, strict=True):
+        done = _done(_for_scene(flags, scene, folder)) if flags.resume else None
+        if done is not None:
+            console.warn(f"{folder} is done: its light is kept, without --resume it is baked once more")
+            results.append({**done, "done_before": True})
+            rows.append((*_row(scene, done)[:-1], "done before"))
+            codes.append(0)
+            continue
         try:
             baked, whole = _one(_for_scene(flags, scene, folder), console)
         except UserError as error:
@@ -96,6 +104,29 @@ def _all(flags: argparse.Namespace, console: Console) -> int:
     table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     console.result({"bakes": results}, "\n".join(table))
     return max(codes)
+
+
+def _done(flags: argparse.Namespace) -> dict[str, Any] | None:
+    """The report of a bake of this scene with these settings that was finished, and not before the scene's file was changed."""
+    path = flags.output / REPORT_NAME
+    if (flags.output / CHECKPOINT_NAME).exists() or not path.exists():
+        return None
+    try:
+        report = json.loads(path.read_text(encoding="utf-8"))
+        asked, was = session_options(flags), report["parameters"]
+        options = {name: value for name, value in asked["options"].as_dict().items() if value is not None}
+        same = (
+            not report["interrupted"]
+            and (was["solver"], was["light"]) == (flags.solver, flags.light)
+            and (was["atlas"], was["lightmap"]) == (asked["atlas"].as_dict(), asked["light"].as_dict())
+            and options.items() <= was[flags.solver].items()
+        )
+        source = Path(report["source"])
+        newer = source.exists() and source.stat().st_mtime > path.stat().st_mtime
+        _row(flags.scene, report)
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, StopIteration):  # no report of ours
+        return None
+    return report if same and not newer else None
 
 
 def _row(scene: str, result: dict[str, Any]) -> tuple[str, ...]:

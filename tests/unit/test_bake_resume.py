@@ -156,6 +156,35 @@ def test_without_resume_it_says_that_it_begins_anew(unfinished: Path, capsys: py
     assert not (unfinished / CHECKPOINT_NAME).exists()
 
 
+def test_of_several_scenes_those_that_are_done_are_not_baked_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = tmp_path / "room.toml"
+    scene.write_text((ROOT / "scenes" / "cornell-box.toml").read_text())
+    line = ["bake", "furnace", str(scene), "-o", str(tmp_path / "out"), "--rays", "8", "--json", "--texels", "1500"]
+    light = [tmp_path / "out" / name / "irradiance.exr" for name in ("furnace", "room")]
+
+    def written() -> list[int]:
+        return [path.stat().st_mtime_ns for path in light]
+
+    assert run(line) == 0
+    first = written()
+    (tmp_path / "out" / "room" / "report.json").unlink()
+    capsys.readouterr()
+    assert run([*line, "--resume"]) == 0
+    bakes = json.loads(capsys.readouterr().out)["bakes"]
+    assert [bake.get("done_before", False) for bake in bakes] == [True, False]
+    second = written()
+    assert second[0] == first[0] and second[1] > first[1]
+    scene.touch()
+    os.utime(scene, (time.time() + 5, time.time() + 5))
+    assert run([*line, "--resume"]) == 0  # the scene is another by now
+    third = written()
+    assert third[0] == second[0] and third[1] > second[1]
+    assert run([*line, "--resume", "--texels", "900"]) == 0
+    assert written()[0] > third[0]  # other settings
+
+
 def test_nothing_to_resume_begins(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """So that a script need not know whether it was stopped."""
     assert run(bake(tmp_path / "out", *GATHERING, "--rays", "8", "--resume")) == 0
