@@ -95,7 +95,7 @@ def _counts(
     scene: Scene, outline: Outline, atlas: AtlasOptions, light: LightmapOptions, tell: Progress
 ) -> tuple[dict[str, Any], tuple[str, ...], list[str]]:
     """What unfolding the scene comes to, all warnings, and which of it are estimates."""
-    scene, charts, _ = read_and_unfold(scene, atlas, False, tell, roots=light.adaptive)
+    _, scene, charts, _ = read_and_unfold(scene, atlas, False, tell, roots=light.adaptive)
     leaves, slots, depth = uniform_leaves(charts), 0, 0
     if light.adaptive:
         tell("planting quadtrees", 0.6)

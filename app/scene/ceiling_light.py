@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.scene.lamp_surfaces import with_rectangle
+from app.scene.area_lamps import AreaLamp, Surfaces, with_surfaces
 from app.scene.model import Scene
 from app.scene.rooms import OPEN, AxisRays, Free, find_room
 
@@ -21,9 +21,14 @@ LOOKS = 5  # along each edge, for what hangs from the ceiling or stands in its w
 HALVINGS = 6  # of its edges, at most, until nothing does
 
 
-def with_ceiling_light(scene: Scene, name: str = "ceiling light") -> Scene:
-    """The scene with a one-sided, downward square of light under the ceiling of a room: the one that the first camera stands in,
-    else the one that ``find_room`` finds.
+def with_ceiling_light(scene: Scene) -> Scene:
+    """The scene with a ``ceiling_light``."""
+    return with_surfaces(scene, Surfaces((ceiling_light(scene, "ceiling light"),)))
+
+
+def ceiling_light(scene: Scene, name: str) -> AreaLamp:
+    """A one-sided, downward rectangle of light under the ceiling of a room: the one that the first camera stands in, else the one
+    that ``find_room`` finds.
 
     Its edges are a quarter of the room's, or less where something is in the way; it hangs 1 % of the room's height below whatever
     is lowest over it, in an open room the top of the scene, and its radiance L follows from πL·A_light = E·A_ground with
@@ -31,9 +36,9 @@ def with_ceiling_light(scene: Scene, name: str = "ceiling light") -> Scene:
     no room and has no ceiling is lit from a quarter of its size above it.
     """
     (x, y, z), u, v, ground = _square(scene)
-    radiance = MEAN_IRRADIANCE * ground / (math.pi * 4 * u * v)
-    corners = np.array([(x - u, y, z - v), (x + u, y, z - v), (x + u, y, z + v), (x - u, y, z + v)])
-    return with_rectangle(scene, corners, name, (radiance, radiance, radiance))
+    radiance = float(MEAN_IRRADIANCE * ground / (math.pi * 4 * u * v))
+    middle = float(x), float(y), float(z)
+    return AreaLamp(name, middle, (radiance, radiance, radiance), (2 * float(u), 2 * float(v)))
 
 
 class _Square(NamedTuple):

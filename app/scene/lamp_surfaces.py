@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -33,8 +34,9 @@ def with_rectangle(scene: Scene, corners: F64, name: str, radiance: RGB) -> Scen
     return _with(scene, corners, new, lamp, name)
 
 
-def with_copy(scene: Scene, index: int, shift: F64, name: str) -> Scene:
-    """The scene with the triangles of material ``index`` once more, moved by (3,) [m], as a lamp of its own."""
+def with_copy(scene: Scene, index: int, shift: F64, name: str, radiance: RGB) -> Scene:
+    """The scene with the triangles of material ``index`` once more, moved by (3,) [m], as a lamp of its own; radiance L
+    [W/(sr m²)]."""
     chosen = np.flatnonzero(scene.material_ids == index)
     used, numbers = np.unique(scene.triangles[chosen], return_inverse=True)
     new = {key: value[chosen] for key in PER_TRIANGLE if (value := getattr(scene, key)) is not None}
@@ -43,17 +45,17 @@ def with_copy(scene: Scene, index: int, shift: F64, name: str) -> Scene:
     new["object_ids"] = np.full(len(chosen), len(scene.objects), np.int32)
     if "listed" in new:
         new["listed"] = np.full(len(chosen), -1, np.int32)
-    lamp = dataclasses.replace(scene.materials[index], name=name)
+    lamp = dataclasses.replace(scene.materials[index], name=name, emission=radiance)
     return _with(scene, scene.positions[used] + shift, new, lamp, name)
 
 
-def without_material(scene: Scene, index: int) -> Scene:
-    """The scene without material ``index`` and its triangles; something else must be there."""
-    kept = scene.material_ids != index
-    assert kept.any(), "a scene has triangles"
+def without_surfaces(scene: Scene, materials: Sequence[int]) -> Scene:
+    """The scene without the triangles of these materials, which stay; as it is where nothing else is there."""
+    kept = ~np.isin(scene.material_ids, materials)
+    if not kept.any():
+        return scene
     less: dict[str, Any] = {key: value[kept] for key in PER_TRIANGLE if (value := getattr(scene, key)) is not None}
-    less["material_ids"] = less["material_ids"] - (less["material_ids"] > index).astype(np.int32)
-    return dataclasses.replace(scene, materials=scene.materials[:index] + scene.materials[index + 1 :], **less)
+    return dataclasses.replace(scene, **less)
 
 
 def new_name(kind: str, taken: object) -> str:
@@ -76,4 +78,4 @@ def _with(scene: Scene, positions: F64, new: dict[str, Any], lamp: Material, nam
     )
 
 
-__all__ = ["new_name", "with_copy", "with_rectangle", "without_material"]
+__all__ = ["new_name", "with_copy", "with_rectangle", "without_surfaces"]

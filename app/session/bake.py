@@ -30,7 +30,8 @@ __all__ = ["Baked", "Taken", "bake_folder", "check_parts", "take_light", "write_
 @dataclass(frozen=True, eq=False)
 class Taken:
     """The light of a session at one moment, ready to be written: what is to be read of the GPU has been. scene: as edited;
-    unedited: as it was read. result, line: the report so far, and that in a line. lost: texels whose light is no number."""
+    unedited: its surfaces, but materials, lights and sky as they were read. result, line: the report so far, and that in a line.
+    lost: texels whose light is no number."""
 
     scene: Scene
     unedited: Scene
@@ -78,7 +79,8 @@ def take_light(session: Session, *, parts: bool = False) -> Taken:
     result = report(session) | picture(session) | {"texels_not_finite": lost}
     irradiance = np.where(finite[..., None], np.maximum(irradiance, 0), np.float32(0))  # no light is still owed
     laid = Laid(session.charts, irradiance, covered & finite)
-    return Taken(session.edited_scene, session.unedited, laid, result, summary(session, result), lost)
+    unedited = session.unedited.with_lights(session.read.lights).with_sky(session.read.sky)
+    return Taken(session.edited_scene, unedited, laid, result, summary(session, result), lost)
 
 
 def write_taken(taken: Taken, folder: Path, how: BakeOptions, *, unwrap: bool = False) -> Baked:

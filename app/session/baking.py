@@ -27,6 +27,7 @@ from app.util.state import State
 from app.util.state_file import read_state
 
 NEVER = Stop()
+FIXED = "they are being baked; stop the bake first"
 ASK_AGAIN = 1.5  # times as long as until the error was last estimated, when it is again
 FIRST_LOOK = 5.0  # s of solving, before the first
 ASK_SHARE = 0.5  # of the time that was solved for, that one estimate may take
@@ -89,6 +90,7 @@ class Baking:
         check_options(order.files)
         check_parts(session.family, order.files)
         prepare_directory(order.folder)
+        session.fixed = FIXED
         path = order.folder / CHECKPOINT_NAME
         self._checkpoint = Checkpoint(session, path, order.keep.checkpoint, self._say, aside=True)
         if resume:
@@ -198,7 +200,7 @@ class Baking:
                 self._checkpoint.close()
             else:
                 self._checkpoint.remove()
-            self.stage = DONE
+            self.stage, self._session.fixed = DONE, None
             self.note = "; ".join((*([self.note] if self.note else ()), *self.baked.notes)) or None
 
     # -- how far it is -------------------------------------------------------------------------------------------------
@@ -235,7 +237,7 @@ class Baking:
 
     def _end(self, why: str) -> None:
         self._checkpoint.close()
-        self.stage, self.note = STOPPED, why
+        self.stage, self.note, self._session.fixed = STOPPED, why, None
 
     def release(self) -> None:
         """Wait for what is being written."""

@@ -1,8 +1,7 @@
 """A document is what of an open session is kept in a .glow file: its scene by name and hash, edits, settings, camera, bookmarks.
 
 Plain values (JSON), checked when they are read: a file may come from anywhere. Materials are edited by name, so that edits find
-their materials again in a scene whose file has changed. Surfaces that were added or removed are not kept. The light beside it is
-``light_state``'s.
+their materials again in a scene whose file has changed. The light beside it is ``light_state``'s.
 """
 
 from __future__ import annotations
@@ -14,138 +13,38 @@ import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import ValidationError
 
 from app.errors import UserError
 from app.options import Options
 from app.render.camera import CameraView
+from app.scene.area_lamps import AreaLamp, Key, Surfaces, keys_of, with_surfaces
 from app.scene.gltf_file import first_problem
 from app.scene.library import scene_names, scene_path
-from app.scene.lights import Light, LightKind
-from app.scene.model import Material
+from app.scene.lights import Light
+from app.scene.model import Material, Scene
 from app.scene.options import FileOptions
-from app.scene.sky import LEAST_TURBIDITY, MOST_TURBIDITY, Sky, SkyKind, Sun
+from app.scene.sky import Sky, Sun
+from app.session.document_tables import (
+    AreaLampTable,
+    CameraTable,
+    Document,
+    KeyTable,
+    LightTable,
+    MaterialTable,
+    SceneTable,
+    SkyTable,
+    SunTable,
+)
 from app.session.session import Reading
+from app.session.versions import Version
 from app.session.view import View
 
-RIGID = 1e-6  # of a camera's axes, how far from orthonormal they may be
 NUMBERS = ("albedo", "emission", "opacity")  # fields of a material that can be edited
 HASH_AT_ONCE = 1 << 20  # bytes
-
-Vec3 = tuple[float, float, float]
-NotNegative = Annotated[float, Field(ge=0.0)]
-Emitted = tuple[NotNegative, NotNegative, NotNegative]
-Unit = Annotated[float, Field(ge=0.0, le=1.0)]
-Angle = Annotated[float, Field(ge=0.0, le=math.pi)]
-
-
-class Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
-
-
-class SunTable(Table):
-    azimuth: float
-    height: Annotated[float, Field(ge=0.0, le=90.0)]
-
-
-class SkyTable(Table):
-    """A picture is not kept here: it is that of the scene."""
-
-    kind: SkyKind
-    colour: Emitted
-    strength: NotNegative
-    sun: SunTable | None = None
-    turbidity: Annotated[float, Field(ge=LEAST_TURBIDITY, le=MOST_TURBIDITY)]
-    rotation: float = 0.0
-
-    @model_validator(mode="after")
-    def _sun_of_a_clear_sky(self) -> Self:
-        if self.kind == "clear" and self.sun is None:
-            raise ValueError("a clear sky needs a sun")
-        return self
-
-
-class LightTable(Table):
-    """range: none where it does not end."""
-
-    name: str
-    kind: LightKind
-    intensity: Emitted
-    position: Vec3
-    direction: Vec3
-    inner: Angle
-    outer: Angle
-    range: Annotated[float, Field(gt=0.0)] | None
-    radius: NotNegative
-    angle: Angle
-    on: bool
-
-    @model_validator(mode="after")
-    def _unit_direction(self) -> Self:
-        if abs(math.hypot(*self.direction) - 1) > RIGID:
-            raise ValueError("direction must have length 1")
-        return self
-
-
-class MaterialTable(Table):
-    """What of a material was edited. index: among materials of one name."""
-
-    name: str
-    index: Annotated[int, Field(ge=0)]
-    albedo: tuple[Unit, Unit, Unit] | None = None
-    emission: Emitted | None = None
-    opacity: Unit | None = None
-
-
-class CameraTable(Table):
-    """world_from_camera: rows of a rigid matrix."""
-
-    world_from_camera: tuple[tuple[float, float, float, float], ...]
-    yfov: Annotated[float, Field(gt=0.0, lt=math.pi)]
-    distance: Annotated[float, Field(gt=0.0)]
-
-    @model_validator(mode="after")
-    def _rigid(self) -> Self:
-        matrix = np.array(self.world_from_camera)
-        if matrix.shape != (4, 4) or not np.allclose(matrix[3], (0, 0, 0, 1)):
-            raise ValueError("must be a 4 by 4 matrix")
-        turn = matrix[:3, :3]
-        if np.abs(turn @ turn.T - np.eye(3)).max() > RIGID or np.linalg.det(turn) < 0:
-            raise ValueError("must be rigid")
-        return self
-
-
-class SceneTable(Table):
-    """Where the scene came from and how it was read. relative: to the folder of the file; digest: of the scene's file."""
-
-    source: str
-    relative: str | None = None
-    digest: str | None = None
-    file: dict[str, Any]
-    default_light: bool
-    sky: SkyTable | None = None
-
-
-class Document(Table):
-    """lights, sky: all of them, where they were edited. settings: as of ``settings.checked``."""
-
-    glowtree: str
-    scene: SceneTable
-    settings: dict[str, Any]
-    materials: list[MaterialTable] = []
-    lights: list[LightTable] | None = None
-    sky: SkyTable | None = None
-    no_sky: bool = False
-    camera: CameraTable
-    bookmarks: dict[Annotated[str, Field(pattern="^[1-9]$")], CameraTable] = {}
-
-    @property
-    def edits(self) -> tuple[object, ...]:
-        """What of it was made by hand and would be missed."""
-        return self.materials, self.lights, self.sky, self.no_sky, self.bookmarks
 
 
 def document_of(view: View, tables: Mapping[str, Options], folder: Path) -> Document:
@@ -153,12 +52,14 @@ def document_of(view: View, tables: Mapping[str, Options], folder: Path) -> Docu
     from app import __version__
 
     session = view.session
-    came, now = session.unedited, session.edited_scene
+    came, now = session.read, session.edited_scene
     return Document(
         glowtree=__version__,
         scene=_scene(view, folder),
         settings={"solver": session.chosen_solver} | {name: _given(options) for name, options in tables.items()},
-        materials=_edited(came.materials, now.materials),
+        area_lamps=[_area_lamp(lamp) for lamp in session.asked_surfaces.lamps],
+        removed=[_key(key) for key in session.asked_surfaces.removed],
+        materials=_edited(session.unedited.materials, now.materials),
         lights=None if now.lights == came.lights else [_light(light) for light in now.lights],
         sky=None if now.sky is came.sky or now.sky is None else _sky(now.sky),
         no_sky=now.sky is None and came.sky is not None,
@@ -180,10 +81,8 @@ def _given(options: Options) -> dict[str, Any]:
 
 
 def _edited(came: tuple[Material, ...], now: tuple[Material, ...]) -> list[MaterialTable]:
-    seen: dict[str, int] = {}
     edited = []
-    for before, after in zip(came, now, strict=True):
-        index = seen[after.name] = seen.get(after.name, -1) + 1
+    for (_, index), before, after in zip(keys_of(came), came, now, strict=True):
         changes = {name: getattr(after, name) for name in NUMBERS if getattr(after, name) != getattr(before, name)}
         if changes:
             edited.append(MaterialTable(name=after.name, index=index, **changes))
@@ -193,6 +92,15 @@ def _edited(came: tuple[Material, ...], now: tuple[Material, ...]) -> list[Mater
 def _light(light: Light) -> LightTable:
     values = dataclasses.asdict(light)
     return LightTable(**values | {"range": None if math.isinf(light.range) else light.range})
+
+
+def _area_lamp(lamp: AreaLamp) -> AreaLampTable:
+    values = {field.name: getattr(lamp, field.name) for field in dataclasses.fields(lamp)}
+    return AreaLampTable(**values | {"of": None if lamp.of is None else _key(lamp.of)})
+
+
+def _key(key: Key) -> KeyTable:
+    return KeyTable(name=key[0], index=key[1])
 
 
 def _sky(sky: Sky) -> SkyTable:
@@ -277,16 +185,46 @@ def reading_of(document: Document) -> Reading:
     return Reading(file, scene.default_light, None if scene.sky is None else sky_of(scene.sky, None))
 
 
+def version_of(document: Document) -> Version:
+    """What it makes of the scene that is read, before that is cut."""
+    surfaces = surfaces_of(document)
+
+    def make(scene: Scene) -> Scene:
+        lights = scene.lights if document.lights is None else tuple(light_of(light) for light in document.lights)
+        return with_surfaces(scene, surfaces).with_lights(lights).with_sky(_sky_then(document, scene.sky))
+
+    return Version(surfaces, make)
+
+
+def surfaces_of(document: Document) -> Surfaces:
+    """That were added and removed."""
+    return Surfaces(
+        tuple(area_lamp_of(lamp) for lamp in document.area_lamps), tuple(_key_of(key) for key in document.removed)
+    )
+
+
+def _sky_then(document: Document, came: Sky | None) -> Sky | None:
+    """The sky of a scene that came with that one."""
+    if document.no_sky:
+        return None
+    image = None if came is None else came.image
+    if document.sky is None or (document.sky.kind == "image" and image is None):
+        return came
+    return sky_of(document.sky, image)
+
+
 # -- put back ----------------------------------------------------------------------------------------------------------
 
 
 def put_back(document: Document, view: View) -> list[str]:
     """Edit the scene that has just been opened as the document says, and look at it from there; notes of what could not be
     done."""
-    session, came = view.session, view.session.unedited
-    materials, notes = _put_materials(document.materials, came.materials)
-    if materials != came.materials:
+    session, came = view.session, view.session.read
+    notes = _missing(document, came.materials)
+    materials, more = _put_materials(document.materials, session.unedited.materials)
+    if materials != session.unedited.materials:
         session.set_materials(materials)
+    notes += more
     if document.lights is not None:
         session.set_lights(tuple(light_of(light) for light in document.lights))
     if document.no_sky:
@@ -300,6 +238,14 @@ def put_back(document: Document, view: View) -> list[str]:
     view.camera = camera_of(document.camera)
     view.bookmarks = {int(place): camera_of(camera) for place, camera in document.bookmarks.items()}
     return notes
+
+
+def _missing(document: Document, came: tuple[Material, ...]) -> list[str]:
+    """What to say of surfaces that are not there to be copied or removed."""
+    known, surfaces = set(keys_of(came)), surfaces_of(document)
+    asked = [*(lamp.of for lamp in surfaces.lamps if lamp.of is not None), *surfaces.removed]
+    names = list(dict.fromkeys(name or "a material without name" for name, _ in set(asked) - known))
+    return [f"the scene has no {', '.join(names[:3])} any more: lamps of it are lost"] if names else []
 
 
 def _put_materials(edits: list[MaterialTable], came: tuple[Material, ...]) -> tuple[tuple[Material, ...], list[str]]:
@@ -321,6 +267,15 @@ def light_of(table: LightTable) -> Light:
     return Light(**values | {"range": math.inf if table.range is None else table.range})
 
 
+def area_lamp_of(table: AreaLampTable) -> AreaLamp:
+    values = {field.name: getattr(table, field.name) for field in dataclasses.fields(AreaLamp)}
+    return AreaLamp(**values | {"of": None if table.of is None else _key_of(table.of)})
+
+
+def _key_of(table: KeyTable) -> Key:
+    return table.name, table.index
+
+
 def sky_of(table: SkyTable, image: Any) -> Sky:
     """image: of a sky that is one."""
     values = table.model_dump(exclude={"sun"})
@@ -332,4 +287,4 @@ def camera_of(table: CameraTable) -> CameraView:
     return CameraView(np.array(table.world_from_camera, np.float64), table.yfov, table.distance)
 
 
-__all__ = ["Document", "digest_of", "document_of", "found", "put_back", "read_document", "reading_of"]
+__all__ = ["Document", "digest_of", "document_of", "found", "put_back", "read_document", "reading_of", "version_of"]

@@ -7,16 +7,24 @@ from collections.abc import Mapping
 
 from app.errors import UserError
 from app.options import Options
+from app.scene.area_lamps import Key, keys_of
 from app.scene.lights import Light
-from app.scene.model import F64, Material
+from app.scene.model import F64, Material, Scene
 from app.scene.sky import Sky
 from app.session.flicker import flickering
 from app.session.solved_scene import SolvedScene
+from app.session.versions import MaterialEdits, edits_of, with_edits
 from app.solvers import SOLVERS
 
 
 class EditableScene(SolvedScene):
-    """A solved scene that can be edited: charts and texels stay, and the light where its solver can solve for the difference."""
+    """A solved scene that can be edited: charts and texels stay, and the light where its solver can solve for the difference.
+
+    unedited: the scene as it was cut, with materials as they came.
+    """
+
+    unedited: Scene
+    _away: Mapping[Key, Material]  # edits of lamps that are not there, but may come back
 
     # -- the solver ----------------------------------------------------------------------------------------------------
 
@@ -98,6 +106,17 @@ class EditableScene(SolvedScene):
         self.run.set_materials(materials)
         if self.solver.issued == 0:
             self._light_begins()
+
+    @property
+    def material_edits(self) -> dict[Key, Material]:
+        """Materials that were edited, also of lamps that are not there now."""
+        return {**self._away, **edits_of(self.unedited.materials, self.materials)}
+
+    def set_material_edits(self, edits: MaterialEdits) -> None:
+        """Have these edits of materials, and no others."""
+        known = set(keys_of(self.unedited.materials))
+        self._away = {key: material for key, material in edits.items() if key not in known}
+        self.set_materials(with_edits(self.unedited.materials, edits))
 
     def set_sky(self, sky: Sky | None) -> None:
         """Another sky, or none. Raises UserError where the solver cannot light by one."""

@@ -32,11 +32,12 @@ class Knob:
 
 @dataclass
 class Step:
-    """Values of the knobs that were changed together, by name."""
+    """Values of the knobs that were changed together, by name. there: whether what it takes a while to come has come."""
 
     before: dict[str, Any] = field(default_factory=dict)
     after: dict[str, Any] = field(default_factory=dict)
     words: str = ""
+    there: bool = False
 
 
 class EditHistory:
@@ -89,8 +90,21 @@ class EditHistory:
         last = self._past[-2] if len(self._past) > 1 else None
         if step.before == step.after:
             self._past.pop()
-        elif waits and last is not None and (last.before, last.after) == (step.after, step.before):
+        elif waits and last is not None and not last.there and (last.before, last.after) == (step.after, step.before):
             del self._past[-2:]
+
+    def arrived(self, name: str, knobs: Sequence[Knob]) -> None:
+        """What the last step of knob ``name`` waited for is there: what has changed since the last look came with it."""
+        now = {knob.name: knob.get() for knob in knobs}
+        known, self._known = self._known, now
+        step = next((step for step in reversed(self._past) if name in step.after), None)
+        if known is None or step is None:
+            return
+        step.there = True
+        for key in now.keys() & known.keys():
+            if now[key] != known[key]:
+                step.before.setdefault(key, known[key])
+                step.after[key] = now[key]
 
     # -- back and forth ------------------------------------------------------------------------------------------------
 

@@ -20,7 +20,7 @@ from app.atlas.options import AtlasOptions
 from app.errors import UserError
 from app.lightmap.options import LightmapOptions
 from app.options import Options
-from app.session.document import Document, document_of, found, put_back, read_document, reading_of
+from app.session.document import Document, document_of, found, put_back, read_document, reading_of, version_of
 from app.session.light_state import light_state, restore_light
 from app.session.loading import Loading
 from app.session.session import Cut
@@ -137,7 +137,7 @@ class Keeping:
             settings.of("lightmap", LightmapOptions()),
             settings.solver or session.chosen_solver,
         )
-        session.open(source, reading=reading, cut=cut)
+        session.open(source, reading=reading, cut=cut, version=version_of(document))
         assert session.loading is not None
         self._coming = Coming(session.loading, document, settings, state.part(LIGHT), path, note, aside)
 
@@ -266,7 +266,7 @@ def _now(view: View) -> tuple[object, float]:
     """What was made by hand, and seconds of solving."""
     session = view.session
     scene = session.edited_scene
-    return (scene.materials, scene.lights, scene.sky, dict(view.bookmarks)), session.run.seconds
+    return (session.asked_surfaces, scene.materials, scene.lights, scene.sky, dict(view.bookmarks)), session.run.seconds
 
 
 def _worth(now: tuple[Any, float], saved: tuple[Any, float], *, seconds: float | None = None) -> bool:

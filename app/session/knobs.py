@@ -11,7 +11,10 @@ import numpy as np
 from app.options import Options
 from app.render.camera import CameraView
 from app.render.options import DisplayOptions
+from app.scene.area_lamps import Surfaces, keys_of
+from app.scene.model import Material
 from app.session.edits import Knob
+from app.session.versions import MaterialEdits
 from app.session.view import View
 
 WHEEL_SECONDS = 0.5  # between two notches of the wheel, at most, that are one move of the camera
@@ -22,7 +25,13 @@ def knobs_of(view: View) -> tuple[Knob, ...]:
     """All knobs of an open scene."""
     session = view.session
     return (
-        Knob("materials", lambda: session.materials, session.set_materials, _materials),
+        Knob("surfaces", lambda: session.asked_surfaces, session.change_surfaces, _surfaces, waits=True),
+        Knob(
+            "materials",
+            lambda: session.material_edits,
+            session.set_material_edits,
+            lambda a, b: _materials(a, b, session.unedited.materials),
+        ),
         Knob("lights", lambda: session.edited_scene.lights, session.set_lights, _lights),
         Knob("sky", lambda: session.edited_scene.sky, session.set_sky, _sky),
         Knob("solver", lambda: session.chosen_solver, session.set_solver, lambda a, b: "solver", waits=True),
@@ -91,8 +100,18 @@ def _solvers(before: Mapping[str, Options], after: Mapping[str, Options]) -> str
     return ", ".join(said(before[name], after[name]) for name in before if before[name] != after[name])
 
 
-def _materials(before: Sequence[Any], after: Sequence[Any]) -> str:
-    return _things(before, after, "material")
+def _surfaces(before: Surfaces, after: Surfaces) -> str:
+    if before.removed != after.removed:
+        return f"lamp {'added' if len(after.removed) < len(before.removed) else 'removed'}"
+    return _things(before.lamps, after.lamps, "lamp")
+
+
+def _materials(before: MaterialEdits, after: MaterialEdits, came: Sequence[Material]) -> str:
+    """Edits of materials, and these as they came."""
+    known = dict(zip(keys_of(came), came, strict=True))
+    others = [key for key in known if before.get(key) != after.get(key)]
+    one, other = ([edits.get(key, known[key]) for key in others] for edits in (before, after))
+    return _things(one, other, "material")
 
 
 def _lights(before: Sequence[Any], after: Sequence[Any]) -> str:

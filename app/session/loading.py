@@ -31,9 +31,10 @@ from app.visibility.rays import tree_of
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A tile pool and what of it is uploaded, how it was cut and is held, the exposure to open it with [EV] if that was asked
-    for, and how long each stage took [s]."""
+    """The scene as it was read, the tile pool of it as it was made and cut, what of that is uploaded, how it was cut and is held,
+    the exposure to open it with [EV] if that was asked for, and how long each stage took [s]."""
 
+    read: Scene
     pool: TilePool
     arrays: dict[str, Array]
     atlas: AtlasOptions
@@ -51,14 +52,16 @@ def read_and_unfold(
     file: FileOptions | None = None,
     sky: Sky | None = None,
     roots: bool = False,
+    make: Callable[[Scene], Scene] | None = None,
     show: Callable[[FlatScene], None] | None = None,
-) -> tuple[Scene, Charts, dict[str, float]]:
-    """The scene, cut where its surfaces meet, its charts, and the seconds of both stages. file: its unit and axes, guessed if
-    None. roots: whether texels are the coarsest of quadtrees. show: is given what can be drawn as soon as the scene is read.
-    Raises UserError (SceneError)."""
+) -> tuple[Scene, Scene, Charts, dict[str, float]]:
+    """The scene as it was read, what ``make`` makes of it, cut where its surfaces meet, its charts, and the seconds of both
+    stages. file: its unit and axes, guessed if None. roots: whether texels are the coarsest of quadtrees. show: is given what can
+    be drawn as soon as the scene is read. Raises UserError (SceneError)."""
     start = time.perf_counter()
     tell("reading the file", 0.0)
-    scene = source if isinstance(source, Scene) else load_scene(source, file, default_light=default_light, sky=sky)
+    read = source if isinstance(source, Scene) else load_scene(source, file, default_light=default_light, sky=sky)
+    scene = read if make is None else make(read)
     seconds = {"read": time.perf_counter() - start}
     if show is not None:
         start = time.perf_counter()
@@ -67,7 +70,7 @@ def read_and_unfold(
     start = time.perf_counter()
     tell("unfolding surfaces", 0.1)
     scene, charts = charts_of(scene, atlas, roots=roots, progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share))
-    return scene, charts, seconds | {"unfold": time.perf_counter() - start}
+    return read, scene, charts, seconds | {"unfold": time.perf_counter() - start}
 
 
 def load(
@@ -85,15 +88,11 @@ def load(
     show: Callable[[FlatScene], None] | None = None,
 ) -> Loaded:
     """Read a scene, or take one as it is; unfold it, cut it into texels, with ``expose`` find its exposure, and with ``rays``
-    build the tree that they walk. file, show: as of ``read_and_unfold``. make: makes another scene of one that is taken as it is.
-    Raises UserError (SceneError)."""
+    build the tree that they walk. file, make, show: as of ``read_and_unfold``. Raises UserError (SceneError)."""
     tell: Progress = progress or (lambda stage, share: None)
-    if make is not None:
-        assert isinstance(source, Scene)
-        source = make(source)
     options = options or LightmapOptions()
-    scene, charts, seconds = read_and_unfold(
-        source, atlas, default_light, tell, file=file, sky=sky, roots=options.adaptive, show=show
+    read, scene, charts, seconds = read_and_unfold(
+        source, atlas, default_light, tell, file=file, sky=sky, roots=options.adaptive, make=make, show=show
     )
     start = time.perf_counter()
 
@@ -118,12 +117,12 @@ def load(
         tree_of(pool, lambda share: tell(SORTING, 0.8 + 0.2 * share))
         seconds["rays"] = time.perf_counter() - start
     tell("done", 1.0)
-    return Loaded(pool, arrays, atlas, options, exposure, seconds)
+    return Loaded(read, pool, arrays, atlas, options, exposure, seconds)
 
 
 class Loading(BackgroundTask[Loaded]):
     """A scene on its way, see ``load``. solver: by name, what it is made ready for. atlas, light: how it is cut and held.
-    version: what the open scene becomes, if it is that. flat: what can be drawn of a scene as soon as it is read."""
+    version: what is made of it, if anything. flat: what can be drawn of a scene as soon as it is read."""
 
     def __init__(
         self,

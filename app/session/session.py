@@ -18,6 +18,7 @@ from app.errors import UserError
 from app.gpu import Gpu
 from app.lightmap.options import LightmapOptions
 from app.options import Options
+from app.scene.area_lamps import Surfaces, keys_of, with_surfaces
 from app.scene.lights import Light
 from app.scene.model import Scene
 from app.scene.options import FileOptions
@@ -26,7 +27,7 @@ from app.session.editable_scene import EditableScene
 from app.session.loading import Loading, load
 from app.session.opening import Opened, Opening, Prepare, Ready
 from app.session.solver_choice import SolverChoice
-from app.session.versions import Version
+from app.session.versions import Version, with_edits
 from app.solvers import DEFAULT_SOLVER, SOLVERS
 from app.util.background import BackgroundTask
 
@@ -55,10 +56,10 @@ class Session(EditableScene):
     through ``message`` instead. Whoever makes it releases it.
 
     options: of the solver that is at work. atlas, light: how scenes are cut, and how their light is held. expose_on_open:
-    whether the exposure is forecast of a scene that opens. unedited: the open scene as it was read, the same through edits and
-    however it is cut. edited: what edits are of: another object where those of before are not edits of what is open now.
-    reading: how it was read. has_own_surfaces: whether it has others than its file. load_seconds: of each stage of opening.
-    message: what the user should know.
+    whether the exposure is forecast of a scene that opens. read: the open scene as it was read. surfaces: that were added to it
+    and removed; unedited: it with these as it was cut, the same through other edits. edited: what edits are of: another object
+    where those of before are not edits of what is open now. fixed: why its surfaces have to stay as they are, if so. reading: how
+    it was read. load_seconds: of each stage of opening. message: what the user should know.
     """
 
     def __init__(
@@ -79,12 +80,13 @@ class Session(EditableScene):
         super().__init__(gpu, choice, atlas or AtlasOptions(), light or LightmapOptions(), default_light=default_light)
         self.sky, self.expose_on_open = sky, expose_on_open
         self.load_seconds: dict[str, float] = {}
-        self.unedited: Scene
+        self.read: Scene
+        self.surfaces = Surfaces()
+        self.fixed: str | None = None
         self.source: str | Path
         self._opening = Opening(gpu)
         self._on_open: Opened | None = None
         self.edited: object = None
-        self.has_own_surfaces = False
         self._then_reference: Path | None = None
         self.reading = self._reading = Reading()
 
@@ -102,16 +104,16 @@ class Session(EditableScene):
         reference: Path | None = None,
         reading: Reading | None = None,
         cut: Cut | None = None,
+        version: Version | None = None,
     ) -> None:
         """Start to load in the background; ``poll`` swaps the scene when it is there. file: its unit and axes,
-        guessed if None. reference: a bake to open then. reading, cut: instead of the session's own."""
+        guessed if None. reference: a bake to open then. reading, cut: instead of the session's own. version: of what is read."""
         self._then_reference = reference
         self._reading = reading or Reading(file, self.default_light, self.sky)
         cut = cut or Cut(self.atlas, self.light, self.chosen_solver)
         more: dict[str, Any] = {"default_light": self._reading.default_light, "expose": self.expose_on_open}
-        self._opening.begin(
-            Loading(source, cut.atlas, cut.light, cut.solver, file=self._reading.file, sky=self._reading.sky, **more)
-        )
+        more |= {"file": self._reading.file, "sky": self._reading.sky, "version": version}
+        self._opening.begin(Loading(source, cut.atlas, cut.light, cut.solver, **more))
 
     def open_now(
         self,
@@ -151,19 +153,22 @@ class Session(EditableScene):
             solver.release()
             lightmap.release()
             raise
-        version = version if self._opened and version is not None and version.of is self.unedited else None
-        same_scene = self._opened and (scene is self.unedited or version is not None)
+        surfaces = Surfaces() if version is None else version.surfaces
+        same_scene = self._opened and (scene is self.unedited or (version is not None and version.of is self.read))
         flickers = same_scene and self.flickers
-        if not same_scene or (version is not None and not version.keeps_materials):
-            self.edited, self.has_own_surfaces = object(), same_scene
+        edits = self.material_edits if same_scene else {}
+        self._away = {key: material for key, material in edits.items() if key not in keys_of(scene.materials)}
+        if not same_scene:
+            self.edited = object()
         if same_scene and self.scene is not scene:
-            lightmap.set_materials(self.materials if version is None else version.materials(scene, self.materials))
+            lightmap.set_materials(with_edits(scene.materials, edits))
             lightmap.set_sky(self.scene.sky)
             lightmap.set_lights(self.scene.lights)
             solver.reset()
         self.close()
         self.reading = self.reading if same_scene else self._reading
-        self.lightmap, self.solver, self.unedited = lightmap, solver, scene
+        self.lightmap, self.solver, self.unedited, self.surfaces = lightmap, solver, scene, surfaces
+        self.read = self.read if same_scene else loaded.read
         self._choice.at_work = ready.solver_name
         self.atlas, self.light = loaded.atlas, lightmap.options
         self.load_seconds = loaded.seconds | {"upload": time.perf_counter() - ready.began}
@@ -209,17 +214,35 @@ class Session(EditableScene):
     def cut_anew(self, atlas: AtlasOptions, *, adaptive: bool | None = None) -> None:
         """Cut the open scene anew, in the background; its materials as edited, exposure and camera stay. adaptive: whether into
         quadtrees, as it is if None. Raises UserError while another scene is on its way."""
-        if self.loading is not None and not (self._opened and self.loading.source is self.unedited):
-            raise UserError(f"{self.loading.name} is loading: cut {self.name or 'it'} anew before or after that")
         light = self.light if adaptive is None else self.light.replace(adaptive=adaptive)
-        self._opening.begin(Loading(self.unedited, atlas, light, self.chosen_solver))
+        self._cut(atlas, light, self.asked_surfaces)
 
     @property
     def asked_cut(self) -> tuple[AtlasOptions, bool]:
         """How the open scene is cut, and whether into quadtrees; as it was asked for last, where that is on its way."""
-        cuts = self._opened and self.loading is not None and self.loading.source is self.unedited
-        cut = self.loading if cuts and self.loading is not None else self
+        cut = self._next or self
         return cut.atlas, cut.light.adaptive
+
+    def _cut(self, atlas: AtlasOptions, light: LightmapOptions, surfaces: Surfaces, *, afresh: bool = False) -> None:
+        """Cut the open scene anew. afresh: also its own surfaces, which may have other sides that are lit."""
+        if self.loading is not None and self._next is None:
+            raise UserError(f"{self.loading.name} is loading: cut {self.name or 'it'} anew before or after that")
+        same, now = surfaces == self.surfaces and not afresh, self.edited_scene
+
+        def make(scene: Scene) -> Scene:
+            return with_surfaces(scene, surfaces).with_sky(now.sky).with_lights(now.lights)
+
+        version = Version(surfaces, (lambda scene: scene) if same else make, self.read)
+        source = self.unedited if same else self.read
+        dark = not same and not now.emits
+        self._opening.begin(Loading(source, atlas, light, self.chosen_solver, expose=dark, version=version))
+
+    @property
+    def _next(self) -> Loading | None:
+        """What is on its way, if it is a version of what is open."""
+        loading = self.loading if self._opened else None
+        of_this = loading is not None and loading.version is not None and loading.version.of is self.read
+        return loading if of_this else None
 
     def set_light(self, light: LightmapOptions) -> None:
         """Other ways to hold the light: thresholds of quadtrees act on the next work, another format begins again, and quadtrees
@@ -236,38 +259,45 @@ class Session(EditableScene):
             else:
                 self.run.options_changed()
 
-    def change_surfaces(self, version: Version) -> None:
-        """Let the open scene have other surfaces, cut in the background: its edits, exposure and camera stay, light begins again.
-        Raises UserError while another scene is on its way."""
-        if self.loading is not None:
-            raise UserError(f"{self.loading.name} is loading: change {self.name} before or after that")
-        dark = not self.edited_scene.emits
-        self._opening.begin(
-            Loading(version.of, self.atlas, self.light, self.chosen_solver, expose=dark, version=version)
-        )
+    # -- with other surfaces -------------------------------------------------------------------------------------------
+
+    def change_surfaces(self, surfaces: Surfaces) -> None:
+        """Let the open scene have these surfaces beside its own, cut in the background: its edits, exposure and camera stay,
+        light begins again. Raises UserError where its surfaces are ``fixed``, and as ``cut_anew``."""
+        if self.fixed is not None:
+            raise UserError(f"the surfaces of {self.name} stay as they are: {self.fixed}")
+        atlas, adaptive = self.asked_cut
+        self._cut(atlas, self.light.replace(adaptive=adaptive), surfaces)
+
+    @property
+    def asked_surfaces(self) -> Surfaces:
+        """What was added to the open scene and removed; as it was asked for last, where that is on its way."""
+        version = None if self._next is None else self._next.version
+        return self.surfaces if version is None else version.surfaces
 
     def set_sky(self, sky: Sky | None) -> None:
         """Another sky, or none; where nothing from outside lit the scene before, it is cut anew. Raises UserError where the
-        solver cannot light by one."""
-        before = self.edited_scene
+        solver cannot light by one, or surfaces are ``fixed`` that it needs cut."""
+        opens = self._opens(sky, self.edited_scene.lights)
         super().set_sky(sky)
-        self._open_to_the_sky(before)
+        if opens:
+            self._cut(self.atlas, self.light, self.surfaces, afresh=True)
 
     def set_lights(self, lights: tuple[Light, ...]) -> None:
-        """Other lamps without area; as another sky, they may have the scene cut anew. Raises UserError where the solver cannot
-        light by them."""
-        before = self.edited_scene
+        """Other lamps without area; as another sky, they may have the scene cut anew. Raises UserError as ``set_sky``."""
+        opens = self._opens(self.edited_scene.sky, lights)
         super().set_lights(lights)
-        self._open_to_the_sky(before)
+        if opens:
+            self._cut(self.atlas, self.light, self.surfaces, afresh=True)
 
-    def _open_to_the_sky(self, before: Scene) -> None:
-        """Cut the scene anew where it has a sky or lights now and had none ``before``: sides that face nothing may be lit now."""
-        now = self.edited_scene
-        if before.open_to_lights or not now.open_to_lights or not self.charts.dark_faces or self.loading is not None:
-            return
-        sky, lights = now.sky, now.lights
-        same = tuple(range(len(self.unedited.materials)))
-        self.change_surfaces(Version(self.unedited, lambda scene: scene.with_sky(sky).with_lights(lights), same))
+    def _opens(self, sky: Sky | None, lights: tuple[Light, ...]) -> bool:
+        """Whether sides that face nothing may be lit by these alone, and were not cut for that. Raises UserError where they
+        cannot be now."""
+        closed = not self.edited_scene.open_to_lights and self.charts.dark_faces > 0 and self.loading is None
+        opens = closed and (sky is not None or bool(lights))
+        if opens and self.fixed is not None:
+            raise UserError(f"sides that only it lights would have to be cut: {self.fixed}")
+        return opens
 
     # -- frame by frame ------------------------------------------------------------------------------------------------
 

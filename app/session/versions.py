@@ -1,34 +1,37 @@
-"""A version of the open scene has other surfaces, a lamp more or less: it is cut in the background, and then takes its place."""
+"""A version of a scene has other surfaces, a lamp more or less; edits of materials pass from one version to another."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from app.scene.area_lamps import Key, Surfaces, keys_of
 from app.scene.model import Material, Scene
+
+MaterialEdits = Mapping[Key, Material]  # those that are others than they came
 
 
 @dataclass(frozen=True, eq=False)
 class Version:
-    """Other surfaces for a scene that is open.
+    """A scene with other surfaces, cut in the background, that then takes the place of what is open.
 
-    of: that scene, as it was read. make: makes the other one from it. origins: for each material of the other one, its index in
-    the open scene; None where it is new.
+    surfaces: that it has. make: makes it from what is loaded. of: the open scene as it was read, of a version of that.
     """
 
-    of: Scene
+    surfaces: Surfaces
     make: Callable[[Scene], Scene]
-    origins: tuple[int | None, ...]
-
-    @property
-    def keeps_materials(self) -> bool:
-        """Whether the materials are the same ones, in the same order."""
-        return self.origins == tuple(range(len(self.of.materials)))
-
-    def materials(self, made: Scene, now: Sequence[Material]) -> tuple[Material, ...]:
-        """Those of the version that was made, as they are ``now`` in the open scene where they come from there."""
-        own = zip(self.origins, made.materials, strict=True)
-        return tuple(new if origin is None else now[origin] for origin, new in own)
+    of: Scene | None = None
 
 
-__all__ = ["Version"]
+def edits_of(came: tuple[Material, ...], now: tuple[Material, ...]) -> dict[Key, Material]:
+    """Materials that are others now."""
+    pairs = zip(keys_of(came), came, now, strict=True)
+    return {key: after for key, before, after in pairs if after is not before}
+
+
+def with_edits(came: tuple[Material, ...], edits: MaterialEdits) -> tuple[Material, ...]:
+    """Materials as edited; edits of others than these do nothing."""
+    return tuple(edits.get(key, material) for key, material in zip(keys_of(came), came, strict=True))
+
+
+__all__ = ["MaterialEdits", "Version", "edits_of", "with_edits"]

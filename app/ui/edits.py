@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 def watch(view: View, state: State, seconds: float) -> None:
     """Note what was edited in this frame, ``seconds`` after the last."""
+    if state.version is not view.session.unedited:  # other surfaces, which an edit has waited for
+        state.version = view.session.unedited
+        state.edits.arrived("surfaces", _knobs(view, state))
     state.edits.watch(_knobs(view, state), held=state.held or state.flight is not None, seconds=seconds)
 
 

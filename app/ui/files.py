@@ -26,7 +26,6 @@ IRRADIANCE = ".exr"
 SETTINGS = ".toml"
 AUTHORED = "The scenes that come along are under File > Scenes."
 BAKES = "'glowtree bake' writes an irradiance.exr."
-SURFACES = "the session does not keep lamps with area that were added or removed: all else of it is saved"
 WRITTEN = "File > Settings > Save settings writes one."
 
 
@@ -168,8 +167,6 @@ def _save(view: View, state: State, path: Path) -> None:
     state.keeping.save(view, path, settings.tables(view, state))
     state.recent.add(path)
     state.notify(f"saved {path}")
-    if view.session.has_own_surfaces:
-        state.notify(SURFACES, error=True)
     if leaving:
         state.requests.append(Request.QUIT)
 

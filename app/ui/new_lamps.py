@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from imgui_bundle import imgui
 
-from app.scene.ceiling_light import MEAN_IRRADIANCE, with_ceiling_light
-from app.scene.lamp_surfaces import new_name, with_copy, with_rectangle, without_material
+from app.scene.area_lamps import AreaLamp, keys_of, middle_of
+from app.scene.ceiling_light import MEAN_IRRADIANCE, ceiling_light
+from app.scene.lamp_surfaces import new_name
 from app.scene.lights import Light
 from app.scene.model import RGB
 from app.scene.sky import DEFAULT_SUN, SUN_ANGLE, Sky, Sun
-from app.session.versions import Version
 from app.ui import theme, widgets
 from app.ui.state import State
 
 if TYPE_CHECKING:
-    from app.scene.model import F64, Scene
+    from app.scene.model import F64
     from app.session.view import View
 
 ICONS = theme.ICONS
@@ -78,7 +78,7 @@ def why_not(view: View, kind: Kind) -> str | None:
     session = view.session
     family = session.family
     if not kind.lamps:
-        return LOADING if session.loading is not None else None
+        return why_fixed(view)
     if kind.lamps not in family.lamps:
         return f"{family.title} knows emitting surfaces alone; other solvers know all lamps"
     return "there is a sky, see below" if kind.label == "Sky" and session.edited_scene.sky is not None else None
@@ -104,27 +104,41 @@ def light_beside(view: View, light: Light, size: float) -> Light:
     return replace(light, name=name, position=light.position if light.from_afar else (x + EDGE * size / 2, y, z))
 
 
+def added_lamp(view: View, index: int) -> AreaLamp | None:
+    """The lamp with area that material ``index`` is of, if it was added."""
+    session = view.session
+    if index < len(session.read.materials):
+        return None
+    name = session.materials[index].name
+    return next(lamp for lamp in session.surfaces.lamps if lamp.name == name)
+
+
 def duplicate_surfaces(view: View, index: int) -> None:
     """The lamp of material ``index`` once more, beside itself."""
-    scene = view.session.unedited
+    scene, now = view.session.unedited, view.session.materials[index]
     corners = scene.corners[scene.material_ids == index].reshape(-1, 3)
     size = np.ptp(corners, axis=0)
     shift = np.where(np.arange(3) == np.argmax(size * (1, 0.5, 1)), 1.5 * size, 0.0)  # rather not upwards
+    x, y, z = (middle_of(scene, index) + shift).tolist()
+    like = added_lamp(view, index) or AreaLamp("", (x, y, z), now.emission, of=keys_of(scene.materials)[index])
     name = _name(view, scene.materials[index].name or "lamp")
-    lamp = view.session.materials[index]
-
-    def make(scene: Scene) -> Scene:
-        made = with_copy(scene, index, shift, name)
-        return made.with_materials((*made.materials[:-1], replace(made.materials[-1], emission=lamp.emission)))
-
-    view.session.change_surfaces(Version(scene, make, (*_all(scene), None)))
+    _add(view, replace(like, name=name, position=(x, y, z), emission=now.emission))
 
 
 def remove_surfaces(view: View, index: int) -> None:
     """Take the lamp of material ``index`` away, with its surfaces."""
-    scene = view.session.unedited
-    kept = tuple(origin for origin in _all(scene) if origin != index)
-    view.session.change_surfaces(Version(scene, lambda scene: without_material(scene, index), kept))
+    session, lamp = view.session, added_lamp(view, index)
+    now = session.asked_surfaces
+    if lamp is None:
+        less = replace(now, removed=(*now.removed, keys_of(session.read.materials)[index]))
+    else:
+        less = replace(now, lamps=tuple(other for other in now.lamps if other.name != lamp.name))
+    session.change_surfaces(less)
+
+
+def why_fixed(view: View) -> str | None:
+    """Why the surfaces of the open scene cannot be changed now."""
+    return LOADING if view.session.loading is not None else view.session.fixed
 
 
 def add_light(view: View, light: Light, state: State) -> None:
@@ -157,31 +171,36 @@ def _sky(view: View, state: State) -> None:
 
 
 def _ceiling(view: View, state: State) -> None:
-    scene, name = view.session.unedited, _name(view, "ceiling light")
-    version = Version(scene, lambda scene: with_ceiling_light(scene, name), (*_all(scene), None))
-    view.session.change_surfaces(version)
+    _add(view, ceiling_light(view.session.unedited, _name(view, "ceiling light")))
 
 
 def _area(view: View, state: State) -> None:
     """A square on the picked surface, or on what is in the middle of the view; its light falls on the ground plan as that of a
     ceiling light does."""
-    scene = view.session.unedited
-    low, high = scene.bounds
+    low, high = view.session.unedited.bounds
     size = float(np.linalg.norm(high - low))
+    edge = EDGE * size
     point, normal = _surface(view, state)
     if normal is None:
-        point, normal = point - EDGE * size * view.camera.forward, -view.camera.forward
-    aside = np.cross((0.0, 1.0, 0.0) if abs(normal[1]) < 0.9 else (1.0, 0.0, 0.0), normal)
-    aside *= EDGE * size / 2 / np.linalg.norm(aside)
-    up = np.cross(normal, aside)
-    middle = point + GAP * size * normal
-    corners = np.array([middle - aside - up, middle + aside - up, middle + aside + up, middle - aside + up])
-    ground = max(float((high - low)[0] * (high - low)[2]), (EDGE * size) ** 2)
-    L = MEAN_IRRADIANCE * ground / (math.pi * (EDGE * size) ** 2)
-    name = _name(view, "area light")
-    view.session.change_surfaces(
-        Version(scene, lambda scene: with_rectangle(scene, corners, name, (L, L, L)), (*_all(scene), None))
-    )
+        point, normal = point - edge * view.camera.forward, -view.camera.forward
+    across = np.cross((0.0, 1.0, 0.0) if abs(normal[1]) < 0.9 else (1.0, 0.0, 0.0), normal)
+    L = MEAN_IRRADIANCE * max(float((high - low)[0] * (high - low)[2]), edge**2) / (math.pi * edge**2)
+    name, middle = _name(view, "area light"), point + GAP * size * normal
+    _add(view, AreaLamp(name, _triple(middle), (L, L, L), (edge, edge), _unit(normal), _unit(across)))
+
+
+def _add(view: View, lamp: AreaLamp) -> None:
+    now = view.session.asked_surfaces
+    view.session.change_surfaces(replace(now, lamps=(*now.lamps, lamp)))
+
+
+def _triple(vector: F64) -> RGB:
+    x, y, z = np.asarray(vector, np.float64).tolist()
+    return x, y, z
+
+
+def _unit(vector: F64) -> RGB:
+    return _triple(np.asarray(vector, np.float64) / np.linalg.norm(vector))
 
 
 def _let_shine(view: View, edit: Callable[[], None]) -> None:
@@ -215,15 +234,14 @@ def _surface(view: View, state: State) -> tuple[F64, F64 | None]:
 
 
 def _name(view: View, kind: str) -> str:
-    return new_name(kind, [material.name for material in view.session.materials])
+    """That no material has, nor one that may come back."""
+    session = view.session
+    names = [material.name for material in session.materials] + [name for name, _ in session.material_edits]
+    return new_name(kind, names)
 
 
 def _light_name(view: View, kind: str) -> str:
     return new_name(kind, [light.name for light in view.session.edited_scene.lights])
-
-
-def _all(scene: Scene) -> range:
-    return range(len(scene.materials))
 
 
 KINDS = (
@@ -271,6 +289,6 @@ KINDS = (
 )
 
 __all__ = [
-    *("KINDS", "LOADING", "add_light", "buttons", "duplicate_surfaces", "is_lit", "light_beside", "pair_of_buttons"),
-    *("remove_surfaces", "used_materials", "why_not"),
+    *("KINDS", "add_light", "added_lamp", "buttons", "duplicate_surfaces", "is_lit", "light_beside", "pair_of_buttons"),
+    *("remove_surfaces", "used_materials", "why_fixed", "why_not"),
 ]

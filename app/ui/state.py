@@ -101,9 +101,9 @@ class State:
     and of which light. draw_rays: those of the picked texel, in the room. pointed: under the pointer, at which pixel.
     reveal_material: the list scrolls to the selected one. draw_lights: lamps without area, in the view. reference: of a solve
     in the background; layer: to go back to from the error. edits: of the open scene; held: whether a hand was at a control in
-    the last frame. used: of which scene, the materials that are somewhere. keeping: saves and opens sessions; asides: what
-    crashes have left, to be asked about; quit_when_saved: the user is leaving. order: of the next bake, as far as it was
-    edited; baking: the last.
+    the last frame. used: of which scene, the materials that are somewhere. version: of the open scene, that
+    edits are noted of. keeping: saves and opens sessions; asides: what crashes have left, to be asked about; quit_when_saved: the
+    user is leaving. order: of the next bake, as far as it was edited; baking: the last.
     """
 
     measured: bool = True
@@ -155,6 +155,7 @@ class State:
     light: int = 0
     area_lamp: int = 0
     used: tuple[object, tuple[int, ...]] = (None, ())
+    version: object = None
     light_held: bool = False
     draw_lights: bool = True
     atlas: AtlasOptions | None = None

@@ -15,9 +15,11 @@ from app.lightmap.options import LightmapOptions
 from app.render.camera import CameraView
 from app.render.false_colour import Scale, false_colour_scale
 from app.render.options import LAYERS, DisplayOptions
+from app.scene.area_lamps import Key, Surfaces
 from app.scene.lights import Light
 from app.scene.model import Material
 from app.scene.sky import Sky
+from app.session.versions import edits_of, with_edits
 from app.solvers import DEFAULT_SOLVER, SOLVERS, EnergyBalance, Inspection, ShootingOptions
 
 EMITTED = 34.6  # W
@@ -101,7 +103,7 @@ class FakeSession:
         self.gpu, self.opened, self.running, self.name, self.message = gpu, opened, True, "fake box", None
         self.loading: SimpleNamespace | None = None
         self.seconds = 0.3  # of solving
-        self.has_own_surfaces = False
+        self.surfaces, self.fixed = Surfaces(), None
         self.calls: list[tuple[object, ...]] = []
         self.session = self.run = self
         self.seconds = 0.3
@@ -116,7 +118,8 @@ class FakeSession:
         self.scene.corners = np.zeros((len(MATERIALS), 3, 3))
         self.scene.bounds, self.scene.material_ids = (np.zeros(3), np.ones(3)), np.arange(len(MATERIALS))
         self.scene.normals_areas = np.zeros((len(MATERIALS), 3)), np.ones(len(MATERIALS))
-        self.unedited, self.source, self.reading = self.scene, "fake box", object()
+        self.read = self.unedited = FakeScene(**vars(self.scene))
+        self.source, self.reading = "fake box", object()
         self.charts = SimpleNamespace(density=40.0, tile=16, warnings=(), size=(160, 96))
         self.lightmap = SimpleNamespace(space=FakeSpace())
         self.options, self.display = ShootingOptions(), DisplayOptions()
@@ -306,8 +309,20 @@ class FakeSession:
         self.set_materials(tuple(materials))
         self.calls.append(("set_material", index, dataclasses.replace(material)))
 
-    def change_surfaces(self, version: object) -> None:
-        self.calls.append(("change_surfaces", version))
+    @property
+    def material_edits(self) -> dict[Key, Material]:
+        return edits_of(self.unedited.materials, self.materials)
+
+    def set_material_edits(self, edits: dict[Key, Material]) -> None:
+        self.set_materials(with_edits(self.unedited.materials, edits))
+
+    @property
+    def asked_surfaces(self) -> Surfaces:
+        return self.surfaces
+
+    def change_surfaces(self, surfaces: Surfaces) -> None:
+        self.surfaces = surfaces
+        self.calls.append(("change_surfaces", surfaces))
 
     def expose_for_light_to_come(self) -> None:
         self.calls.append(("expose_for_light_to_come",))

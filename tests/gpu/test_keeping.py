@@ -15,14 +15,16 @@ import pytest
 from app.atlas.options import AtlasOptions
 from app.errors import UserError
 from app.gpu import Gpu
+from app.scene.area_lamps import Surfaces
 from app.scene.library import scene_path
 from app.scene.lights import Light
 from app.session import keeping as module
 from app.session.keeping import Keeping, check_session, drop
 from app.session.session import Session
 from app.session.view import View
+from app.ui import new_lamps
 from app.ui import settings as ui_settings
-from app.ui.new_lamps import duplicate_surfaces
+from app.ui.new_lamps import duplicate_surfaces, remove_surfaces
 from app.ui.state import State
 from app.util.state_file import read_state, write_state
 
@@ -172,16 +174,69 @@ def test_edits_find_their_materials_in_a_scene_that_has_changed(place: Callable[
     assert second.session.solver.issued == 0
 
 
-def test_a_lamp_with_area_is_a_surface_of_its_own(place: Callable[..., Place]) -> None:
+def emitters(place: Place) -> list[int]:
+    return [index for index in np.unique(place.session.scene.material_ids) if place.session.materials[index].emits]
+
+
+def settle(place: Place) -> None:
+    place.frames_until(lambda: place.session.on_its_way is None)
+
+
+def test_lamps_with_area_come_back_with_their_light(place: Callable[..., Place], tmp_path: Path) -> None:
+    """One that was copied and edited, and one under the ceiling, in the place of the scene's own."""
     one = place().open("cornell-box")
-    assert not one.session.has_own_surfaces
-    duplicate_surfaces(one.view, next(i for i, m in enumerate(one.session.materials) if m.emits))
-    one.frames_until(lambda: one.session.on_its_way is None)
-    assert one.session.has_own_surfaces
-    one.session.cut_anew(AtlasOptions(texels=1500))
-    one.frames_until(lambda: one.session.on_its_way is None)
-    assert one.session.has_own_surfaces, "of another cut of it, too"
-    assert not one.open("furnace").session.has_own_surfaces
+    own = emitters(one)[0]
+    duplicate_surfaces(one.view, own)
+    settle(one)
+    new_lamps.KINDS[0].add(one.view, one.state)
+    settle(one)
+    remove_surfaces(one.view, own)
+    settle(one)
+    copy, ceiling = emitters(one)
+    one.session.set_material(copy, dataclasses.replace(one.session.materials[copy], emission=(3.0, 2.0, 1.0)))
+    one.session.work(8)
+    one.session.run.settle()
+    assert one.keeping.unsaved(one.view)
+    file = one.save(tmp_path / "a.glow")
+    assert not one.keeping.unsaved(one.view)
+    light = one.session.lightmap.irradiance()
+
+    two = place().open(file)
+    assert two.notes == [] and two.session.message is None and two.session.surfaces == one.session.surfaces
+    both = ([dataclasses.asdict(material) for material in each.session.materials] for each in (one, two))
+    assert next(both) == next(both) and emitters(two) == [copy, ceiling]
+    np.testing.assert_array_equal(two.session.scene.corners, one.session.scene.corners)
+    assert two.session.solver.issued == one.session.solver.issued > 0
+    np.testing.assert_array_equal(two.session.lightmap.irradiance(), light)
+    assert not two.keeping.unsaved(two.view)
+    two.session.change_surfaces(Surfaces())
+    settle(two)
+    assert emitters(two) == [own], "as the scene is"
+
+
+def test_lamps_of_a_scene_that_has_changed_are_said(place: Callable[..., Place], tmp_path: Path) -> None:
+    scene = copied(tmp_path)
+    one = place().open(scene)
+    lamp = emitters(one)[0]
+    name = one.session.materials[lamp].name
+    duplicate_surfaces(one.view, lamp)
+    settle(one)
+    one.save(tmp_path / "a.glow")
+    scene.write_text(scene.read_text().replace(f'"{name}"', '"another"'))
+    two = place().open(tmp_path / "a.glow")
+    assert any(f"no {name} any more: lamps of it are lost" in note for note in two.notes)
+    assert len(two.session.materials) == len(one.session.materials) - 1
+
+
+def test_lights_for_which_a_scene_was_cut_anew_are_kept(place: Callable[..., Place], tmp_path: Path) -> None:
+    """A session whose surfaces have sides that only lamps without area light."""
+    one = place().open("cornell-box")
+    one.session.set_lights((Light("bulb", intensity=(1.0, 0.5, 0.25), position=(0.1, 0.2, 0.3)),))
+    settle(one)
+    one.session.work(8)
+    two = place().open(one.save(tmp_path / "a.glow"))
+    assert two.notes == [] and two.session.edited_scene.lights == one.session.edited_scene.lights
+    assert two.session.solver.issued == one.session.solver.issued > 0
 
 
 def test_a_failed_scene_leaves_all_as_it_was(place: Callable[..., Place], tmp_path: Path) -> None:

@@ -5,18 +5,22 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 from solver_scenes import grey, quads_scene, room
 
 from app.atlas.options import AtlasOptions
+from app.errors import UserError
 from app.gpu import Gpu
 from app.lightmap.options import LightmapOptions
+from app.scene.area_lamps import Surfaces
 from app.scene.model import Camera
+from app.session.baking import Baking, Order
 from app.session.session import Session
 from app.session.view import TRAPPED, View
-from app.ui import new_lamps
+from app.ui import edits, new_lamps
 from app.ui.new_lamps import KINDS, Kind
 from app.ui.state import State
 
@@ -85,10 +89,9 @@ def test_surfaces_come_and_go_and_edits_stay(dark: Dark, kind: Kind) -> None:
     session = dark.session
     red = dataclasses.replace(session.materials[1], albedo=(0.6, 0.1, 0.1))
     session.set_material(1, red)
-    before = session.unedited
     dark.add(kind)
     lamp = len(session.materials) - 1
-    assert session.materials[1] is red and session.materials[lamp].emits and session.unedited is not before
+    assert session.materials[1] is red and session.materials[lamp].emits and session.unedited is not session.read
     session.set_material(lamp, dataclasses.replace(session.materials[lamp], emission=(3.0, 2.0, 1.0)))
     new_lamps.duplicate_surfaces(dark.view, lamp)
     dark.wait()
@@ -99,6 +102,99 @@ def test_surfaces_come_and_go_and_edits_stay(dark: Dark, kind: Kind) -> None:
     assert len(session.materials) == lamp + 1 and session.materials[1] is red
     assert session.materials[lamp].emission == (1.0, 1.0, 1.0), "the other one stays, as it was edited"
     assert mean_light(dark) > 0
+
+
+def frame(dark: Dark) -> None:
+    edits.watch(dark.view, dark.state, 0.1)
+    dark.session.poll()
+
+
+def settle(dark: Dark) -> None:
+    """Frames, as the window has them, until nothing is on its way."""
+    end = time.monotonic() + PATIENCE
+    while dark.session.on_its_way is not None:
+        assert time.monotonic() < end
+        frame(dark)
+    frame(dark)
+
+
+@pytest.mark.parametrize("kind", SURFACES, ids=lambda kind: kind.label)
+def test_an_added_lamp_is_undone_in_one_step_and_done_again(dark: Dark, kind: Kind) -> None:
+    """With the exposure that came with its light, and what was edited of it."""
+    session, state = dark.session, dark.state
+    red = dataclasses.replace(session.materials[1], albedo=(0.6, 0.1, 0.1))
+    frame(dark)
+    session.set_material(1, red)
+    frame(dark)
+    exposure = dark.view.display.exposure
+    kind.add(dark.view, state)
+    frame(dark)
+    assert state.edits.undoable == "lamp added"
+    settle(dark)
+    lit = dark.view.display.exposure
+    assert state.edits.undoable == "lamp added" and lit != exposure
+    lamp = len(session.materials) - 1
+    session.set_material(lamp, dataclasses.replace(session.materials[lamp], emission=(3.0, 2.0, 1.0)))
+    frame(dark)
+    new_lamps.remove_surfaces(dark.view, lamp)
+    frame(dark)
+    settle(dark)
+    assert state.edits.undoable == "lamp removed" and not new_lamps.is_lit(dark.view, state)
+    edits.undo(dark.view, state)
+    state.run_actions()
+    settle(dark)
+    assert session.materials[lamp].emission == (3.0, 2.0, 1.0), "as it was edited"
+    for _ in range(2):
+        edits.undo(dark.view, state)
+        state.run_actions()
+        settle(dark)
+    assert not new_lamps.is_lit(dark.view, state) and len(session.materials) == lamp
+    assert dark.view.display.exposure == exposure and session.materials[1] is red
+    assert state.edits.undoable is not None and state.edits.undoable.startswith("albedo of")
+    for _ in range(2):
+        edits.redo(dark.view, state)
+        state.run_actions()
+        settle(dark)
+    assert session.materials[lamp].emission == (3.0, 2.0, 1.0) and new_lamps.is_lit(dark.view, state)
+    assert dark.view.display.exposure == lit
+
+
+def test_a_lamp_that_was_stopped_on_its_way_is_no_edit(dark: Dark) -> None:
+    frame(dark)
+    SURFACES[0].add(dark.view, dark.state)
+    frame(dark)
+    assert dark.state.edits.undoable == "lamp added" and dark.session.loading is not None
+    dark.session.loading.cancel()
+    settle(dark)
+    frame(dark)
+    assert dark.state.edits.undoable is None and dark.session.surfaces == Surfaces()
+
+
+def test_an_added_lamp_stays_however_the_scene_is_cut(dark: Dark) -> None:
+    """Also where both are asked for at once."""
+    session = dark.session
+    SURFACES[0].add(dark.view, dark.state)
+    session.cut_anew(AtlasOptions(texels=1600))
+    dark.wait()
+    assert session.atlas.texels == 1600 and new_lamps.is_lit(dark.view, dark.state)
+    session.cut_anew(AtlasOptions(texels=800))
+    dark.wait()
+    assert new_lamps.is_lit(dark.view, dark.state) and len(session.surfaces.lamps) == 1
+
+
+def test_surfaces_stay_while_they_are_baked(dark: Dark, tmp_path: Path) -> None:
+    session = dark.session
+    dark.add(SURFACES[0])
+    assert session.loading is None
+    baking = Baking(session, Order(tmp_path / "out"))
+    assert new_lamps.why_not(dark.view, SURFACES[0]) == session.fixed is not None
+    with pytest.raises(UserError, match="stop the bake first"):
+        session.change_surfaces(Surfaces())
+    baking.poll()
+    assert baking.active and session.loading is None
+    baking.stop()
+    assert new_lamps.why_not(dark.view, SURFACES[0]) is None
+    baking.release()
 
 
 def test_a_lamp_is_not_added_while_another_comes(dark: Dark) -> None:

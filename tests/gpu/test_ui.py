@@ -311,7 +311,7 @@ def test_the_sun_is_moved_and_the_sky_is_another(gpu: Gpu, monkeypatch: pytest.M
     (sky,) = [call[1] for call in desk.session.calls if call[0] == "set_sky"]
     assert (sky.sun, sky.strength, sky.colour) == (Sun(230, 20), 3.0, before.colour)
     for index, kind in enumerate(("none", "uniform", "clear")):
-        desk.session.unedited = FakeScene(**vars(desk.session.scene) | {"sky": before})
+        desk.session.read = FakeScene(**vars(desk.session.scene) | {"sky": before})
         chosen = {"##kind": index}
         monkeypatch.setattr(imgui, "combo", lambda label, now, *_, c=chosen: (label in c, c.get(label, now)))
         desk.frames(1)

@@ -79,12 +79,6 @@ def test_save_asks_for_a_name_once(desk: Desk, keeping: FakeKeeping, tmp_path: P
     assert not asking() and len(keeping.calls) == 2
 
 
-def test_what_a_session_does_not_keep_is_said(desk: Desk, keeping: FakeKeeping, tmp_path: Path) -> None:
-    keeping.path, desk.session.has_own_surfaces = tmp_path / "a.glow", True
-    desk.key(imgui.Key.s, control=True)
-    assert "does not keep lamps with area" in desk.ui.state.toasts[-1].text and desk.ui.state.toasts[-1].error
-
-
 def test_no_name_is_taken_where_nothing_can_be_saved(desk: Desk, keeping: FakeKeeping, tmp_path: Path) -> None:
     desk.key(imgui.Key.s, control=True)
     for text in (str(tmp_path), str(tmp_path / "no" / "such"), "  "):

@@ -114,6 +114,7 @@ def test_lights_are_in_candela_lumen_and_lux(
 ) -> None:
     scene = desk.session.scene
     scene.lights, scene.materials = (light,), (MATERIALS[0],) * len(MATERIALS)
+    desk.session.unedited.materials = scene.materials
     imgui.set_window_focus("Lights")
     for quantities, strength, flux in (("photometric", *texts[:2]), ("radiometric", *texts[2:])):
         desk.session.display = desk.session.display.replace(quantities=quantities)

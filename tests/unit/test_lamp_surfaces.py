@@ -7,10 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from app.scene.lamp_surfaces import new_name, with_copy, with_rectangle, without_material
+from app.scene.area_lamps import AreaLamp, Surfaces, keys_of, middle_of, with_surfaces
+from app.scene.lamp_surfaces import new_name, with_copy, with_rectangle, without_surfaces
 from app.scene.load import load_scene
 from app.scene.model import Scene
-from app.session.versions import Version
+from app.session.versions import edits_of, with_edits
 
 CORNERS = np.array([(0.2, 0.5, 0.2), (0.4, 0.5, 0.2), (0.4, 0.5, 0.5), (0.2, 0.5, 0.5)])[::-1]
 
@@ -52,33 +53,70 @@ def test_a_rectangle_shines_to_its_front(scene: Scene) -> None:
 
 def test_a_copy_stands_beside_and_goes_alone(scene: Scene) -> None:
     lamp = next(index for index, material in enumerate(scene.materials) if material.emits)
-    two = with_copy(scene, lamp, np.array([0.0, 0.0, 0.1]), "light 1")
+    two = with_copy(scene, lamp, np.array([0.0, 0.0, 0.1]), "light 1", (1.0, 2.0, 3.0))
     consistent(two)
     one, other = (two.corners[two.material_ids == index] for index in (lamp, len(scene.materials)))
     assert np.allclose(other - one, (0, 0, 0.1)) and two.materials[-1].name == "light 1"
-    back = without_material(two, len(scene.materials))
+    assert two.materials[-1].emission == (1.0, 2.0, 3.0)
+    back = without_surfaces(two, [len(scene.materials)])
     consistent(back)
-    assert (back.corners == scene.corners).all() and back.materials == scene.materials
+    assert (back.corners == scene.corners).all() and back.materials[:-1] == scene.materials
 
 
-def test_materials_behind_one_that_goes_stay_on_their_triangles(scene: Scene) -> None:
-    less = without_material(scene, 0)
+def test_materials_stay_on_their_triangles_where_others_go(scene: Scene) -> None:
+    less = without_surfaces(scene, [0, 2])
     consistent(less)
-    for index in range(1, len(scene.materials)):
-        assert less.materials[index - 1] is scene.materials[index]
-        assert area(less, index - 1) == pytest.approx(area(scene, index))
+    assert less.materials == scene.materials and area(less, 0) == area(less, 2) == 0
+    assert area(less, 1) == area(scene, 1)
+    assert without_surfaces(less, [1, 3, 4, 5]).triangles is less.triangles, "something stays"
 
 
-def test_edits_follow_their_materials() -> None:
-    scene = load_scene("cornell-box")
-    edited = tuple(dataclasses.replace(material, albedo=(0.1, 0.2, 0.3)) for material in scene.materials)
-    kept = tuple(range(1, len(edited)))
-    version = Version(
-        scene, lambda scene: with_rectangle(without_material(scene, 0), CORNERS, "new", (1, 1, 1)), (*kept, None)
-    )
-    made = version.make(scene)
-    assert not version.keeps_materials
-    assert version.materials(made, edited) == (*edited[1:], made.materials[-1])
+# -- as plain values ----------------------------------------------------------------------------------------------------
+
+PANEL = AreaLamp("area light 1", (0.3, 0.5, 0.4), (2.0, 1.0, 0.5), (0.2, 0.4), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+
+
+def test_a_rectangle_lies_as_it_is_told(scene: Scene) -> None:
+    lit = with_surfaces(scene, Surfaces((PANEL,)))
+    consistent(lit)
+    index = len(scene.materials)
+    assert lit.materials[index].emission == PANEL.emission and area(lit, index) == pytest.approx(0.08)
+    assert np.allclose(middle_of(lit, index), PANEL.position)
+    assert np.allclose(lit.normals_areas[0][-2:], PANEL.direction)
+    assert np.allclose(np.ptp(PANEL.corners, axis=0), (0, 0.2, 0.4)), "width is along y, height along z"
+    assert with_surfaces(scene, Surfaces()) is scene
+
+
+def test_a_lamp_is_copied_and_its_original_removed(scene: Scene) -> None:
+    """And the order of the two does not matter: both are said of the scene as it was read."""
+    lamp = next(index for index, material in enumerate(scene.materials) if material.emits)
+    key = keys_of(scene.materials)[lamp]
+    copy = dataclasses.replace(PANEL, name="light 1", of=key)
+    moved = with_surfaces(scene, Surfaces((copy,), (key,)))
+    consistent(moved)
+    assert area(moved, lamp) == 0 and area(moved, len(scene.materials)) == pytest.approx(area(scene, lamp))
+    assert np.allclose(middle_of(moved, len(scene.materials)), PANEL.position)
+
+
+def test_what_a_scene_has_not_is_left_out(scene: Scene) -> None:
+    lost = ("no such", 0)
+    copy = dataclasses.replace(PANEL, name="copy", of=lost)
+    made = with_surfaces(scene, Surfaces((copy, PANEL), (lost,)))
+    assert [material.name for material in made.materials[len(scene.materials) :]] == [PANEL.name]
+    assert len(made.triangles) == len(scene.triangles) + 2
+
+
+def test_materials_of_one_name_are_told_apart(scene: Scene) -> None:
+    names = [dataclasses.replace(scene.materials[0], name=name) for name in ("a", "b", "a", "")]
+    assert keys_of(names) == [("a", 0), ("b", 0), ("a", 1), ("", 0)]
+
+
+def test_edits_follow_their_materials(scene: Scene) -> None:
+    red = dataclasses.replace(scene.materials[1], albedo=(0.1, 0.2, 0.3))
+    edits = edits_of(scene.materials, (scene.materials[0], red, *scene.materials[2:]))
+    assert edits == {keys_of(scene.materials)[1]: red}
+    more = with_surfaces(scene, Surfaces((PANEL,)))
+    assert with_edits(more.materials, edits) == (more.materials[0], red, *more.materials[2:])
 
 
 def test_names_are_new() -> None:

@@ -72,7 +72,7 @@ def _mitsuba(task: Task) -> list[Row]:
 def _cycles(task: Task, *, denoise: bool) -> list[Row]:
     """Lightmaps with 1, 2, 4 … samples of each texel, each baked by itself; building the scene is not timed. Raises UserError."""
     reference, picture = task.reference, task.picture
-    _, charts, _ = read_and_unfold(task.scene, task.atlas, False, lambda text, share: None)
+    _, _, charts, _ = read_and_unfold(task.scene, task.atlas, False, lambda text, share: None)
     sides = np.diff(charts.face_uv, axis=1)
     texels = round(np.abs(np.linalg.det(sides)).sum() / 2)
     rows: list[Row] = []

@@ -66,8 +66,9 @@ def _row(view: View, state: State, index: int) -> None:
 def _why_not(view: View, index: int) -> str | None:
     """Why its surfaces cannot be changed now."""
     session = view.session
-    if session.loading is not None:
-        return new_lamps.LOADING
+    why = new_lamps.why_fixed(view)
+    if why is not None:
+        return why
     return ALONE if (session.unedited.material_ids == index).all() else None
 
 

@@ -83,7 +83,7 @@ def _row(state: State, index: int, light: Light) -> None:
 
 def _as_read(view: View, index: int, light: Light) -> Light:
     """That light as the file has it, or as it is where it was added since."""
-    came = view.session.unedited.lights
+    came = view.session.read.lights
     same = index < len(came) and (came[index].name, came[index].kind) == (light.name, light.kind)
     return came[index] if same else light
 

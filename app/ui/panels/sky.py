@@ -21,7 +21,7 @@ LOWEST = 0.1  # degrees above the horizon
 
 def draw(view: View, state: State) -> None:
     """The section, for a scene that has a sky, or came with one."""
-    came = view.session.unedited.sky or view.session.edited_scene.sky
+    came = view.session.read.sky or view.session.edited_scene.sky
     if came is None or not widgets.fold("Sky"):
         return
     sky = view.session.edited_scene.sky

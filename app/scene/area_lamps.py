@@ -1,0 +1,80 @@
+"""Lamps with area that are added to a scene, and surfaces that are taken from it, as plain values; one function makes it so."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.scene.lamp_surfaces import with_copy, with_rectangle, without_surfaces
+from app.scene.model import F64, RGB, Material, Scene
+
+Key = tuple[str, int]  # of a material: its name, and its number among those of that name
+
+
+@dataclass(frozen=True)
+class AreaLamp:
+    """A lamp with area that was added: a rectangle that shines to its front, or the surfaces of a material once more.
+
+    name: of its material and its object. position: its middle [m]. emission: L [W/(sr m²)]. Of a rectangle, size: width and
+    height [m]; direction, across: unit vectors out of its front and along its width. of: the material, of a copy.
+    """
+
+    name: str
+    position: RGB
+    emission: RGB
+    size: tuple[float, float] = (1.0, 1.0)
+    direction: RGB = (0.0, -1.0, 0.0)
+    across: RGB = (1.0, 0.0, 0.0)
+    of: Key | None = None
+
+    @property
+    def corners(self) -> F64:
+        """(4, 3) of a rectangle [m], counter-clockwise from its front."""
+        width, height = self.size
+        a = width / 2 * np.array(self.across)
+        b = height / 2 * np.cross(self.direction, self.across)
+        return np.asarray(np.array(self.position) + np.array([-a - b, a - b, a + b, b - a]))
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """What surfaces a scene has besides its own, and which of its own it has not. removed: the materials that these are of."""
+
+    lamps: tuple[AreaLamp, ...] = ()
+    removed: tuple[Key, ...] = ()
+
+
+def with_surfaces(scene: Scene, surfaces: Surfaces) -> Scene:
+    """The scene as ``surfaces`` say: each lamp has a material of its own behind all others, and materials without surfaces stay,
+    so that all keep their index. What the scene does not have is neither copied nor removed; nor is all that there is."""
+    index = {key: number for number, key in enumerate(keys_of(scene.materials))}
+    made = scene
+    for lamp in surfaces.lamps:
+        if lamp.of is None:
+            made = with_rectangle(made, lamp.corners, lamp.name, lamp.emission)
+        elif lamp.of in index and (scene.material_ids == index[lamp.of]).any():
+            shift = np.array(lamp.position) - middle_of(scene, index[lamp.of])
+            made = with_copy(made, index[lamp.of], shift, lamp.name, lamp.emission)
+    removed = [index[key] for key in surfaces.removed if key in index]
+    return without_surfaces(made, removed) if removed else made
+
+
+def keys_of(materials: Iterable[Material]) -> list[Key]:
+    """Of each material."""
+    seen: dict[str, int] = {}
+    keys = []
+    for material in materials:
+        number = seen[material.name] = seen.get(material.name, -1) + 1
+        keys.append((material.name, number))
+    return keys
+
+
+def middle_of(scene: Scene, index: int) -> F64:
+    """(3,) of the box around the surfaces of a material that has some [m]."""
+    corners = scene.corners[scene.material_ids == index].reshape(-1, 3)
+    return np.asarray((corners.min(axis=0) + corners.max(axis=0)) / 2)
+
+
+__all__ = ["AreaLamp", "Key", "Surfaces", "keys_of", "middle_of", "with_surfaces"]
