@@ -48,7 +48,7 @@ def put(lightmap: Lightmap, name: str, tiles: F64) -> None:
 
 
 def put_ambient(lightmap: Lightmap, a: tuple[float, float, float], share: float = 1.0) -> None:
-    """Ambient light (RGB) [W/m²], and its share of what has arrived."""
+    """Ambient light (RGB) [W/m²], at most so many times what has arrived."""
     lightmap.texture("t_ambient").write(np.array([*np.array(a) / lightmap.unit, share], np.float32).tobytes())
 
 

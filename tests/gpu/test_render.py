@@ -161,7 +161,7 @@ def test_what_is_still_to_come_is_shown_with_what_has_arrived(gpu: Gpu, box: Lig
     H, covered = box.irradiance(ambient=True), box.pool.surfaces.area > 0
     np.testing.assert_allclose(H[covered], np.broadcast_to((4.0, 2.0, 1.5), H[covered].shape), rtol=1e-6)
     np.testing.assert_allclose(box.irradiance()[covered][:, 0], 2.0, rtol=1e-6)
-    put_ambient(box, (3.0, 3.0, 3.0), share=0.125)  # four times that of what has arrived
+    put_ambient(box, (3.0, 3.0, 3.0), share=0.5)  # of what has arrived, at most
     np.testing.assert_allclose(box.irradiance(ambient=True)[covered], 1.5 * box.irradiance()[covered], rtol=1e-6)
     late = picture(gpu, box, display)
     put(box, "t_irradiance", even(box, (3.0, 2.25, 3.0)))
