@@ -143,6 +143,7 @@ class Ui:
             or state.drag_button >= 0
             or state.split_held
             or state.light_held
+            or state.area_held
             or state.flying
         )
 

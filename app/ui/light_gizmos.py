@@ -63,12 +63,9 @@ def handle(view: View, light: Light) -> F64:
 
 def _move(view: View, state: State, lights: tuple[Light, ...]) -> None:
     """The light whose handle is held, as the mouse has moved: in the plane that faces the eye."""
-    index, io, camera = min(state.light, len(lights) - 1), imgui.get_io(), view.camera
+    index = min(state.light, len(lights) - 1)
     light = lights[index]
-    place = handle(view, light)
-    metres = 2 * math.tan(camera.yfov / 2) * float((place - camera.eye) @ camera.forward) / state.view_px[3]
-    right, up = camera.world_from_camera[:3, 0], camera.world_from_camera[:3, 1]
-    place = place + metres * (io.mouse_delta.x * right - io.mouse_delta.y * up)
+    place = moved_by_mouse(view, state, handle(view, light))
     if light.from_afar:
         way = view.session.lightmap.space.centre - place
         x, y, z = (way / max(float(np.linalg.norm(way)), 1e-30)).tolist()
@@ -77,6 +74,14 @@ def _move(view: View, state: State, lights: tuple[Light, ...]) -> None:
         x, y, z = place.tolist()
         moved = dataclasses.replace(light, position=(x, y, z))
     state.act(lambda: view.session.set_lights((*lights[:index], moved, *lights[index + 1 :])))
+
+
+def moved_by_mouse(view: View, state: State, place: F64) -> F64:
+    """A place (3,) [m] after what the mouse has moved since the last frame, in the plane that faces the eye."""
+    io, camera = imgui.get_io(), view.camera
+    metres = 2 * math.tan(camera.yfov / 2) * float((place - camera.eye) @ camera.forward) / state.view_px[3]
+    right, up = camera.world_from_camera[:3, 0], camera.world_from_camera[:3, 1]
+    return np.asarray(place + metres * (io.mouse_delta.x * right - io.mouse_delta.y * up))
 
 
 def _draw(view: View, state: State, light: Light, at: imgui.ImVec2, *, chosen: bool) -> None:
@@ -111,4 +116,4 @@ def cone(place: F64, light: Light, length: float) -> F64:
     return np.asarray(place + length * (math.cos(light.outer) * axis + math.sin(light.outer) * around))
 
 
-__all__ = ["light_gizmos"]
+__all__ = ["GRAB_EM", "HANDLE_EM", "light_gizmos", "moved_by_mouse"]

@@ -9,6 +9,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from app.ui import pointer, theme
+from app.ui.area_gizmos import area_gizmos
 from app.ui.divider import divider
 from app.ui.light_gizmos import light_gizmos
 from app.ui.on_screen import on_screen
@@ -39,7 +40,7 @@ def navigate(view: View, state: State, seconds: float) -> None:
     left, top, width, height = state.view_px
     x, y = io.mouse_pos.x - left, io.mouse_pos.y - top
     inside = 0 <= x < width and 0 <= y < height and not io.want_capture_mouse
-    taken = divider(view, state) or light_gizmos(view, state)
+    taken = divider(view, state) or light_gizmos(view, state) or area_gizmos(view, state)
     for button in range(3):
         if inside and not (taken and button == 0) and imgui.is_mouse_clicked(button) and state.drag_button < 0:
             state.drag_button, state.flight = button, None

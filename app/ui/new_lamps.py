@@ -136,6 +136,14 @@ def remove_surfaces(view: View, index: int) -> None:
     session.change_surfaces(less)
 
 
+def move_surfaces(view: View, name: str, position: RGB) -> None:
+    """Put the added lamp of that name there, with its middle at (3,) [m]."""
+    now = view.session.asked_surfaces
+    lamps = tuple(replace(lamp, position=position) if lamp.name == name else lamp for lamp in now.lamps)
+    if lamps != now.lamps:
+        view.session.change_surfaces(replace(now, lamps=lamps))
+
+
 def why_fixed(view: View) -> str | None:
     """Why the surfaces of the open scene cannot be changed now."""
     return LOADING if view.session.loading is not None else view.session.fixed
@@ -289,6 +297,16 @@ KINDS = (
 )
 
 __all__ = [
-    *("KINDS", "add_light", "added_lamp", "buttons", "duplicate_surfaces", "is_lit", "light_beside", "pair_of_buttons"),
-    *("remove_surfaces", "used_materials", "why_fixed", "why_not"),
+    *(
+        "KINDS",
+        "add_light",
+        "added_lamp",
+        "buttons",
+        "duplicate_surfaces",
+        "is_lit",
+        "light_beside",
+        "move_surfaces",
+        "pair_of_buttons",
+    ),
+    *("move_surfaces", "remove_surfaces", "used_materials", "why_fixed", "why_not"),
 ]

@@ -102,8 +102,9 @@ class State:
     reveal_material: the list scrolls to the selected one. draw_lights: lamps without area, in the view. reference: of a solve
     in the background; layer: to go back to from the error. edits: of the open scene; held: whether a hand was at a control in
     the last frame. used: of which scene, the materials that are somewhere. version: of the open scene, that
-    edits are noted of. keeping: saves and opens sessions; asides: what crashes have left, to be asked about; quit_when_saved: the
-    user is leaving. order: of the next bake, as far as it was edited; baking: the last.
+    edits are noted of. lamp_place: of a lamp with area, by name, as long as a hand moves it [m]. keeping: saves and opens
+    sessions; asides: what crashes have left, to be asked about; quit_when_saved: the user is leaving. order: of the next bake, as
+    far as it was edited; baking: the last.
     """
 
     measured: bool = True
@@ -157,6 +158,8 @@ class State:
     used: tuple[object, tuple[int, ...]] = (None, ())
     version: object = None
     light_held: bool = False
+    lamp_place: tuple[str, RGB] | None = None
+    area_held: bool = False
     draw_lights: bool = True
     atlas: AtlasOptions | None = None
     adaptive: bool | None = None

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from desks import VIEW, Desk, desk, session, where
 from fake_session import FakeScene
 from imgui_bundle import imgui
 
+from app.scene.area_lamps import AreaLamp, Surfaces
 from app.scene.lights import Light
 from app.solvers import SOLVERS
 from app.ui.new_lamps import KINDS
+from app.ui.on_screen import on_screen
 
 __all__ = ["desk", "session", "where"]
 
@@ -91,3 +94,65 @@ def test_the_view_is_free_behind_the_offer(desk: Desk, where: dict[str, tuple[fl
     where.clear()
     desk.frames(2)
     assert not set(LABELS) & where.keys(), "a picture alone"
+
+
+PANEL = AreaLamp("panel", (0.0, 0.0, -2.0), (1.0, 1.0, 1.0), (0.4, 0.4))
+
+
+@pytest.fixture
+def panel(desk: Desk) -> Desk:
+    """An added lamp before the eye."""
+    session = desk.session
+    session.surfaces = Surfaces((PANEL,))
+    lamp = replace(session.materials[0], name="panel", emission=PANEL.emission)
+    session.unedited = FakeScene(**vars(session.unedited) | {"materials": (*session.materials, lamp)})
+    session.scene.materials = session.unedited.materials
+    number = len(session.materials) - 1
+    for scene in (session.scene, session.unedited):
+        scene.material_ids = np.append(scene.material_ids, number)
+        scene.corners = np.zeros((number + 1, 3, 3))
+        scene.normals_areas = np.zeros((number + 1, 3)), np.ones(number + 1)
+    return desk
+
+
+def test_an_added_lamp_is_moved_by_its_handle(panel: Desk) -> None:
+    """And its surfaces are cut once, when it is let go."""
+    state, session = panel.ui.state, panel.session
+    panel.frames(2)
+    at = on_screen(session, state, np.array(PANEL.position))
+    assert at is not None
+    eye = session.camera.world_from_camera.copy()
+    panel.point(at.x, at.y)
+    panel.press(0, True)
+    panel.point(at.x + 20, at.y)
+    panel.point(at.x + 40, at.y)
+    assert session.surfaces.lamps[0] == PANEL and state.lamp_place is not None
+    panel.press(0, False)
+    panel.frames(2)
+    (x, y, z) = session.surfaces.lamps[0].position
+    assert x > 0.05 and abs(y) < 1e-6 and z == pytest.approx(-2.0)
+    assert [call[0] for call in session.calls].count("change_surfaces") == 1
+    assert (session.camera.world_from_camera == eye).all() and state.edits.undoable == "position of panel"
+    panel.key(imgui.Key.z, control=True)
+    assert session.surfaces.lamps[0] == PANEL
+
+
+def test_an_added_lamp_is_moved_in_the_panel(panel: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    state = panel.ui.state
+    panel.front("Lights")
+    state.area_lamp = len(panel.session.materials) - 1
+    moved = {"##Position [m]": [1.0, 2.0, 3.0]}
+    with monkeypatch.context() as hand:
+        hand.setattr(imgui, "drag_float3", lambda label, now, *_: (label in moved, moved.get(label, now)))
+        panel.frames(1)
+    panel.frames(2)
+    assert panel.session.surfaces.lamps[0].position == (1.0, 2.0, 3.0)
+
+
+def test_handles_are_not_there_while_a_bake_runs(panel: Desk) -> None:
+    session = panel.session
+    session.fixed = "they are being baked"
+    panel.frames(2)
+    at = on_screen(session, panel.ui.state, np.array(PANEL.position))
+    panel.drag((at.x, at.y), (at.x + 40, at.y))
+    assert session.surfaces.lamps[0] == PANEL and panel.ui.state.lamp_place is None

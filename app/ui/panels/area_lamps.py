@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
@@ -10,6 +11,7 @@ from imgui_bundle import imgui
 from app.ui import new_lamps, theme, widgets
 from app.ui.panels import materials
 from app.ui.state import State
+from app.ui.vector import STEP, edit_vector
 
 if TYPE_CHECKING:
     from app.session.view import View
@@ -36,6 +38,7 @@ def draw(view: View, state: State) -> None:
     edited = dataclasses.replace(
         material, emission=materials.emission(view, state, material, session.unedited.materials[index], index)
     )
+    _place(view, state, index)
     duplicate, remove = new_lamps.pair_of_buttons(_why_not(view, index))
     imgui.pop_id()
     if duplicate:
@@ -44,6 +47,21 @@ def draw(view: View, state: State) -> None:
         state.act(lambda: new_lamps.remove_surfaces(view, index))
     if edited.emission != material.emission:
         state.act(lambda: session.set_material(index, edited))
+
+
+def _place(view: View, state: State, index: int) -> None:
+    """Where an added lamp is: surfaces are cut once it is let go."""
+    lamp = new_lamps.added_lamp(view, index)
+    if lamp is None:
+        return
+    held = state.lamp_place is not None and state.lamp_place[0] == lamp.name
+    shown = state.lamp_place[1] if held and state.lamp_place is not None else lamp.position
+    low, high = view.session.scene.bounds
+    imgui.begin_disabled(new_lamps.why_fixed(view) is not None)
+    place = edit_vector("Position [m]", shown, lamp.position, STEP * math.dist(low, high), "%.2f")
+    imgui.end_disabled()
+    if place != shown:
+        state.lamp_place = lamp.name, place
 
 
 def lamps(view: View, state: State) -> list[int]:

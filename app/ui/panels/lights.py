@@ -11,15 +11,14 @@ from imgui_bundle import imgui
 from app.scene.lights import Light
 from app.ui import lamp, new_lamps, slider, theme, widgets
 from app.ui.panels import area_lamps, sky
-from app.ui.state import RGB, State
+from app.ui.state import State
+from app.ui.vector import STEP, edit_vector
 
 if TYPE_CHECKING:
     from app.session.view import View
 
 ROWS_SHOWN = 4  # of the list before it scrolls
 WEAKEST = 1e-4  # W/sr or W/m²
-UNTWEAKED = int(imgui.SliderFlags_.no_speed_tweaks)  # Shift is slower here
-STEP = 0.005  # of the scene's diagonal, for a pixel that a place is dragged by
 WIDEST = 10.0  # degrees across a directional light
 
 
@@ -98,12 +97,12 @@ def _editor(light: Light, came: Light, quantities: str, size: float) -> Light:
     )
     light = dataclasses.replace(light, on=on, intensity=intensity)
     if not light.from_afar:
-        place = _vector("Position [m]", light.position, came.position, STEP * size, "%.2f")
+        place = edit_vector("Position [m]", light.position, came.position, STEP * size, "%.2f")
         help = "Of the lamp: above 0, shadows have soft edges"
         radius = _slider("Radius", light.radius, came.radius, 0.1 * size, "%.3g m", help)
         light = dataclasses.replace(light, position=place, radius=radius)
     if light.kind != "point":
-        aim = _vector("Direction", light.direction, came.direction, STEP, "%.3f")
+        aim = edit_vector("Direction", light.direction, came.direction, STEP, "%.3f")
         length = math.hypot(*aim)
         if aim != light.direction and length > 0:
             x, y, z = (c / length for c in aim)
@@ -117,23 +116,6 @@ def _editor(light: Light, came: Light, quantities: str, size: float) -> Light:
         wide = _angle("Angle", light.angle, came.angle, WIDEST, help)
         light = dataclasses.replace(light, angle=wide)
     return light
-
-
-def _vector(label: str, value: RGB, came: RGB, step: float, text: str) -> RGB:
-    widgets.labelled(label, changed=value != came)
-    imgui.begin_group()
-    imgui.set_next_item_width(-1)
-    shown = [component + 0.0 for component in value]  # -0 is 0
-    slow = slider.FINE if imgui.get_io().key_shift else 1.0
-    changed, moved = imgui.drag_float3(f"##{label}", shown, slow * step, 0.0, 0.0, text, UNTWEAKED)
-    imgui.end_group()
-    widgets.tooltip(f"Drag, with Shift finely, or click twice to type. {widgets.AS_READ}")
-    if widgets.put_back(False, True):
-        return came
-    if not changed or not all(map(math.isfinite, moved)):
-        return value
-    x, y, z = (float(c) for c in moved)
-    return (x, y, z)
 
 
 def _angle(label: str, value: float, came: float, most: float, help: str) -> float:
