@@ -19,12 +19,7 @@ in vec3 v_position;
 
 layout(location = 0) out vec4 out_colour;
 
-#if OVERLAY
-#include "render/overlay.glsl"
-#endif
-#if BICUBIC
-#include "render/bicubic.glsl"
-#endif
+#include "render/display_texel.glsl"
 
 void main() {
     float alpha = 1.0;
@@ -34,16 +29,7 @@ void main() {
 #endif
     vec2 uv = gl_FrontFacing ? v_uv.xy : v_uv.zw;
     vec4 place = place_of(max(ivec2(uv * u_texel.z), 0));
-    vec2 texel = uv * place.z + place.xy;
-#if BICUBIC
-    vec3 colour = bicubic(t_display, texel, u_texel.xy);
-#else
-    vec3 colour = textureLod(t_display, texel * u_texel.xy, 0.0).rgb;
-#endif
+    vec3 colour = under_overlay(display_at(uv, place), uv, place);
     if (uv.x < 0.0) colour = gl_FrontFacing ? v_unlit_front : v_unlit_back;
-#if OVERLAY
-    vec4 per_px = max(fwidth(v_uv), 1e-6);
-    if (uv.x >= 0.0) colour = overlaid(colour, uv, gl_FrontFacing ? per_px.xy : per_px.zw, place.z, place.w);
-#endif
     out_colour = vec4(colour, alpha);
 }

@@ -23,32 +23,18 @@ layout(location = 0) out vec4 out_colour;
 // develop(rgb): linear Rec.709 of the screen, 0 to 1
 #include <curve>
 #include "render/shown.glsl"
-#if OVERLAY
-#include "render/overlay.glsl"
-#endif
-#if BICUBIC
-#include "render/bicubic.glsl"
-#endif
+#include "render/display_texel.glsl"
 
 void main() {
     vec2 uv = gl_FrontFacing ? v_uv.xy : v_uv.zw;
     vec4 place = place_of(max(ivec2(uv * u_texel.z), 0));
     vec3 albedo = u_albedo * v_colour * texture(t_albedo_picture, v_albedo_uv).rgb;
 #if LIT
-    vec2 texel = uv * place.z + place.xy;
-#if BICUBIC
-    vec3 light = bicubic(t_display, texel, u_texel.xy);
-#else
-    vec3 light = textureLod(t_display, texel * u_texel.xy, 0.0).rgb;
-#endif
-    vec3 colour = shown(albedo * max(light, 0.0) + u_emission * texture(t_emission_picture, v_emission_uv).rgb);
+    vec3 colour = shown(albedo * max(display_at(uv, place), 0.0) + u_emission * texture(t_emission_picture, v_emission_uv).rgb);
 #else
     vec3 colour = shown(albedo);
 #endif
-#if OVERLAY
-    vec4 per_px = max(fwidth(v_uv), 1e-6);
-    colour = overlaid(colour, uv, gl_FrontFacing ? per_px.xy : per_px.zw, place.z, place.w);
-#endif
+    colour = under_overlay(colour, uv, place);
     if (uv.x < 0.0) discard;  // a side without texels
     out_colour = vec4(colour, 1.0);
 }
