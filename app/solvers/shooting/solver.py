@@ -12,16 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from app.gpu import Framebuffer, Gpu, Texture
+from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap
-from app.lightmap.quadtree import Change
-from app.lightmap.tile_pool import Moves
 from app.scene.lights import Light
 from app.scene.model import F64, Material
 from app.scene.sky import Sky
 from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.shooting.audit import Audit
 from app.solvers.shooting.batch import Batch
+from app.solvers.shooting.leaves import Leaves
 from app.solvers.shooting.material_edits import MaterialEdits, needs_restart
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.outside import Sent
@@ -48,10 +47,17 @@ class Shooting:
         """audits: whether strong shots are tried before they are made."""
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
         self.batch = Batch(gpu, lightmap, options, audits=audits)
-        if lightmap.refinement is not None:
-            lightmap.refinement.follower = self
         self._reports, self._edits, self._picture = Reports(gpu), MaterialEdits(gpu, lightmap), ItemImage(gpu)
         self._under_way = UnderWay()
+        self._leaves: Leaves | None = None
+        if lightmap.refinement is not None and self.batch.replay is not None:
+            self._leaves = Leaves(
+                lightmap.refinement,
+                self.batch,
+                self.batch.replay,
+                finish=self._under_way.finish,
+                settle=lambda: self.poll(wait=True),
+            )
         self._progress = Progress(0, 1.0, np.zeros(3))  # but for what follows from now
         self._look_at = 0  # shots at which leaves are looked at again
         self.issued = 0
@@ -167,19 +173,8 @@ class Shooting:
         refinement = self.lightmap.refinement
         refining, note = (False, None) if refinement is None else (self._refining, refinement.note)
         converged = bool(self._all_shot) and not refining
-        leaves = self._leaves_say if refining else ""
+        leaves = self._leaves.say() if self._leaves is not None and refining else ""
         return replace(self._progress, converged=converged, refining=refining, leaves=leaves, note=note)
-
-    @property
-    def _leaves_say(self) -> str:
-        """What is being done for leaves."""
-        refinement, replay = self.lightmap.refinement, self.batch.replay
-        assert refinement is not None and replay is not None
-        pending = replay.under_way
-        if pending is not None:
-            share = pending.next / max(pending.end, 1)
-            return f"light of {len(pending.slots):,} new leaves: {share:.0%}"
-        return f"{refinement.wanted:,} more to split" if refinement.wanted else "looking at leaves"
 
     def _follow_report(self, report: Report) -> None:
         """Take in what became of a batch."""
@@ -296,30 +291,6 @@ class Shooting:
         self._progress = replace(self._progress, remaining=self._unshot_share())
         batch.update_ambient()
 
-    # -- leaves that come and go, see app/lightmap/refinement.py -------------------------------------------------------
-
-    @property
-    def carried(self) -> list[tuple[Texture, Framebuffer]]:
-        return [] if self.batch.replay is None else self.batch.replay.carried
-
-    def options_changed(self) -> None:
-        if self.batch.replay is not None:
-            self.batch.replay.all_again = bool(self.batch.replay.log.count)
-
-    def leaves_changed(self, change: Change) -> None:
-        self.batch.leaves_changed(change)
-
-    def give_up(self) -> None:
-        self._under_way.finish()
-        if self.batch.replay is not None:
-            self.batch.replay.give_up()
-
-    def slots_will_move(self) -> None:
-        self.poll(wait=True)
-
-    def resized(self, moves: Moves) -> None:
-        self.batch.resized(moves)
-
     # -- kept for later ------------------------------------------------------------------------------------------------
 
     def state(self) -> State:
@@ -406,9 +377,8 @@ class Shooting:
             yield
 
     def release(self) -> None:
-        refinement = self.lightmap.refinement
-        if refinement is not None and refinement.follower is self:
-            refinement.follower = None
+        if self._leaves is not None:
+            self._leaves.release()
         for part in (self._reports, self._picture, self.batch):
             part.release()
 
