@@ -6,9 +6,12 @@ from app.scene.model import F64
 from app.solvers.local.form_factors import LocalSet
 from app.solvers.local.lighting import Lighting
 from app.solvers.local.matrix import LocalMatrix
+from app.solvers.local.options import LocalOptions
 from app.solvers.local.patches import Patches
 from app.solvers.local.rows import Rows
 from app.solvers.local.selection import distances
+
+NOTED = 0.02  # of the light, that the matrix is off by, from which on it is said
 
 
 def figures_of(
@@ -36,3 +39,12 @@ def facts_of(node: int, slot: int, patches: Patches, age: int, share: float) -> 
     texels = int(patches.end[node] - patches.start[node])
     kind = "patch" if patches.level[node] == 0 else f"cluster of level {patches.level[node]}"
     return {"Local set": f"{kind}, {texels:,} texels, {age:,} pictures ago", "Sees of outside": f"{100 * share:.1f} %"}
+
+
+def note_of(error: float, matrix: LocalMatrix, options: LocalOptions) -> str | None:
+    """What to do where the matrix has lost much of the light. error: the share of it."""
+    if error <= NOTED or not matrix.coloured:
+        return None
+    exact = "--bounces iterate" if options.bits == 32 else "--bits 32 or --bounces iterate"
+    better = "--bounces inverse" if options.bounces == "series" else exact
+    return f"the local matrix is off by {error:.0%} of the light: {better} would do"

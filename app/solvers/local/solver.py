@@ -28,29 +28,26 @@ from app.solvers.base import EnergyBalance, Inspection, Progress
 from app.solvers.local.balance import balance_of, matrix_error
 from app.solvers.local.exchange import Exchange
 from app.solvers.local.form_factors import LocalSet
-from app.solvers.local.inspectable import facts_of, figures_of
-from app.solvers.local.lighting import SWEEPS, Lighting
-from app.solvers.local.matrix import ROW, LocalMatrix
-from app.solvers.local.members import DRIFT, Members
+from app.solvers.local.inspectable import facts_of, figures_of, note_of
+from app.solvers.local.lighting import Lighting
+from app.solvers.local.matrix import LocalMatrix
+from app.solvers.local.members import Members
 from app.solvers.local.options import LocalOptions
-from app.solvers.local.patches import patch_count, patches_of
-from app.solvers.local.rows import BYTES, ROWS_OF_A_NODE, Rows, rows_in
+from app.solvers.local.patches import patches_of
+from app.solvers.local.relighting import Relighting
+from app.solvers.local.rows import Rows, rows_in
 from app.solvers.local.selection import Swap
-from app.solvers.local.tiles import Tiles
+from app.solvers.local.size import fitting, size_of_set
+from app.solvers.local.tiles import Tiles, first_eye
 from app.util.parts import UnderWay, run_to_end
 from app.util.state import State
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
 
 I64 = NDArray[np.int64]
-SOFTWARE, HARDWARE = 1024, 4096  # patches of the set by default, where a CPU rasterises and where not
-WHOLE = 3  # highest level of patches that are large so that a whole scene is in the set
-LEFT, MOST_REFLECTED = 1e-4, 0.99  # of light, that bounces may leave; mean albedo that their number allows for
-OUTSIDE_BOUNCES = 8  # between the set and what is outside of it
 FADE, FADED = 0.75, 16  # share of what was shown that stays in each picture after nodes came and went, and for how many
 FLUSH_PARTS = 3  # of the pass over the matrix that all updates wait for: whole, it takes a third of a frame
 MOST_ALBEDO = 0.9999  # in a closed room of 1 light never ends, and its matrix has no inverse
-NOTED = 0.02  # of the light, that the matrix is off by, from which on it is said
 SOON = 16  # shadow rays to what is new, before an edit is shown; the rest comes with the next pieces of work
 BATCH = 64
 
@@ -68,12 +65,12 @@ class Local:
         self.gpu, self.lightmap = gpu, lightmap
         self.rays, self.origins = RayScene(gpu, lightmap.pool), Origins(gpu, lightmap)
         self.direct = DirectLight(gpu, lightmap, self.rays, self.origins)
-        self._tiles = Tiles(lightmap.pool, lightmap.space.local_from_world(_first_eye(lightmap)))
+        self._tiles = Tiles(lightmap.pool, lightmap.space.local_from_world(first_eye(lightmap)))
         self._parts: list[Any] = []
         self._under_way = UnderWay()
-        self._fading = self._bounces_left = self.issued = 0
+        self._fading = self.issued = 0
         # whether lamps are others, change in every piece of work, and direct light is known of all tiles as they are now
-        self._edited, self._editing, self._all_known, self._lit = False, False, True, False
+        self._edited, self._editing, self._all_known = False, False, True
         self._escaped, self._error = np.zeros(3), 0.0
         try:
             self._build(options)
@@ -85,18 +82,9 @@ class Local:
     def _build(self, options: LocalOptions) -> None:
         """Patches, rows and matrix of these options."""
         gpu, lightmap = self.gpu, self.lightmap
-        most = options.patches or default_patches(gpu, options)
-        level = options.patch_level
-        if level is None:
-            level = next((n for n in range(WHOLE + 1) if patch_count(lightmap.pool, n) <= most), 0)
+        level, most = size_of_set(gpu, lightmap.pool, options)
         patches = patches_of(lightmap.pool, level)
-        most = -(-min(most, patches.count) // ROW) * ROW
-        components = 1 if options.bounces == "iterate" else 4
-        mebibytes = most**2 * components * options.bits / 8 / 2**20
-        if mebibytes > options.matrix_memory:
-            raise UserError(
-                f"--matrix-memory {options.matrix_memory}: the matrix of {most} patches takes {mebibytes:.0f} MiB"
-            )
+        most = fitting(most, patches.count, options)
         rows_in(options.row_memory, options.rays, most)  # before anything is released
         matrix = LocalMatrix(gpu, most, options.bounces, options.bits)
         self._release_parts()
@@ -108,6 +96,7 @@ class Local:
         self.options, self.patches, self.rows, self.lighting, self.level = options, patches, rows, lighting, level
         self.set, self.matrix = LocalSet(patches, rows, most), matrix
         self.members = Members(self.set, matrix, self._albedo())
+        self._relighting = Relighting(lighting, matrix, self.set, self.members)
         self.exchange = Exchange(patches, rows, self.set, self.members, matrix)
 
     # -- work ----------------------------------------------------------------------------------------------------------
@@ -127,7 +116,7 @@ class Local:
         else:
             if self._editing and not self._all_known:
                 self.direct.sum(self.lightmap.scene)
-                self._lit = False
+                self._relighting.changed()
             self._editing, self._all_known = False, True
         entered = 0
         self.members.pieces += 1
@@ -143,7 +132,7 @@ class Local:
         if self._edited:
             yield from self._follow_edit()
             return entered
-        self._relight()
+        self._relighting.go_on(self.direct.light)
         yield
         self._fading = FADED if entered else max(self._fading - 1, 0)
         self._compose(all_=self._fading == 0, stays=FADE if self._fading else 0.0)
@@ -154,7 +143,7 @@ class Local:
         for some in np.array_split(tiles, min(bands, len(tiles))):
             yield from self.direct.shoot_from(some)
         self.direct.sum(self.lightmap.scene, tiles)
-        self._lit = False
+        self._relighting.changed()
 
     def _compose(self, *, all_: bool, stays: float = 0.0) -> None:
         """Write the light that is shown; if not all of it, that which is near, and some of the rest in turn. stays: share of what
@@ -170,30 +159,10 @@ class Local:
         yield from self.direct.catch_up(min(SOON, self.options.shadow_rays))
         tiles = self._tiles.in_turn() if goes_on else self._tiles.all
         self.direct.sum(self.lightmap.scene, tiles)
-        self._lit, self._all_known = False, not goes_on
-        self._relight()
+        self._all_known = not goes_on
+        self._relighting.changed()
+        self._relighting.go_on(self.direct.light)
         self.lighting.compose(self.direct.light, tiles)
-
-    def _relight(self) -> None:
-        """The indirect light of the set as it is, where it is not known yet: bounces that are done one after the other, and light
-        from outside that follows from that inside, go on in the next pieces of work."""
-        if not self._lit:
-            held, members = self.set, self.members
-            albedo = members.albedo[held.node]
-            self.lighting.set_nodes(held.node, held.area, albedo, held.outside, members.entered)
-            self._bounces_left = self._bounces
-        elif not self._bounces_left:
-            return
-        self.lighting.light(self.matrix, self.direct.light)
-        self._lit, self._bounces_left = True, max(self._bounces_left - 1, 0)
-
-    @property
-    def _bounces(self) -> int:
-        """How often light is found until no more than LEFT of it is missing."""
-        if self.matrix.coloured:
-            return OUTSIDE_BOUNCES if np.abs(self.set.outside).max() > DRIFT else 0
-        reflected = min(self.members.mean_albedo, MOST_REFLECTED)
-        return int(np.ceil(np.log(LEFT) / np.log(reflected) / SWEEPS)) if reflected > 0 else 0
 
     def _swap(self, plan: list[Swap], bands: int) -> Generator[None, None, int]:
         """Nodes enter and leave, less of them where an edit waits for it to end."""
@@ -203,7 +172,7 @@ class Local:
             self._fill_anew()  # paths through nodes that left pile up
         yield from self.matrix.flush_in(FLUSH_PARTS * bands)
         self.lighting.set_slots(self.set.slot_at)
-        self._lit = False
+        self._relighting.changed()
         return entered
 
     # -- how far it is -------------------------------------------------------------------------------------------------
@@ -221,21 +190,13 @@ class Local:
             asked = self.options.shadow_rays
             shadow = 1 - float(np.minimum(self.direct.fewest[some], asked).mean()) / asked
         missing = max(here, shadow, self.members.waiting / wanted) if emits else 0.0
-        known = self.members.settled and self._fading == self._bounces_left == 0
+        known = self.members.settled and self._fading == self._relighting.left == 0
         followed = not self._edited and self._all_known
         dark = not emits and not self.issued
         done = followed and (dark or (missing <= self.options.missing and known))
         remaining = missing if self.issued or not emits else 1.0
-        return Progress(self.issued, remaining, self._escaped, converged=done, note=self._note)
-
-    @property
-    def _note(self) -> str | None:
-        """What to do where the matrix has lost much of the light."""
-        if self._error <= NOTED or not self.matrix.coloured:
-            return None
-        exact = "--bounces iterate" if self.options.bits == 32 else "--bits 32 or --bounces iterate"
-        better = "--bounces inverse" if self.options.bounces == "series" else exact
-        return f"the local matrix is off by {self._error:.0%} of the light: {better} would do"
+        note = note_of(self._error, self.matrix, self.options)
+        return Progress(self.issued, remaining, self._escaped, converged=done, note=note)
 
     def settle(self) -> Progress:
         """End the work under way, and wait for the GPU."""
@@ -245,7 +206,7 @@ class Local:
 
     def _look_for_error(self) -> None:
         """By how much the matrix is off, once its light is that of the set as it is."""
-        found = self.to_come == 0 and self.members.settled and self._lit and self._bounces_left == 0
+        found = self.to_come == 0 and self.members.settled and self._relighting.done
         self._error = matrix_error(self.lighting, self.members) if found else 0.0
 
     def energy(self) -> EnergyBalance:
@@ -270,8 +231,9 @@ class Local:
         self.lighting.set_slots(self.set.slot_at)
         self.direct.forget()
         self.direct.follow(self.lightmap.scene)
-        self._edited, self._editing, self._all_known, self._lit = False, False, True, False
-        self._fading = self._bounces_left = self.issued = 0
+        self._edited, self._editing, self._all_known = False, False, True
+        self._fading = self.issued = 0
+        self._relighting.forget()
         self._escaped, self._error = np.zeros(3), 0.0
         self._look()
 
@@ -325,7 +287,8 @@ class Local:
         """Take all nodes out: they enter with the next pieces of work."""
         self.members.clear()
         self.lighting.set_slots(self.set.slot_at)
-        self.exchange.first, self._lit = True, False
+        self.exchange.first = True
+        self._relighting.changed()
 
     def _albedo(self) -> F64:
         """(nodes, 3) of each patch and cluster."""
@@ -350,11 +313,11 @@ class Local:
     # -- kept for later ------------------------------------------------------------------------------------------------
 
     def state(self) -> State:
-        """Nothing: what is around the observer is lit anew in seconds, wherever it is by then."""
+        """Nothing to be kept: what is around the observer is lit anew in seconds, wherever it is by then."""
         return State()
 
     def restore(self, state: State) -> None:
-        """It begins anew."""
+        """Begin anew, whatever was kept."""
         self.lightmap.clear()
 
     # -- what there is to see ------------------------------------------------------------------------------------------
@@ -414,8 +377,8 @@ class Local:
         }
 
     def _light_anew(self) -> None:
-        self._lit = False
-        self._relight()
+        self._relighting.changed()
+        self._relighting.go_on(self.direct.light)
 
     def warm_up(self) -> Iterator[None]:
         """Every pass."""
@@ -434,20 +397,3 @@ class Local:
         self._release_parts()
         for part in (self.direct, self.origins, self.rays):
             part.release()
-
-
-def default_patches(gpu: Gpu, options: LocalOptions) -> int:
-    """As many as the driver and the memory for the matrix allow, up to what this kind of renderer keeps up with."""
-    most = min(SOFTWARE if gpu.software else HARDWARE, gpu.limits.max_texture)
-    components = 1 if options.bounces == "iterate" else 4
-    in_matrix = int(np.sqrt(options.matrix_memory * 2**20 * 8 / (components * options.bits)))
-    in_rows = options.row_memory * 2**20 // (options.rays * BYTES) // ROWS_OF_A_NODE
-    return max(min(most, in_matrix, in_rows) // ROW, 1) * ROW
-
-
-def _first_eye(lightmap: Lightmap) -> F64:
-    """Where the scene's first camera is (3,) [m]: the observer, until somebody says where. The middle of a scene without any."""
-    cameras = lightmap.scene.cameras
-    if not cameras:
-        return lightmap.space.centre
-    return np.asarray(np.asarray(cameras[0].world_from_camera, np.float64)[:3, 3])

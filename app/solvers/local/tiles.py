@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.direct_light.shadow_rays import DirectLight
+from app.lightmap.lightmap import Lightmap
 from app.lightmap.tile_pool import TilePool
 from app.scene.model import F64
 
@@ -54,3 +55,11 @@ class Tiles:
         counts = direct.fewest[self.all]
         left = self.all[(counts < asked) & (counts == counts.min(initial=asked))]
         return np.sort(left[np.argsort(self._away[left], kind="stable")[:AT_ONCE]])
+
+
+def first_eye(lightmap: Lightmap) -> F64:
+    """Where the scene's first camera is (3,) [m]: the observer, until somebody says where. The middle of a scene without any."""
+    cameras = lightmap.scene.cameras
+    if not cameras:
+        return lightmap.space.centre
+    return np.asarray(np.asarray(cameras[0].world_from_camera, np.float64)[:3, 3])
