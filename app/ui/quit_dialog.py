@@ -26,9 +26,7 @@ def quit_dialog(view: View, state: State) -> None:
             state.requests.append(Request.QUIT)
             return
         imgui.open_popup(TITLE)
-    imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
-    flags = imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_saved_settings
-    if not imgui.begin_popup_modal(TITLE, None, flags)[0]:
+    if not widgets.begin_modal(TITLE):
         return
     em = imgui.get_font_size()
     imgui.dummy(imgui.ImVec2(TEXT_EM * em, 0))

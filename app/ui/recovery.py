@@ -24,9 +24,7 @@ def recovery(view: View, state: State) -> None:
     if not state.asides:
         return
     imgui.open_popup(TITLE)
-    imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
-    flags = imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_saved_settings
-    if not imgui.begin_popup_modal(TITLE, None, flags)[0]:
+    if not widgets.begin_modal(TITLE):
         return
     em, aside = imgui.get_font_size(), state.asides[0]
     imgui.dummy(imgui.ImVec2(TEXT_EM * em, 0))

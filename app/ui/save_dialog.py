@@ -55,9 +55,7 @@ class SaveDialog:
     def _named(self) -> Path | None:
         if self._opening:
             imgui.open_popup(self._title)
-        imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
-        flags = imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_saved_settings
-        self._shown = imgui.begin_popup_modal(self._title, None, flags)[0]
+        self._shown = widgets.begin_modal(self._title)
         if not self._shown:
             return None
         if self._opening:

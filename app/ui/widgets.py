@@ -248,6 +248,13 @@ def fold(text: str, *, opened: bool = True) -> bool:
     return shown
 
 
+def begin_modal(title: str) -> bool:
+    """Whether the popup of that title is open, in the middle of the window and as large as what is in it; ``end_popup`` then."""
+    imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
+    flags = imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_saved_settings
+    return bool(imgui.begin_popup_modal(title, None, flags)[0])
+
+
 def number(value: float, digits: int = 4) -> str:
     """``digits`` significant ones, thousands apart, no exponent between 0.001 and a million."""
     if value == 0 or not math.isfinite(value):
