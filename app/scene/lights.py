@@ -20,7 +20,6 @@ RGB = tuple[float, float, float]
 Vector = tuple[float, float, float]
 LightKind = Literal["point", "spot", "directional"]
 
-LIGHT_KINDS: tuple[LightKind, ...] = ("point", "spot", "directional")
 OUTER = math.pi / 4  # of a spot whose file does not say
 LUMENS_PER_WATT = 683.0  # of radiant power as files count it
 SHARPEST = 1e-3  # cos inner - cos outer, at least

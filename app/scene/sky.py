@@ -21,7 +21,6 @@ F64 = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 RGB = tuple[float, float, float]
 SkyKind = Literal["uniform", "clear", "image"]
 
-SKY_KINDS: tuple[SkyKind, ...] = ("uniform", "clear", "image")
 CLEAR_SIZE = 256, 128  # px of the map of a clear sky
 COARSE = 128  # columns of a map that irradiance is summed up from: what lies between them changes cosines by 1 %, to either side
 AT_ONCE = 512  # normals
@@ -177,7 +176,6 @@ __all__ = [
     "DEFAULT_SUN",
     "LEAST_TURBIDITY",
     "MOST_TURBIDITY",
-    "SKY_KINDS",
     "SUN_ANGLE",
     "TURBIDITY",
     "Sky",

@@ -44,7 +44,6 @@ from app.session.versions import Version
 from app.session.view import View
 
 NUMBERS = ("albedo", "emission", "opacity")  # fields of a material that can be edited
-HASH_AT_ONCE = 1 << 20  # bytes
 
 
 def document_of(view: View, tables: Mapping[str, Options], folder: Path) -> Document:
@@ -136,13 +135,13 @@ def _source(source: str | Path, path: Path | None) -> str:
 
 
 def _library_name(path: Path) -> str | None:
-    """Of a scene that comes along."""
+    """The name of the library's scene whose file this is; None where it is another file."""
     known = path.stem in scene_names() and scene_path(path.stem).resolve() == path.resolve()
     return path.stem if known else None
 
 
 def digest_of(path: Path) -> str | None:
-    """Of a file's content; None where it cannot be read."""
+    """The digest of a file's content; None where it cannot be read."""
     try:
         stat = path.stat()
         return _digest(path, stat.st_mtime_ns, stat.st_size)

@@ -80,7 +80,6 @@ METHODS = {
     "level-1": Method("shooting level", options={"level": 1}),
     "level-3": Method("shooting level", options={"level": 3}),
 }
-DEFAULT_METHODS = ("uniform", "adaptive", "gathering", "disc", "item-id", "level-1", "level-3")
 
 
 def method_names(text: str) -> tuple[str, ...]:

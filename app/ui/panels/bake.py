@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 ICONS = theme.ICONS
 CUT = ("texels", "density")
-TEXEL_SECONDS = "Known once this solver has worked on the scene for a moment"
 GO_ON = "A bake into this folder was not finished: with its settings, from where it was"
 STOP = "Stop solving. The light stays as it is, here and in the folder's checkpoint"
 WRITE = "Write the light as it is now; the checkpoint stays, so that it can go on"
@@ -200,6 +199,6 @@ def _last(state: State, baking: Baking) -> None:
 
 
 def names(baking: Baking) -> str:
-    """Of the files that were written."""
+    """The names of the files that were written."""
     assert baking.baked is not None
     return ", ".join(path.name for path in baking.baked.files.paths)
