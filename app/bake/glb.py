@@ -43,7 +43,7 @@ class GlbBuilder:
         self._extensions.add(name)
 
     def drop_extension(self, name: str) -> None:
-        """It is neither used nor required any more."""
+        """Say that an extension is neither used nor required any more."""
         self._extensions.discard(name)
         required = [other for other in self.document.pop("extensionsRequired", ()) if other != name]
         if required:

@@ -35,5 +35,5 @@ def write_hdr(path: Path, light: F32) -> None:
 
 
 def write_rgbe_png(path: Path, light: F32) -> None:
-    """As a PNG whose alpha is the exponent. OSError if it cannot be written."""
+    """Write light as a PNG whose alpha is the exponent. OSError if it cannot be written."""
     Image.fromarray(rgbe(light)).save(path, "PNG")

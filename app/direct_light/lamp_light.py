@@ -52,7 +52,7 @@ class LampLight(Kind[LampSet]):
         }
 
     def reads(self, of: LampSet) -> dict[str, Texture]:
-        """Its triangles, and near and far as Chances have them, folded."""
+        """The triangles of a set of lamps, and near and far as Chances have them, folded."""
         known = chances(self.lightmap.pool, of)
         more = {"t_unoccluded": self.gpu.texture(self.lightmap.size, 1, "f4")} if of.closed_form else {}
         return {

@@ -47,7 +47,7 @@ class PunctualLight(Kind[Lights]):
         return light_sets(scene.lights_and_sun)
 
     def same(self, known: Lights, wanted: Lights) -> bool:
-        """But for the strength and colour of a single one."""
+        """Whether they are the same lights, but for the strength and colour of a single one."""
         return known == wanted or (len(known) == len(wanted) == 1 and _shape(known[0]) == _shape(wanted[0]))
 
     def emits(self, of: Lights, scene: Scene) -> bool:

@@ -42,7 +42,7 @@ class SkyLight(Kind[Sky]):
         return [scene.sky] if scene.sky is not None and scene.lit_by_sky and scene.sky.shines else []
 
     def same(self, known: Sky, wanted: Sky) -> bool:
-        """But for its scale."""
+        """Whether they are the same sky, but for its scale."""
         return known.same_shape(wanted)
 
     def emits(self, of: Sky, scene: Scene) -> bool:
@@ -69,7 +69,7 @@ class SkyLight(Kind[Sky]):
         return Draw(self._add, textures, {"u_scale": tuple((lit.of.scale / self.lightmap.unit).tolist())})
 
     def gathering(self, lit: Lit[Sky], scene: Scene) -> Draw:
-        """The same as rays have gathered it."""
+        """How that light is added as rays to the sky have gathered it."""
         return self.adding(lit, scene)._replace(how=self._gathered)
 
 

@@ -30,11 +30,11 @@ class MeanPicture:
         return (0.5 + self.count / PLASTIC ** np.array([1, 2])) % 1.0 - 0.5
 
     def clear(self) -> None:
-        """None is in it."""
+        """Forget all pictures that were added."""
         self.count = 0
 
     def add(self, picture: Texture) -> None:
-        """One more, all of the same size."""
+        """Add one more picture, of the same size as those before."""
         if self._sum is None or self._sum[0].size != picture.size:
             self.release()
             texture = self._gpu.texture(picture.size, 4, "f4")

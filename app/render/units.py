@@ -20,7 +20,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec.709 [IEC 61966-2-1]
 
 
 class Quantity(NamedTuple):
-    """What it is called, and what it is counted in."""
+    """A quantity of light, by its name and the unit that it is counted in."""
 
     name: str
     unit: str

@@ -211,7 +211,7 @@ class Baking:
 
     @property
     def share(self) -> float:
-        """That is done of the solve."""
+        """The share of the solve that is done."""
         return 1.0 if self.stage in (JUDGING, WRITING) and self._whole else self._session.run.share_done(NEVER)
 
     # -- ending it early -----------------------------------------------------------------------------------------------

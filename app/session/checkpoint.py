@@ -90,7 +90,7 @@ class Checkpoint:
             self._say(f"{error}: the bake goes on without checkpoints")
 
     def remove(self) -> None:
-        """What it was kept for is done."""
+        """Remove what was kept: what it was kept for is done."""
         self._end_writing()
         remove_state(self.path)
 

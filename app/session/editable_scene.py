@@ -34,7 +34,7 @@ class EditableScene(SolvedScene):
         return self._choice.latest
 
     def set_solver_options(self, options: Mapping[str, Options]) -> None:
-        """Of all solvers, each to be had when it is chosen. Raises UserError as ``set_options``."""
+        """Other options of all solvers, each to be had when it is chosen. Raises UserError as ``set_options``."""
         self._choice.options |= {name: other for name, other in options.items() if name != self.solver_name}
         if options[self.solver_name] != self.options:
             self.set_options(options[self.solver_name])

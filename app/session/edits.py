@@ -110,12 +110,12 @@ class EditHistory:
 
     @property
     def undoable(self) -> str | None:
-        """In words, what ``undo`` takes back."""
+        """The words for what ``undo`` takes back; None where that is nothing."""
         return self._past[-1].words if self._past else None
 
     @property
     def redoable(self) -> str | None:
-        """In words, what ``redo`` does again."""
+        """The words for what ``redo`` does again; None where that is nothing."""
         return self._future[-1].words if self._future else None
 
     def undo(self, knobs: Sequence[Knob]) -> None:

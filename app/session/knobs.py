@@ -91,7 +91,7 @@ def _differ(before: Any, after: Any) -> bool:
 
 
 def said(before: Any, after: Any) -> str:
-    """Which options are others, in words."""
+    """Which options differ, in words."""
     names = [name.replace("_", " ") for name in differing(before, after)]
     return ", ".join(names) if len(names) <= 2 else f"{len(names)} options"
 

@@ -58,7 +58,7 @@ class SolvedScene:
 
     @property
     def materials(self) -> tuple[Material, ...]:
-        """Of ``edited_scene``."""
+        """The materials of ``edited_scene``."""
         return self.edited_scene.materials
 
     @property
@@ -81,12 +81,12 @@ class SolvedScene:
 
     @property
     def options(self) -> Any:
-        """Of the solver that is at work."""
+        """The options of the solver that is at work."""
         return self._choice.options[self.solver_name]
 
     @property
     def solver_options(self) -> Mapping[str, Options]:
-        """Of each solver, by name."""
+        """The options of each solver, by its name."""
         return self._choice.options
 
     # -- solving -------------------------------------------------------------------------------------------------------
@@ -134,7 +134,7 @@ class SolvedScene:
         self.run.restore(state)
 
     def _begin(self) -> None:
-        """With a solver that has done no work."""
+        """Begin a run with a solver that has done no work."""
         self.run.begin(self.solver, self.family, self._not_finite)
         self._light_begins()
 

@@ -226,7 +226,7 @@ class View:
         return TRAPPED
 
     def _say_no_longer(self) -> None:
-        """That light is trapped."""
+        """Say no longer that light is trapped."""
         if self.session.message == TRAPPED:
             self.session.message = None
 

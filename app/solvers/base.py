@@ -59,7 +59,7 @@ class Progress:
 
     @staticmethod
     def of(measured: list[Any]) -> Progress:
-        """With what was measured before."""
+        """The progress whose ``measured`` this is."""
         done, remaining, escaped = measured
         return Progress(int(done), float(remaining), np.array(escaped, np.float64).reshape(3))
 

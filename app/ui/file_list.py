@@ -74,7 +74,7 @@ class FileList:
 
     @property
     def _filter(self) -> str:
-        """What names must contain to be listed."""
+        """The text that a name must contain to be listed."""
         return "" if not self._text.strip() or os.path.isdir(self._typed) else self._typed.name.lower()
 
     def _path(self) -> bool:

@@ -96,7 +96,7 @@ def _build(space: int) -> None:
 
 
 def _bottom_share(area: imgui.ImVec2) -> float:
-    """Of the height, for the plots."""
+    """The share of the height that the plots take."""
     return max(BOTTOM_SHARE, min(BOTTOM_EM * imgui.get_font_size() / area.y, LOWEST_SHARE))
 
 

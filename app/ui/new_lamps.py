@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from imgui_bundle import imgui
@@ -235,7 +235,7 @@ def _in_view(view: View, state: State) -> tuple[RGB, RGB, RGB]:
 def _surface(view: View, state: State) -> tuple[F64, F64 | None]:
     """The picked point, or that in the middle of the view, and its normal; without any the point that the eye turns around."""
     _, _, width, height = (int(v * state.ratio) for v in state.view_px)
-    picked: Any = state.picked or view.pick(width // 2, height // 2)
+    picked = state.picked or view.pick(width // 2, height // 2)
     if picked is None:
         return view.camera.target, None
     return np.array(picked.position), np.array(picked.normal)

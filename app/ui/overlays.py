@@ -18,6 +18,7 @@ from app.ui.words import plain
 
 if TYPE_CHECKING:
     from app.session.view import View
+    from app.util.background import BackgroundTask
 
 ICONS = theme.ICONS
 FLOATING = int(
@@ -217,7 +218,7 @@ def no_lamps(view: View, state: State) -> None:
     imgui.end()
 
 
-def loading_overlay(loading: Any, state: State) -> None:
+def loading_overlay(loading: BackgroundTask[Any] | None, state: State) -> None:
     """Stage, progress and a way out while a scene or a solver is on its way, at the top of the view: the middle shows it flat."""
     if loading is None:
         return

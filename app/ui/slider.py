@@ -47,7 +47,7 @@ class Range:
         self._per_px = span / SPAN_PX if not multiple else max(span / SPAN_PX, multiple / STEP_PX)
 
     def position(self, value: float) -> float:
-        """Of a value [px]."""
+        """Where a value lies [px]."""
         if not self.logarithmic:
             return (value - self.low) / self._per_px
         return DECADE_PX * math.log10(max(value if value > 0 else self._start, self._least))

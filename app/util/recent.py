@@ -25,7 +25,7 @@ class Recent:
         return [path for path in self._paths if path.is_file()]
 
     def add(self, path: Path) -> None:
-        """It was opened just now."""
+        """Note that this file was opened just now."""
         path = path.resolve()
         self._paths = [path, *(other for other in self._paths if other != path)][:MOST]
         if self._file is None:
@@ -36,7 +36,7 @@ class Recent:
                 partial.write_text(json.dumps([str(path) for path in self._paths]))
 
     def forget(self) -> None:
-        """Of all."""
+        """Remember none of them any more."""
         self._paths = []
         if self._file is not None:
             with contextlib.suppress(OSError):

@@ -101,7 +101,7 @@ def _member(nth: int) -> str:
 
 
 def _content(archive: zipfile.ZipFile, name: str, most: int) -> bytes:
-    """Of a small member."""
+    """The bytes of a small member, of which there may be at most so many."""
     if (size := _size(archive, name)) > most:
         raise ValueError(f"{name}: {size} bytes")
     return archive.read(name)

@@ -71,7 +71,7 @@ class Bounce:
         self.at, self.share = None, 0.0
 
     def _rows_from(self, row: int) -> int:
-        """Of the band that begins there."""
+        """How many rows the band has that begins there."""
         width, height = self._lightmap.size
         least = min(LEAST_SENDERS, self._gather.choices)
         return height if self._gather.whole else min(max(self._pace.pairs // (width * least), 1), height - row)

@@ -115,7 +115,7 @@ class DirectionShots:
             )
 
     def _write(self, shots: Sequence[OutsideShot]) -> None:
-        """As the shooters of the batch."""
+        """Write these shots as the shooters of the batch."""
         records = np.zeros(BATCH, SHOOTER.dtype)
         for record, shot in zip(records, shots, strict=False):
             record["edge_u"], record["edge_v"] = axes_of(shot.axis)

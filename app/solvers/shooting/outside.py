@@ -58,7 +58,7 @@ class Sent:
 
     @staticmethod
     def of(values: list[Any]) -> Sent:
-        """With these ``values``."""
+        """The one that has these ``values``."""
         to_come, kind, power = values
         return Sent({name: float(to_come[name]) for name in KINDS}, KINDS[KINDS.index(kind)], float(power))
 
@@ -125,7 +125,7 @@ class Outside:
     # -- kept for later ------------------------------------------------------------------------------------------------
 
     def state(self) -> State:
-        """What was given, and what is to come."""
+        """What has been given so far, and what is to come, to be kept for later."""
         received = {kind: [self._received[kind], self._box_sent[kind]] for kind in KINDS}
         state = State({"made": self.made, "at": self._at, "received": received, "sent": self.sent.values})
         state.values["given"] = [[asdict(source), light.tolist()] for source, light in self._given.items()]
@@ -163,7 +163,7 @@ class Outside:
 
     @property
     def next_power(self) -> float:
-        """Of the next shot [W]; 0 after the last."""
+        """The power of the next shot [W]; 0 after the last."""
         if not self.left:
             return 0.0
         shot = self._queue[self._at]

@@ -69,7 +69,8 @@ class PointShots:
                 yield
 
     def _write(self, shots: Sequence[OutsideShot]) -> None:
-        """As the shooters of the batch. Their axes are so long that all of the scene is nearer than FAR in them."""
+        """Write these shots as the shooters of the batch. Their axes are so long that all of the scene is nearer than FAR in
+        them."""
         space, unit = self._lightmap.space, self._lightmap.unit
         records = np.zeros(BATCH, SHOOTER.dtype)
         for nth, (record, shot) in enumerate(zip(records, shots, strict=False)):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from imgui_bundle import imgui
 
-from app.scene.model import MOST_ALBEDO
+from app.scene.model import MOST_ALBEDO, Material
 from app.ui import colour, lamp, theme, widgets
 from app.ui.state import RGB, State
 
@@ -40,7 +40,7 @@ def _list(view: View, state: State) -> None:
     imgui.end_child()
 
 
-def _row(state: State, index: int, material: Any) -> None:
+def _row(state: State, index: int, material: Material) -> None:
     imgui.push_id(index)
     side = imgui.get_text_line_height()
     colour.swatch("##albedo", material.albedo, side)
@@ -54,7 +54,7 @@ def _row(state: State, index: int, material: Any) -> None:
     imgui.pop_id()
 
 
-def _editor(view: View, state: State, material: Any) -> None:
+def _editor(view: View, state: State, material: Material) -> None:
     index = state.material
     came = view.session.unedited.materials[index]
     imgui.push_id("material")
@@ -70,7 +70,7 @@ def _editor(view: View, state: State, material: Any) -> None:
         widgets.dim(", ".join(notes))
 
 
-def _albedo(material: Any, came: Any) -> RGB:
+def _albedo(material: Material, came: Material) -> RGB:
     """came: the material as it was read."""
     widgets.labelled("Albedo ρ", changed=material.albedo != came.albedo)
     imgui.set_next_item_width(-1)
@@ -82,7 +82,7 @@ def _albedo(material: Any, came: Any) -> RGB:
     return widgets.put_back(edited, came.albedo)
 
 
-def emission(view: View, state: State, material: Any, came: Any, index: int) -> RGB:
+def emission(view: View, state: State, material: Material, came: Material, index: int) -> RGB:
     """Widgets of a material's emission. A lamp that is dimmed to nothing keeps its colour in the state. came: the
     material as it was read."""
     edited, state.emission_colours[index] = lamp.edit_light(

@@ -89,7 +89,7 @@ def _sun(sky: Sky, came: Sky) -> Sky:
 
 
 def _slider(label: str, help: str, value: float, came: float, ends: tuple[float, float], text: str) -> float:
-    """What it was moved to."""
+    """Draw one slider of the sky; the value that it was moved to."""
     widgets.labelled(label, changed=value != came)
     imgui.set_next_item_width(-1)
     moved = slider.slide(f"##{label}", value, slider.Range(*ends), text)
