@@ -53,6 +53,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "VIEWS": tuple({p.views for p in PROJECTIONS.values()}),
     "MATERIAL_BITS": (16,),
     "ALBEDO_TEXTURE": FLAG,
+    "POINT": FLAG,
     "EMISSION_TEXTURE": FLAG,
     "OVERLAY": FLAG,
     "LINEAR": FLAG,

@@ -4,7 +4,12 @@
 //   VISIBILITY 0, item id   a sample sees the receiver if it shows the receiver's facet [Coombe03, 3.2]
 //   VISIBILITY 1, depth     or if what it shows is no nearer than the receiver's own plane along that sample's sight
 //   VISIBILITY 2, combined  either: ids save receivers from depth error, depth saves small triangles from id error
+//
+// With POINT, where what looks is one point, whose errors no others even out: where some of the four see the receiver, the others
+// hide it only if it is behind what they show.
 #define VISIBILITY 2
+#define POINT 0
+#include "visibility/behind.glsl"
 
 // Depth is single precision, interpolated across triangles that may be as long as the scene: 2^-14 of it covers the rounding
 // (2^-23 a step) and is far below a texel.
@@ -14,7 +19,8 @@ const float DEPTH_SLACK = 1.0 / 16384.0;
 uniform sampler2D t_items;
 uniform sampler2D t_depth;  // in units of FAR
 
-float visible(float facet, vec3 local, vec3 normal_local, int shot) {
+// axes: of local vectors, in the solver space
+float visible(float facet, vec3 local, vec3 normal_local, mat3 axes, int shot) {
     int view = view_from_direction(local);
     vec3 point = view_from_local(view, local), normal = view_from_local(view, normal_local);
     vec4 bounds = view_bounds_px(view);
@@ -24,7 +30,8 @@ float visible(float facet, vec3 local, vec3 normal_local, int shot) {
     vec2 uv = (middle + vec2(0.0, float(shot) * MAP_PX.y)) / vec2(textureSize(t_items, 0));
     bvec4 seen = bvec4(false);
 #if VISIBILITY != 1
-    seen = equal(textureGather(t_items, uv), vec4(facet));
+    vec4 items = textureGather(t_items, uv);
+    seen = equal(items, vec4(facet));
 #endif
     float plane = dot(normal, point);
 #if VISIBILITY != 0
@@ -34,6 +41,15 @@ float visible(float facet, vec3 local, vec3 normal_local, int shot) {
     vec4 shown = FAR * textureGather(t_depth, uv);
     bvec4 open = greaterThanEqual(shown, depth * (1.0 - DEPTH_SLACK));
     seen = bvec4(seen.x || open.x, seen.y || open.y, seen.z || open.z, seen.w || open.w);
+#endif
+#if POINT && VISIBILITY == 2
+    if (any(seen) && !all(seen)) {
+        for (int i = 0; i < 4; ++i) {
+            vec2 px = middle + vec2(i == 1 || i == 2 ? 0.5 : -0.5, i < 2 ? 0.5 : -0.5);
+            vec3 sight = local_from_view(view, sight_from_px(view, px));
+            if (!seen[i]) seen[i] = !behind(items[i], shown[i] * sight - local, sight, axes);
+        }
+    }
 #endif
     vec4 weight = vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)) * on_hemisphere(middle);
     float share = dot(vec4(seen), weight) / dot(weight, vec4(1.0));

@@ -33,6 +33,7 @@ class Receive:
         options: ShootingOptions,
     ) -> None:
         self._lightmap, self._receivers, self._shooters, self._see = lightmap, receivers, shooters, see
+        self._facets = ("t_facets",) if see.lights is not None and options.visibility == "combined" else ()
         kinds = (True, False) if lightmap.pool.adaptive else tuple(receivers.meshes)
         fields = (False, True) if see.lights is None else (False,)
         self.passes = {(planar, near): self._make(gpu, options, planar, near) for planar in kinds for near in fields}
@@ -44,7 +45,7 @@ class Receive:
             "VISIBILITY": VISIBILITIES.index(options.visibility),
         }
         if self._see.lights is not None:
-            defines["LIGHT"] = True
+            defines |= {"LIGHT": True, "POINT": True}
         else:
             defines |= {"DISC": options.form_factor == "disc", "DISC_SUBDIVISION": options.discs, "NEAR_FIELD": near}
         return Pass(
@@ -79,7 +80,7 @@ class Receive:
         for (planar, _), receive in self.passes.items():
             if planar not in meshes:
                 continue
-            textures = lightmap.textures("t_materials", "t_albedo") | self._see.textures
+            textures = lightmap.textures("t_materials", "t_albedo", *self._facets) | self._see.textures
             receive.draw(
                 target,
                 textures=textures if planar else textures | general,

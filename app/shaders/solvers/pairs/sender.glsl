@@ -1,12 +1,12 @@
 // What sends light: a texel, or what stands for a window of texels. F is its form factor, without visibility, from a point.
 #include "common/atlas.glsl"
 #include "common/contour.glsl"
+#include "common/facet.glsl"
 #include "common/item.glsl"
 #include "solvers/pairs/rows.glsl"
 
 uniform sampler2D t_place;   // of each sender: position and area, solver space
 uniform sampler2D t_facing;  // normal, facet
-uniform sampler2D t_facets;  // edges of its texels, see app/lightmap/textures.py
 
 struct Sender {
     vec3 position;
@@ -25,9 +25,7 @@ const float CLOSE = 32.0;
 
 // The sender as a square of its area, along the axes of its texels: closed form, below 1 however close it is. [Lambert1760; Baum89]
 float close_form_factor(vec3 way, vec3 normal, Sender s) {
-    int entry = 2 * int(s.facet), width = textureSize(t_facets, 0).x;
-    vec3 u = texelFetch(t_facets, ivec2(entry % width, entry / width), 0).xyz;
-    vec3 v = texelFetch(t_facets, ivec2((entry + 1) % width, (entry + 1) / width), 0).xyz;
+    vec3 u = facet_entry(uint(s.facet), 0).xyz, v = facet_entry(uint(s.facet), 1).xyz;
     float scale = 0.5 * sqrt(s.area / max(length(cross(u, v)), 1e-30));
     u *= scale;
     v *= scale;

@@ -1,21 +1,18 @@
 // The light of some directions is blended into H and r of every texel. A sample of a map sees the receiver if it shows its facet,
 // or nothing that lies nearer to the light than the receiver's own plane there: the four around it, weighted bilinearly. What it
-// shows below the sphere around the scene is the background.
-//
-// Where some of the four see it, what another shows hides it only if the receiver is behind the plane of that facet: at the foot
-// of a wall the floor is nearer than the plane of the wall goes on below it, but hides nothing of the wall, nor the wall of the
-// floor.
+// shows below the sphere around the scene is the background. Where some of the four see it, the others hide it only if it is behind
+// what they show.
 #include "common/atlas.glsl"
 #include "common/albedo.glsl"
 #include "common/item.glsl"
 #include "solvers/shooting/direction_shot.glsl"
+#include "visibility/behind.glsl"
 
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
 uniform sampler2D t_materials;
 uniform sampler2D t_items;
 uniform sampler2D t_depth;
-uniform sampler2D t_facets;  // edges of their texels, see app/lightmap/textures.py
 uniform int u_shots;  // from u_first on
 uniform int u_maps;   // that t_items has room for
 
@@ -23,19 +20,6 @@ layout(location = 0) out vec4 out_irradiance;  // a: as in receive.frag.glsl
 layout(location = 1) out vec4 out_residual;
 
 const float SLACK = 1.0 / 8192.0;  // of the scene's radius: rounding of depths, as in visibility/visible.glsl
-
-vec3 facet_tangent(int entry) {
-    int width = textureSize(t_facets, 0).x;
-    return texelFetch(t_facets, ivec2(entry % width, entry / width), 0).xyz;
-}
-
-// Whether the receiver is behind the plane of what a sample shows; to_shown: from the receiver to there, in the map's axes.
-bool behind(float item, vec3 to_shown, mat3 axes) {
-    if (item == OPEN || item == UNCHARTED) return true;
-    int entry = 2 * int(item);
-    vec3 normal = cross(facet_tangent(entry), facet_tangent(entry + 1)) * axes;
-    return dot(normal, to_shown) * normal.z > 0.0;  // what is shown faces the light
-}
 
 float visible(vec3 local, vec3 normal, float facet, mat3 axes, int shot) {
     vec2 at = px_of(local) - 0.5, base = floor(at), f = at - base;
@@ -49,7 +33,7 @@ float visible(vec3 local, vec3 normal, float facet, mat3 axes, int shot) {
     if (any(seen) && !all(seen)) {
         for (int i = 0; i < 4; ++i) {
             vec3 to_shown = vec3(vec2(x[i], y[i]) * (2.0 / (WIDTH * MAP)), shown[i] - local.z);
-            if (!seen[i]) seen[i] = !behind(items[i], to_shown, axes);
+            if (!seen[i]) seen[i] = !behind(items[i], to_shown, vec3(0.0, 0.0, -1.0), axes);
         }
     }
     return dot(vec4(seen), vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)));

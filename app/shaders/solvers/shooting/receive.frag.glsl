@@ -37,10 +37,10 @@ vec2 received(vec3 position, vec3 normal, float facet, Shooter s, int shot) {
     mat3 axes = world_axes(s);
     vec3 local = (position - s.origin) * axes;
 #if LIGHT
-    vec2 FV = vec2(unoccluded(load_light(s.patch_x), position, normal).r, visible(facet, local, normal * axes, shot));
+    vec2 FV = vec2(unoccluded(load_light(s.patch_x), position, normal).r, visible(facet, local, normal * axes, axes, shot));
     return local.z > 0.0 ? FV : vec2(0.0);
 #else
-    vec2 FV = vec2(form_factor(position, normal, s), visible(facet, local, normal * axes, shot));
+    vec2 FV = vec2(form_factor(position, normal, s), visible(facet, local, normal * axes, axes, shot));
     return local.z > COPLANAR ? FV : vec2(0.0);
 #endif
 }
