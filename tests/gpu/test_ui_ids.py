@@ -95,7 +95,7 @@ def lamps_and_sky(desk: Desk) -> None:
 
 
 def names_that_are_shared(desk: Desk) -> None:
-    desk.session.scene.materials = (*MATERIALS, *MATERIALS, MATERIALS[0])
+    desk.session.scene.materials = desk.session.unedited.materials = (*MATERIALS, *MATERIALS, MATERIALS[0])
     desk.session.scene.warnings = desk.session.scene.warnings * 2
 
 
