@@ -37,6 +37,7 @@ def area_gizmos(view: View, state: State) -> bool:
     free = not io.want_capture_mouse and state.drag_button < 0 and not state.area_held
     if near is not None and free and imgui.is_mouse_clicked(0):
         state.lamp_place, state.area_held = (near.name, near.position), True
+        state.area_lamp = [material.name for material in view.session.materials].index(near.name)
     if state.area_held and state.lamp_place is not None and (io.mouse_delta.x or io.mouse_delta.y):
         name, place = state.lamp_place
         x, y, z = moved_by_mouse(view, state, np.array(place)).tolist()

@@ -159,6 +159,24 @@ def test_an_added_lamp_is_undone_in_one_step_and_done_again(dark: Dark, kind: Ki
     assert dark.view.display.exposure == lit
 
 
+def test_a_lamp_that_was_removed_again_comes_back(dark: Dark) -> None:
+    """Adding and removing it are two steps, in a scene that shines without it, too."""
+    dark.add(SURFACES[0])
+    frame(dark)
+    SURFACES[1].add(dark.view, dark.state)
+    frame(dark)
+    settle(dark)
+    added = dark.session.surfaces
+    new_lamps.remove_surfaces(dark.view, len(dark.session.materials) - 1)
+    frame(dark)
+    settle(dark)
+    assert len(dark.session.surfaces.lamps) == 1
+    edits.undo(dark.view, dark.state)
+    dark.state.run_actions()
+    settle(dark)
+    assert dark.session.surfaces == added
+
+
 def test_a_lamp_that_was_stopped_on_its_way_is_no_edit(dark: Dark) -> None:
     frame(dark)
     SURFACES[0].add(dark.view, dark.state)

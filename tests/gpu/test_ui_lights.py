@@ -127,6 +127,7 @@ def test_an_added_lamp_is_moved_by_its_handle(panel: Desk) -> None:
     panel.point(at.x + 20, at.y)
     panel.point(at.x + 40, at.y)
     assert session.surfaces.lamps[0] == PANEL and state.lamp_place is not None
+    assert state.area_lamp == len(session.materials) - 1, "it is selected"
     panel.press(0, False)
     panel.frames(2)
     (x, y, z) = session.surfaces.lamps[0].position
