@@ -230,10 +230,15 @@ def test_lamps_of_a_scene_that_has_changed_are_said(place: Callable[..., Place],
 
 def test_lights_for_which_a_scene_was_cut_anew_are_kept(place: Callable[..., Place], tmp_path: Path) -> None:
     """A session whose surfaces have sides that only lamps without area light."""
-    one = place().open("cornell-box")
+    scene = copied(tmp_path)
+    scene.write_text(scene.read_text().replace('name = "white"', 'name = "white"\ndouble_sided = true', 1))
+    one = place().open(scene)
+    assert one.session.charts.dark_faces > 0
     one.session.set_lights((Light("bulb", intensity=(1.0, 0.5, 0.25), position=(0.1, 0.2, 0.3)),))
     settle(one)
+    assert one.session.charts.dark_faces == 0
     one.session.work(8)
+    one.session.run.settle()
     two = place().open(one.save(tmp_path / "a.glow"))
     assert two.notes == [] and two.session.edited_scene.lights == one.session.edited_scene.lights
     assert two.session.solver.issued == one.session.solver.issued > 0
