@@ -79,16 +79,20 @@ class ErrorEstimator:
         chosen, weights = choose_points(solution, lacking, random)
         points = yield from self._looked(self._candidates.only(chosen), random, start + seconds / 2, 0.1)
         weights = weights[: len(points.points)]
-        helpers = yield from self._looked(choose_helpers(points.ends, weights, random), random, start + seconds, 0.5)
-        nodes = _both(points, helpers)
-        network = yield from self._network(nodes, len(helpers.points))
+        nodes, network = points, None
+        reflecting = choose_helpers(points.ends, weights, random)
+        if len(reflecting):
+            helpers = yield from self._looked(reflecting, random, start + seconds, 0.5)
+            nodes = _both(points, helpers)
+            network = yield from self._network(nodes, len(helpers.points))
         if not np.isfinite(nodes.gathered).all() or not np.isfinite(nodes.solution).all():
             return None
-        lacking = network.with_bounces(nodes.gathered[..., :3] - nodes.solution[:, None])
-        lamps = np.repeat(nodes.gathered[..., 3].mean(1)[:, None, None], 3, axis=2)
-        light = network.with_bounces(lamps)[:, 0].mean(1)
+        lacking = nodes.gathered[..., :3] - nodes.solution[:, None]
+        light = np.repeat(nodes.gathered[..., 3].mean(1)[:, None, None], 3, axis=2)
+        if network is not None:
+            lacking, light = network.with_bounces(lacking), network.with_bounces(light)
         judged = slice(0, len(weights))
-        return estimate_error(nodes.solution[judged], lacking[judged], light[judged], weights)
+        return estimate_error(nodes.solution[judged], lacking[judged], light[judged, 0].mean(1), weights)
 
     def release(self) -> None:
         self._probe.release()
@@ -192,7 +196,8 @@ def choose_points(solution: F64, lacking: F64, random: np.random.Generator) -> t
 
 
 def choose_helpers(ends: Ends, weights: F64, random: np.random.Generator) -> Points:
-    """HELPERS of the ends of links from points with weights (n,): half of them by what they reflect, half by how much they do."""
+    """HELPERS of the ends of links from points with weights (n,): half of them by what they reflect, half by how much they do.
+    None where nothing reflects, or all links end in the sky."""
     shares = np.zeros(ends.hit.size)
     albedo = ends.albedo.mean(2)
     for reflects in (albedo * np.maximum(ends.irradiance, 0.0), albedo):

@@ -278,6 +278,19 @@ def test_a_furnace_knows_what_it_lacks(gpu: Gpu, residual: float) -> None:
     half.release()
 
 
+def test_where_nothing_reflects_no_more_lacks_than_what_is_seen(gpu: Gpu) -> None:
+    """Black walls that shine: H = E everywhere, and a lightmap that has nine tenths of it."""
+    scene = quads_scene(room(), (grey(0.0, 3.0),))
+    lightmap = Lightmap.of(gpu, scene, parametrize(scene, texels=500))
+    put(lightmap, "t_irradiance", 2.7 * (lightmap.pool.surfaces.area > 0)[..., None] * np.ones(3))
+    estimator = ErrorEstimator(gpu, lightmap, 32)
+    error = run_to_end(estimator.parts(np.inf))
+    assert error is not None and error.points == POINTS
+    assert error == pytest.approx((0.1, -0.1, 0.1, POINTS), rel=0.02)
+    estimator.release()
+    lightmap.release()
+
+
 def test_shadows_on_coarse_texels_are_expected_to_be_off(gpu: Gpu) -> None:
     """Within a factor of two of how far they are from ten times as many texels."""
     coarse, fine = (begin(gpu, table_room(), density=density, residual=3e-3, resolution=128) for density in (6.0, 20.0))
