@@ -6,6 +6,7 @@ writing leaves the previous files as they were.
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -100,7 +101,8 @@ def write_bake(
     irradiance (H, W, 3) f32 [W/m²] over the virtual atlas, row 0 at v = 0, finite wherever ``covered`` (H, W); (H, W, 6) where it
     is followed by its direct part: then that and the rest are files of their own, too.
     unedited: the scene as it was read; of a glTF file, its document is kept then, see gltf_edit.py. In the report, numbers
-    that are not finite become null. UserError if the folder cannot be written.
+    that are not finite become null, and it names all files: what an earlier one names, and is not written now, is removed.
+    UserError if the folder cannot be written.
     """
     finer = irradiance.shape[0] // charts.size[1]
     assert irradiance.shape[:2] == (charts.size[1] * finer, charts.size[0] * finer), (
@@ -114,7 +116,7 @@ def write_bake(
     solved, solved_light = charts, finished(irradiance, covered, charts)
     placed = arranged(scene, solved, solved_light, options.padding, options.max_size)
     report = {**report, "atlas": list(placed.page_size), "pages": placed.pages}
-    lightmaps = page_names(placed.pages)
+    lightmaps, before = page_names(placed.pages), _files_before(directory)
     try:
         with Staged(directory) as staged:
             notes = _too_large(placed, options) + write_light(staged, placed.light, placed.pages, options)
@@ -130,15 +132,25 @@ def write_bake(
                 shown = staged.read(SCENE_NAME, *lightmaps, SKY_NAME)
                 page = web_page(scene.name, shown, report, find_three(options.three))
                 staged(PAGE_NAME).write_text(page, encoding="utf-8")
-            staged(REPORT_NAME).write_text(json_text(_with_notes(report, notes)), encoding="utf-8")
-        for path in set(directory.iterdir()).difference(staged.paths):
-            if path.name in OPTIONAL or LIGHT_NAME.fullmatch(path.name):  # of another bake
-                path.unlink()
+            text = staged(REPORT_NAME)
+            files = sorted(path.name for path in staged.paths)
+            text.write_text(json_text(_with_notes({**report, "files": files}, notes)), encoding="utf-8")
+        for name in before.difference(files):
+            (directory / name).unlink(missing_ok=True)
     except OSError as error:
         raise UserError(f"{directory}: cannot write the bake ({error.strerror or error})") from error
     usual = directory / lightmaps[0], directory / SCENE_NAME, directory / REPORT_NAME
     more = tuple(path for path in staged.paths if path not in usual)
     return BakeFiles(*usual, placed.page_size, placed.pages, more, notes)
+
+
+def _files_before(directory: Path) -> set[str]:
+    """Names of files that the bake before has left here by its report, and which this one may not write: others are not ours."""
+    try:
+        names = json.loads((directory / REPORT_NAME).read_text(encoding="utf-8"))["files"]
+        return {name for name in names if name in OPTIONAL or LIGHT_NAME.fullmatch(name)}
+    except (OSError, ValueError, LookupError, TypeError):
+        return set()
 
 
 def _too_large(placed: Arranged, options: BakeOptions) -> tuple[str, ...]:

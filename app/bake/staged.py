@@ -1,4 +1,5 @@
-"""Files that are written beside their final names first and take these together, so that a failure leaves what was there."""
+"""Files that are written beside their final names first and take these together, once all are on the disk, so that a failure
+leaves what was there."""
 
 from __future__ import annotations
 
@@ -38,6 +39,9 @@ class Staged:
     ) -> None:
         try:
             if kind is None:
+                for written in self._written.values():
+                    with written.open("rb+") as file:
+                        os.fsync(file.fileno())
                 for path, written in self._written.items():
                     os.replace(written, path)
         finally:

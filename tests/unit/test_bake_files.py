@@ -101,7 +101,21 @@ def test_writes_three_files_and_nothing_else(tmp_path, inputs):
         "atlas": list(files.atlas),
         "pages": 1,
         "warnings": [note],
+        "files": NAMES,
     }
+
+
+def test_files_that_no_bake_wrote_stay(tmp_path, inputs):
+    mine = ["embedded.glb", "index.html", "irradiance.hdr", "sky.exr"]
+    for name in mine:
+        (tmp_path / name).write_text("mine")
+    for _ in range(2):
+        write_bake(tmp_path, *inputs, {})
+        assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*mine, *NAMES])
+    assert {(tmp_path / name).read_text() for name in mine} == {"mine"}
+    (tmp_path / "report.json").write_text('{"files": ["../x", "embedded.glb", 3]}')  # nothing is done by a damaged one
+    write_bake(tmp_path, *inputs, {})
+    assert (tmp_path / "embedded.glb").exists()
 
 
 def test_half_floats_are_right_to_a_twentieth_of_a_per_cent(tmp_path, inputs):
