@@ -7,9 +7,11 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.gpu import Texture
 from app.lightmap.lightmap import Lightmap
+from app.lightmap.tile_pool import TilePool
 from app.render.layers import LAYER_SHADERS
 from app.render.options import DisplayOptions
 from app.render.sample import sampled_colours, sampled_irradiance, sampled_tiles
@@ -27,6 +29,7 @@ UNITS = {  # of what is no light
     "expected error": "%",
     "jump at seams": "%",
     "rays": "per texel",
+    "texel density": "texels/m",
 }
 LAYER = {"illuminance": "irradiance", "luminance": "combined"}  # the layer whose radiance is measured
 VIRIDIS = np.array(
@@ -76,7 +79,8 @@ def false_colour_scale(
 ) -> Scale:
     """The scale of the display's false colour, found from the light on what does not emit and rounded to short numbers; only its
     lower end where ``false_colour_max`` gives the upper one. Waits for the GPU. Of errors it is always the same; of counts it
-    reaches from 0 to the highest of those that are ``offered``."""
+    reaches from 0 to the highest of those that are ``offered``; of texel density it is logarithmic around those that most of the
+    area has."""
     kind, high, low = measured(display), display.false_colour_max, 0.0
     unit = quantity(kind, display.quantities).unit
     if unit == "%":
@@ -84,6 +88,8 @@ def false_colour_scale(
     if kind == "rays":
         counts = np.frombuffer((offered or {})["rays"].read(), np.float32)
         return Scale(0.0, _nice_above(float(counts.max())), unit)
+    if kind == "texel density":
+        return _density_scale(lightmap.pool)
     if not high or display.false_colour_log:
         darkest, brightest = _ends(kind, lightmap, display.quantities)
         high = high or _nice_above(brightest)
@@ -115,11 +121,27 @@ def _ends(kind: str, lightmap: Lightmap, units: str) -> tuple[float, float]:
     shown = (area > 0) & (emission.max(-1) == 0) & np.isfinite(values) & (values > 0)
     if not shown.any():
         return 0.0, 0.0
-    values, area = values[shown], area[shown]
+    return _between(values[shown], area[shown])
+
+
+def _density_scale(pool: TilePool) -> Scale:
+    """Of texels along a metre [texels/m], as finely as leaves are cut now."""
+    charts = pool.charts
+    edge = np.sqrt(np.linalg.norm(np.cross(pool.dpdu, pool.dpdv), axis=1)) * pool.space.scale
+    area = pool.scene.normals_areas[1][charts.face_triangle]
+    coarsest, finest = _between(1.0 / np.maximum(edge[charts.face_facet], 1e-10), area)
+    levels = pool.leaves.level[np.flatnonzero(pool.used)]
+    coarsest, finest = coarsest * 2.0 ** int(levels.min()), finest * 2.0 ** int(levels.max())
+    wider = max(10.0 ** DECADES[0] / (finest / coarsest), 1.0) ** 0.5  # alike in the middle of the scale
+    return Scale(_nice_below(coarsest / wider), _nice_above(finest * wider), UNITS["texel density"])
+
+
+def _between(values: NDArray[np.floating], area: NDArray[np.floating]) -> tuple[float, float]:
+    """Between which nearly all of the area has its values, see SHARES."""
     order = np.argsort(values)
     share = np.cumsum(area[order])
-    darkest, brightest = values[order][np.searchsorted(share, np.array(SHARES) / 100 * share[-1])]
-    return float(darkest), float(brightest)
+    lowest, highest = values[order][np.searchsorted(share, np.array(SHARES) / 100 * share[-1])]
+    return float(lowest), float(highest)
 
 
 def _nice_above(value: float) -> float:

@@ -41,6 +41,7 @@ LAYER_SHADERS = {
     "charts": Layer("charts", smooth=False, checker=0.12, defines=("MATERIAL_BITS",)),
     "leaves": Layer("leaves", smooth=False, checker=0.12, defines=("TILE",)),
     "texels": Layer("texels", smooth=False, checker=0.25, defines=("MATERIAL_BITS",)),
+    "density": Layer("density", smooth=False, measures="texel density", defines=("MATERIAL_BITS", "TILE")),
     "error": Layer("error", "t_irradiance", compares=True, measures="error"),
     "direct": Layer("offered_light", "t_irradiance", offered="direct"),
     "indirect": Layer("indirect", "t_irradiance", offered="direct"),

@@ -8,7 +8,7 @@ from app.options import Options, option
 from app.render.units import UNITS
 
 LAYERS = (
-    *("combined", "irradiance", "residual", "albedo", "charts", "leaves", "texels", "error"),
+    *("combined", "irradiance", "residual", "albedo", "charts", "leaves", "texels", "density", "error"),
     *("direct", "indirect", "rays", "expected-error", "local", "seams"),
 )
 TONE_MAPS = ("clamp", "reinhard", "aces", "agx", "neutral")
@@ -21,7 +21,7 @@ FALSE_COLOURS = ("off", "illuminance", "luminance")  # lux, cd/m²
 class DisplayOptions(Options):
     layer: str = option(
         "combined",
-        "what is shown: B, H, r, albedo, charts, quadtree levels, texel density, error or jumps at seams; where the "
+        "what is shown: B, H, r, albedo, charts, quadtree levels, texels, their density, error or jumps at seams; where the "
         "solver has it direct or indirect light, rays per texel, the error that it expects, or the local set around the observer",
         choices=LAYERS,
         tip="What surfaces show: combined is the picture; irradiance the light that they receive, residual what is "

@@ -113,6 +113,7 @@ class DisplayTexels:
         uniforms |= {
             "u_unit": lightmap.unit,
             "u_target_texel": 1.0 / (lightmap.charts.density * lightmap.space.scale),
+            "u_metre": 1.0 / lightmap.space.scale,
         }
         textures = self._tables | lightmap.textures(*LAYER_TABLES)
         textures |= {"t_light": lightmap.texture(layer.light)} if layer.light else {}

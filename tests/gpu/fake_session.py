@@ -142,7 +142,7 @@ class FakeSession:
 
     @property
     def layers(self) -> tuple[str, ...]:
-        return LAYERS[:8]
+        return LAYERS[:9]
 
     def false_colour_scale(self) -> Scale:
         if self.scale is not None:

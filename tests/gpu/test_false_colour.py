@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from boxes import SIZE, STEP, box, cornell, even, picture, put
+from boxes import SIZE, STEP, box, cornell, even, hits, picture, put, view_of
 
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
@@ -34,6 +34,20 @@ def test_false_colour_is_the_colour_of_the_value(gpu: Gpu, box: Lightmap, logari
     expected = colour_map(1001)[round(place * 1000)]
     x, y = SIZE[0] // 2, SIZE[1] // 3
     # the legend is sampled in steps of 1/1000 here, less than half a step of 8 bits
+    assert picture(gpu, box, display)[y, x] / 255 == pytest.approx(expected, abs=STEP + 0.5 / 255)
+
+
+def test_the_density_layer_shows_texels_per_metre(gpu: Gpu, box: Lightmap) -> None:
+    """The colour at a pixel of the back wall is that of its whole texels, whose area is known."""
+    display = DisplayOptions(layer="density", exposure=7)
+    low, high, unit = false_colour_scale(display, box)
+    x, y = SIZE[0] // 2, SIZE[1] // 3
+    (triangle,), _ = hits(box.scene, view_of(box), np.array([[x, y]]))
+    surfaces = box.pool.surfaces
+    on_wall = (surfaces.face >= 0) & (box.charts.face_triangle[surfaces.face] == triangle)
+    density = 1 / np.sqrt(surfaces.area[on_wall].max())
+    assert low < density < high and unit == "texels/m"
+    expected = colour_map(1001)[round(np.log(density / low) / np.log(high / low) * 1000)]
     assert picture(gpu, box, display)[y, x] / 255 == pytest.approx(expected, abs=STEP + 0.5 / 255)
 
 
