@@ -133,7 +133,7 @@ def test_samples_double_until_the_time_is_over(monkeypatch: pytest.MonkeyPatch, 
     assert [row["paths"] for row in rows] == [1, 2, 4, 8] and set(asked) == {name == "cycles-oidn"}
     assert [row["rms"] for row in rows] == pytest.approx([1, 0.5, 0.25, 0.125])
     assert [row["cpu_seconds"] for row in rows] == [2.0, 4.0, 8.0, 16.0]
-    _, charts, _ = read_and_unfold(scene, AtlasOptions(texels=600), False, silent)
+    _, _, charts, _ = read_and_unfold(scene, AtlasOptions(texels=600), False, silent)
     assert rows[0]["texels"] == TilePool(scene, charts).texel_count
 
 

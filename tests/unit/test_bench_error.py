@@ -196,7 +196,7 @@ def test_points_lie_on_the_triangles_that_methods_see(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(error, "reference_irradiance", judged)
     run(["bench", "error", str(file), "--methods", "uniform", "--reference", "dense", "-o", str(tmp_path / "out")])
-    seen, _, _ = read_and_unfold(str(file), AtlasOptions(texels=500), False, silent)
+    _, seen, _, _ = read_and_unfold(str(file), AtlasOptions(texels=500), False, silent)
     assert len(given[0].corners) == len(seen.corners) > 4 and (given[0].corners == seen.corners).all()
 
 
