@@ -7,6 +7,9 @@ no exposure that shows the rest shows it, and of what light hardly reaches there
 Light not yet shot counts as an even ambient A = r̄ / (1 − ρ̄) [Cohen88, section 5]. Before the first shot that is too bright
 by what escapes, and by how unevenly light will fall (the mean logarithm of the Cornell box's light lies 1.2 EV below that of
 its ambient, of two rooms 2.5 EV): a scene just opened is exposed for a forecast of its light.
+
+What leaks through closed corners into a room without light is a few bright lines in the dark. It is exposed as if what is emitted
+fell evenly on everything: dark, as it is.
 """
 
 from __future__ import annotations
@@ -30,6 +33,8 @@ FORECAST = 128  # texels of those seen whose light is forecast, at most
 RANGE = 2.0**-8  # what is darker than that beside what is bright, a screen of 8 bits shows as black
 EXPOSURES = next((s.minimum, s.maximum) for s in specs(DisplayOptions) if s.name == "exposure")  # that can be set
 TRAPPED = 1e-4  # of that even light: what leaks from texel to texel through closed corners is less
+LEAKS = 1e-3  # of that even light: more is a room that is lit, or a bright window in the dark
+TO_COME = 0.01  # of what is emitted: with less than that to come a dark room is taken for dark
 LEAST_ABSORBED = 0.01  # 1 − ρ̄: in a furnace of ρ̄ = 1 light never ends, but its exposure may
 
 
@@ -47,10 +52,10 @@ def first_exposure(pool: TilePool, seen: Texels, scene: Scene | None = None) -> 
     return _exposure(albedo[some] * light.asked)
 
 
-def exposure_of(lightmap: Lightmap, seen: Texels, mean_residual: F64) -> float:
+def exposure_of(lightmap: Lightmap, seen: Texels, mean_residual: F64, mean_emitted: F64 | None = None) -> float:
     """EV for the light as it is on what is seen; 0 where there is none. Waits for the GPU.
 
-    mean_residual: r̄ over all texels, RGB [W/m²], as the energy book has it.
+    mean_residual: r̄ over all texels, RGB [W/m²], as the energy book has it; mean_emitted: what is emitted, likewise, if known.
     """
     pool = lightmap.pool
     sample = sampled_tiles(pool)
@@ -61,7 +66,17 @@ def exposure_of(lightmap: Lightmap, seen: Texels, mean_residual: F64) -> float:
     ambient = mean_residual / np.maximum(1 - mean_albedo, LEAST_ABSORBED)
     material = pool.scene.material_ids[pool.charts.face_triangle[pool.surfaces.face[seen]]]
     own = np.array(factors)[material] * (1.0 if pool.albedo_tiles is None else pool.albedo_tiles[seen])
-    return _exposure(own * (irradiance_at(lightmap, seen) + ambient))
+    light = irradiance_at(lightmap, seen)
+    if mean_emitted is not None and mean_residual.mean() < TO_COME * mean_emitted.mean():
+        if _only_leaks(light.mean(1), float(mean_emitted.mean())):
+            return _exposure(own * mean_emitted)
+    return _exposure(own * (light + ambient))
+
+
+def _only_leaks(light: F64, even: float) -> bool:
+    """Whether so little light (n,) is seen as leaks through closed corners, and next to none on most of what is seen: light that
+    comes into a room in earnest is reflected onto all of it."""
+    return len(light) > 0 and light.mean() < LEAKS * even and bool(np.median(light) <= RANGE * light.mean())
 
 
 def is_trapped(lightmap: Lightmap, seen: Texels, even: float) -> bool:

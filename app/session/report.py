@@ -51,7 +51,8 @@ def picture(session: Session) -> dict[str, Any]:
     """How the viewer would show the light at first: the camera, its exposure [EV] and the tone curve. Waits for the GPU."""
     camera, balance = session.scene.cameras[0], session.run.energy
     seen = seen_texels(session.lightmap.pool, camera.world_from_camera, camera.yfov)
-    exposure = exposure_of(session.lightmap, seen, balance.unshot / max(balance.area, 1e-300))
+    unshot, emitted = (power / max(balance.area, 1e-300) for power in (balance.unshot, balance.emitted))
+    exposure = exposure_of(session.lightmap, seen, unshot, emitted)
     pose = camera.world_from_camera.tolist()
     return {
         "camera": {"name": camera.name, "yfov": camera.yfov, "world_from_camera": pose},

@@ -194,9 +194,9 @@ class View:
         """Set the exposure from the light on what the camera sees in a picture of that size [px], else in one like the last."""
         width, height = size or self._size
         balance = self.session.run.energy
-        mean_residual = balance.unshot / max(balance.area, 1e-300)
+        unshot, emitted = (power / max(balance.area, 1e-300) for power in (balance.unshot, balance.emitted))
         self.display = self.display.replace(
-            exposure=exposure_of(self.session.lightmap, self._seen(width / height), mean_residual)
+            exposure=exposure_of(self.session.lightmap, self._seen(width / height), unshot, emitted)
         )
 
     def expose_for_light_to_come(self) -> None:

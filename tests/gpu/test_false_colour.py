@@ -112,6 +112,23 @@ def test_glare_and_darkness_do_not_change_the_exposure(box: Lightmap) -> None:
     assert exposure_of(box, seen, np.zeros(3)) == pytest.approx(exposure, abs=0.05)
 
 
+def test_leaks_in_the_dark_are_exposed_as_dark(box: Lightmap) -> None:
+    """A few texels with a thousandth of the light that is emitted, and none elsewhere; half of the texels so are a dim room."""
+    put(box, "t_residual", even(box, (0.0, 0.0, 0.0)))
+    seen, emitted = seen_by_first(box), np.ones(3)
+    lit = even(box, (1.0, 1.0, 1.0))
+    put(box, "t_irradiance", lit)
+    exposure = exposure_of(box, seen, np.zeros(3), emitted)
+    chance = np.random.default_rng(3).random(lit.shape[:3])[..., None]
+    put(box, "t_irradiance", np.where(chance < 0.03, lit / 1000, np.float32(0)))
+    assert exposure_of(box, seen, np.zeros(3), emitted) == pytest.approx(exposure, abs=1e-6)
+    assert exposure_of(box, seen, 0.1 * emitted, emitted) < exposure + 5, (
+        "as long as light is to come, exposed for that"
+    )
+    put(box, "t_irradiance", np.where(chance < 0.6, lit / 1e5, lit / 1e6))
+    assert exposure_of(box, seen, np.zeros(3), emitted) > exposure + 15, "dim, and lit"
+
+
 def test_what_the_camera_does_not_see_does_not_change_the_exposure(box: Lightmap) -> None:
     put(box, "t_residual", even(box, (0.0, 0.0, 0.0)))
     seen = seen_by_first(box)
