@@ -87,11 +87,12 @@ def _light_of(session: Session) -> dict[str, Any]:
 
 
 def _difference(kept: dict[str, Any], now: dict[str, Any]) -> str | None:
-    """What to say where the light is of something else."""
+    """What to say where the light is of something else. How little may remain only says when to stop: it may be another."""
+    stops = "--" + SOLVERS[now["solver"]].threshold
     for name in ("glowtree", "solver", "options", "light", "atlas"):
         before, after = (_flags(name, of[name]) for of in (kept, now))
         for flag, value in after.items():
-            if before.get(flag) != value:
+            if flag != stops and before.get(flag) != value:
                 return f"the light that was kept is of {flag} {_text(before.get(flag))}, not {_text(value)}"
     if kept["scene"] != now["scene"]:
         return "the light that was kept is of another scene: it, or its materials, lamps or sky have changed"

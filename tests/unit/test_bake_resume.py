@@ -143,6 +143,13 @@ def test_another_scene_or_other_settings_are_refused(unfinished: Path, capsys: p
     assert run(bake(unfinished, *flags, "--resume", "--rays", "32")) == 0  # another stop is none of these
 
 
+@pytest.mark.parametrize("stop", [["--noise", "0.5"], ["--error", "50"]])
+def test_another_stop_is_no_other_light(unfinished: Path, stop: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(bake(unfinished, *GATHERING[:2], "--resume", *stop)) == 0
+    assert "goes on after" in capsys.readouterr().err
+    assert not (unfinished / CHECKPOINT_NAME).exists()
+
+
 def test_a_damaged_checkpoint_is_refused(unfinished: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = unfinished / CHECKPOINT_NAME
     path.write_bytes(path.read_bytes()[:-1000])
