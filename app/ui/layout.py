@@ -48,9 +48,9 @@ PANELS = (
 
 
 def docks(state: State) -> None:
-    """The dock space over what menu and status bar leave; the first time, on request, and where a layout that was kept knows
-    other panels, the docks are built."""
-    space = imgui.get_id(f"docks of {', '.join(panel.title for panel in PANELS)}")
+    """The dock space over what menu and status bar leave; the first time, on request, where a layout that was kept knows other
+    panels, and where the window has become narrow or wide, the docks are built."""
+    space = _space(narrow=_narrow())
     if state.rebuild_layout or imgui.internal.dock_builder_get_node(space) is None:
         _build(space)
         state.rebuild_layout = False
@@ -80,15 +80,26 @@ def panels(view: View, state: State) -> None:
         imgui.end()
 
 
+def _narrow() -> bool:
+    """Whether the window has no room for panels on both sides of the view."""
+    return imgui.get_main_viewport().size.x < NARROW_EM * imgui.get_font_size()
+
+
+def _space(*, narrow: bool) -> int:
+    """The dock space of a narrow or a wide window."""
+    return imgui.get_id(f"{'column' if narrow else 'sides'} of {', '.join(panel.title for panel in PANELS)}")
+
+
 def _build(space: int) -> None:
-    build = imgui.internal
+    build, narrow = imgui.internal, _narrow()
     window = imgui.get_main_viewport().size
     # the viewport's work area knows of menu and status bar only a frame later
     area = imgui.ImVec2(window.x, max(window.y - 2 * imgui.get_frame_height(), 1.0))
-    build.dock_builder_remove_node(space)
+    for either in (False, True):  # panels stand in one of the two
+        build.dock_builder_remove_node(_space(narrow=either))
     build.dock_builder_add_node(space, imgui.internal.DockNodeFlagsPrivate_.dock_space)
     build.dock_builder_set_node_size(space, area)
-    nodes = _column(space, area) if area.x < NARROW_EM * imgui.get_font_size() else _both_sides(space, area)
+    nodes = _column(space, area) if narrow else _both_sides(space, area)
     for panel in PANELS:
         build.dock_builder_dock_window(panel.title, nodes[panel.dock])
         build.dock_builder_get_node(nodes[panel.dock]).set_local_flags(build.DockNodeFlagsPrivate_.no_close_button)

@@ -78,6 +78,22 @@ def test_a_layout_of_other_panels_is_built_anew(gpu: Gpu, tmp_path: Path, monkey
     desk.release()
 
 
+def test_a_window_that_becomes_narrow_or_wide_again_has_all_panels_docked_beside_the_view(
+    gpu: Gpu, tmp_path: Path
+) -> None:
+    file, titles = tmp_path / "layout.ini", {panel.title for panel in layout.PANELS}
+    wide = Desk(gpu, FakeSession(), (1280, 720), ui=Ui(layout_file=file))
+    for size in ((900, 600), (1280, 720)):
+        wide.size = size
+        wide.frames(3)
+        assert wide.ui.state.docked == titles
+    wide.release()
+    narrow = Desk(gpu, FakeSession(), (900, 600), ui=Ui(layout_file=file))
+    assert narrow.ui.state.docked == titles
+    assert narrow.ui.state.view_px[2] > 0.5 * 900
+    narrow.release()
+
+
 def test_the_layout_is_kept_and_can_be_reset(gpu: Gpu, tmp_path: Path) -> None:
     places = []
     for change in ("drag a separator", "", "reset"):
