@@ -20,6 +20,7 @@ OptionsT = TypeVar("OptionsT", bound=Options)
 LABEL_SHARE = 0.44  # of the panel's width
 TOOLTIP_EM = 22.0
 COPIED_SECONDS = 1.0  # that it is said
+ROUNDING = 1e-6  # of 32-bit numbers
 GROUPED = re.compile(r"(?<=\d),(?=\d{3})")
 AS_READ = "Right-click: as in the file"
 TOOLTIP = int(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)
@@ -274,7 +275,9 @@ def percent(fraction: float) -> str:
 
 
 def triple(values: Sequence[float], digits: int = 4) -> str:
-    return "  ".join(number(float(v), digits) for v in values)
+    """Three numbers; 0 where one is nothing but the rounding of the largest."""
+    least = max(abs(float(v)) for v in values) * ROUNDING
+    return "  ".join(number(float(v) if abs(v) > least else 0.0, digits) for v in values)
 
 
 def duration(seconds: float) -> str:
