@@ -11,9 +11,9 @@ from imgui_bundle import imgui, implot
 from app.session.keeping import Keeping
 from app.ui import edits, keys, layout, navigation, overlays, theme
 from app.ui.files import Files, open_file
+from app.ui.leave_dialog import leave_dialog
 from app.ui.panels import bake
 from app.ui.picture_dialog import PictureDialog
-from app.ui.quit_dialog import quit_dialog
 from app.ui.recovery import recovery
 from app.ui.settings import KNOWN
 from app.ui.state import Legend, Request, State
@@ -181,7 +181,7 @@ class Ui:
         overlays.loading_overlay(view.session.on_its_way, state)
         overlays.toasts(view, state, seconds)
         overlays.help_overlay(state)
-        quit_dialog(view, state)
+        leave_dialog(view, state)
         recovery(view, state)
 
     def drop(self, view: View, file: Path) -> None:

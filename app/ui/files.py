@@ -16,7 +16,7 @@ from app.session.settings import Settings, settings_of, write_settings
 from app.ui import settings, theme
 from app.ui.file_dialog import FileDialog
 from app.ui.save_dialog import SaveDialog
-from app.ui.state import Request, State
+from app.ui.state import State
 
 if TYPE_CHECKING:
     from app.session.view import View
@@ -80,7 +80,7 @@ class Files:
         if (named := self._session_name.poll()) is not None:
             state.act(partial(_save, view, state, named))
         elif not self._session_name.asking:
-            state.quit_when_saved = False
+            state.after_saving = None
 
     def keep(self, view: View, state: State) -> None:
         """Once per frame: go on with a session that opens, put aside what is not saved, remember what was opened."""
@@ -102,11 +102,11 @@ def open_file(view: View, state: State, file: Path) -> None:
     """A session, the light of a bake of the scene that is open, or a scene."""
     kind = file.suffix.lower()
     if kind == SUFFIX:
-        state.act(lambda: state.keeping.open(view, file))
+        state.leave_for(lambda: state.keeping.open(view, file))
     elif kind == IRRADIANCE and view.session.opened:
         state.act(lambda: view.session.compared.open(file))
     else:
-        state.act(lambda: view.session.open(file))
+        state.leave_for(lambda: view.session.open(file))
 
 
 def save(view: View, state: State) -> None:
@@ -139,7 +139,7 @@ def menu(view: View, state: State) -> None:
     if imgui.begin_menu(f"{ICONS.ICON_FA_CUBES}  Scenes", bool(state.scenes)):
         for source in state.scenes:
             if imgui.menu_item(Path(source).stem, "", False)[0]:
-                state.act(partial(view.session.open, source))
+                state.leave_for(partial(view.session.open, source))
         imgui.end_menu()
     imgui.separator()
     if imgui.menu_item(f"{ICONS.ICON_FA_FLOPPY_DISK}  Save session", "Ctrl+S", False, opened)[0]:
@@ -163,12 +163,12 @@ def _proposed(view: View, state: State) -> Path:
 
 
 def _save(view: View, state: State, path: Path) -> None:
-    leaving, state.quit_when_saved = state.quit_when_saved, False
+    then, state.after_saving = state.after_saving, None
     state.keeping.save(view, path, settings.tables(view, state))
     state.recent.add(path)
     state.notify(f"saved {path}")
-    if leaving:
-        state.requests.append(Request.QUIT)
+    if then is not None:
+        state.act(then)
 
 
 def _put_settings(view: View, state: State, path: Path) -> None:

@@ -92,7 +92,7 @@ def _open(view: View, state: State) -> None:
 
 
 def _quit(view: View, state: State) -> None:
-    state.ask_to_quit = True
+    state.quit()
 
 
 def _escape(view: View, state: State) -> None:

@@ -1,4 +1,4 @@
-"""Quitting: at once where nothing is lost by it, else after a question."""
+"""Leaving what is open, to quit or for another scene: at once where nothing is lost by it, else after a question."""
 
 from __future__ import annotations
 
@@ -8,25 +8,27 @@ from imgui_bundle import imgui
 
 from app.ui import widgets
 from app.ui.files import save
-from app.ui.state import Request, State
+from app.ui.state import State
 
 if TYPE_CHECKING:
     from app.session.view import View
 
-TITLE = "Quit?"
-BUTTON_EM = 7.0
-TEXT_EM = 26.0
+BUTTON_EM = 8.0
+TEXT_EM = 28.0
 
 
-def quit_dialog(view: View, state: State) -> None:
-    """Answer the wish to quit, once per frame: the host is asked to, or the user whether that is meant."""
-    if state.ask_to_quit:
-        state.ask_to_quit = False
+def leave_dialog(view: View, state: State) -> None:
+    """Answer the wish to leave, once per frame: do what was wanted, or ask the user whether that is meant."""
+    leaving = state.leaving
+    if leaving is None:
+        return
+    if not imgui.is_popup_open(leaving.title):
         if not state.keeping.unsaved(view):
-            state.requests.append(Request.QUIT)
+            state.leaving = None
+            state.act(leaving.go)
             return
-        imgui.open_popup(TITLE)
-    if not widgets.begin_modal(TITLE):
+        imgui.open_popup(leaving.title)
+    if not widgets.begin_modal(leaving.title):
         return
     em = imgui.get_font_size()
     imgui.dummy(imgui.ImVec2(TEXT_EM * em, 0))
@@ -36,15 +38,17 @@ def quit_dialog(view: View, state: State) -> None:
     )
     imgui.spacing()
     size = imgui.ImVec2(BUTTON_EM * em, 0)
-    if imgui.button("Save", size):
-        state.quit_when_saved = True
+    save_it = imgui.button("Save", size)
+    imgui.same_line()
+    go = imgui.button(leaving.word, size)
+    imgui.same_line()
+    stay = imgui.button("Cancel", size) or imgui.is_key_pressed(imgui.Key.escape, False)
+    if save_it:
+        state.after_saving = leaving.go
         save(view, state)
-        imgui.close_current_popup()
-    imgui.same_line()
-    if imgui.button("Quit", size):
-        state.requests.append(Request.QUIT)
-        imgui.close_current_popup()
-    imgui.same_line()
-    if imgui.button("Cancel", size) or imgui.is_key_pressed(imgui.Key.escape, False):
+    elif go:
+        state.act(leaving.go)
+    if save_it or go or stay:
+        state.leaving = None
         imgui.close_current_popup()
     imgui.end_popup()

@@ -50,7 +50,7 @@ def menu_bar(view: View, state: State) -> None:
             state.ask_for_picture = True
         imgui.separator()
         if imgui.menu_item("Quit", "Ctrl+Q", False)[0]:
-            state.ask_to_quit = True
+            state.quit()
         imgui.end_menu()
     if imgui.begin_menu("Edit"):
         edits.menu(view, state)

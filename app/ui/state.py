@@ -53,6 +53,15 @@ class Pace(Options):
 
 
 @dataclass(frozen=True)
+class Leaving:
+    """A wish for which what is open is left: the question that it may need, the word that says yes, and what is done then."""
+
+    title: str
+    word: str
+    go: Callable[[], object]
+
+
+@dataclass(frozen=True)
 class PictureFile:
     """A picture of the view alone that is to be saved: where, and its width and height [px]."""
 
@@ -103,7 +112,8 @@ class State:
     in the background; layer: to go back to from the error. edits: of the open scene; held: whether a hand was at a control in
     the last frame. used: of which scene, the materials that are somewhere. version: of the open scene, that
     edits are noted of. lamp_place: of a lamp with area, by name, as long as a hand moves it [m]. keeping: saves and opens
-    sessions; asides: what crashes have left, to be asked about; quit_when_saved: the user is leaving. order: of the next bake, as
+    sessions; asides: what crashes have left, to be asked about; leaving: a wish that is to be answered;
+    after_saving: what waits for a session to be saved. order: of the next bake, as
     far as it was edited; baking: the last.
     """
 
@@ -120,11 +130,11 @@ class State:
     ask_for_reference: bool = False
     ask_for_picture: bool = False
     picture: PictureFile | None = None
-    ask_to_quit: bool = False
+    leaving: Leaving | None = None
     ask_for_session_name: bool = False
     ask_for_settings: bool = False
     ask_for_settings_name: bool = False
-    quit_when_saved: bool = False
+    after_saving: Callable[[], object] | None = None
     keeping: Keeping = field(default_factory=Keeping)
     asides: list[Aside] = field(default_factory=list)
     recent: Recent = field(default_factory=Recent)
@@ -186,6 +196,14 @@ class State:
     def act(self, action: Callable[[], object]) -> None:
         """Do this once the frame is built: what it raises cannot leave a window half drawn."""
         self.actions.append(action)
+
+    def quit(self) -> None:
+        """Ask the host to end, once the user agrees to lose what is not saved."""
+        self.leaving = Leaving("Quit?", "Quit", lambda: self.requests.append(Request.QUIT))
+
+    def leave_for(self, opening: Callable[[], object]) -> None:
+        """Open something else, once the user agrees to lose what is not saved."""
+        self.leaving = Leaving("Open another?", "Open", opening)
 
     def run_actions(self) -> None:
         """Do what was asked for; a user's mistake becomes a toast."""

@@ -360,7 +360,7 @@ class ViewerWindow(WindowConfig):
 
     def _asked_to_close(self) -> bool:
         """The window's own button: the interface may have a question first. True: pyglet does nothing of its own."""
-        self._ui.state.ask_to_quit = True
+        self._ui.state.quit()
         return True
 
     def _on_deactivate(self) -> None:

@@ -128,6 +128,19 @@ def test_quitting_asks_where_a_long_solve_would_be_lost(
     assert desk.requests == [Request.QUIT] * (answer == "Quit") and not imgui.is_popup_open("", ANY_POPUP)
 
 
+@pytest.mark.parametrize("answer", ["Open", "Cancel"])
+def test_another_scene_asks_where_a_long_solve_would_be_lost(
+    desk: Desk, where: dict[str, tuple[float, float]], answer: str
+) -> None:
+    desk.session.seconds = 2 * WORTH_SECONDS
+    desk.ui.drop(desk.session, Path("other.glb"))
+    desk.frames(3)
+    assert desk.session.calls == [] and imgui.is_popup_open("", ANY_POPUP)
+    desk.click(*where[answer])
+    opened = [("open", "other.glb")] if answer != "Cancel" else []
+    assert desk.session.calls == opened and not imgui.is_popup_open("", ANY_POPUP)
+
+
 @pytest.mark.parametrize(
     ("seconds", "words"), [(42, "42 s"), (200, "3 min 20 s"), (7500.4, "2 h 5 min"), (59.7, "1 min 0 s")]
 )

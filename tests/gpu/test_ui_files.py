@@ -131,7 +131,7 @@ def test_edits_alone_are_worth_a_question(desk: Desk, where: dict[str, tuple[flo
 def test_files_are_opened_by_kind(desk: Desk, keeping: FakeKeeping) -> None:
     for name in ("a.glow", "b.exr", "c.glb"):
         desk.ui.drop(desk.session, Path(name))
-    desk.frames()
+        desk.frames()
     assert keeping.calls == [("open", Path("a.glow"))]
     assert desk.session.calls == [("open_reference", "b.exr"), ("open", "c.glb")]
 
