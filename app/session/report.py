@@ -91,5 +91,5 @@ def summary(session: Session, result: dict[str, Any]) -> str:
     state = "stopped early" if result["interrupted"] else "converged" if result["converged"] else "stopped as asked"
     return (
         f"{stats.done} {stats.unit} in {stats.seconds:.1f} s, {stats.remaining:.2%} {stats.remains} ({state}), "
-        f"{result['texels']} texels, energy imbalance {result['imbalance']:+.2%}{compared}, {result['renderer']}"
+        f"{result['texels']} texels, energy imbalance {result['imbalance']:+z.2%}{compared}, {result['renderer']}"
     )

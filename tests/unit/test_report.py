@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
-from app.session.report import notes
+from app.session.report import notes, summary
 from app.solvers import SOLVERS
 
 
@@ -35,3 +35,10 @@ def test_it_names_only_what_the_solver_has() -> None:
 
 def test_an_even_balance_needs_no_word() -> None:
     assert notes(ended("shooting", 0.019)) == []
+
+
+@pytest.mark.parametrize(("imbalance", "words"), [(-1e-6, "+0.00%"), (-0.012, "-1.20%")])
+def test_what_is_rounded_to_zero_has_no_minus(imbalance: float, words: str) -> None:
+    stats = SimpleNamespace(done=1, unit="shots", seconds=0.0, remaining=0.0, remains="unshot")
+    result = {"interrupted": False, "converged": True, "texels": 9, "imbalance": imbalance, "renderer": "none"}
+    assert f"energy imbalance {words}, none" in summary(cast(Any, SimpleNamespace(stats=stats)), result)
