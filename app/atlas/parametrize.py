@@ -7,6 +7,7 @@ A + (X + Y)/2 + 1 unit squares.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -45,7 +46,7 @@ class Layout:
 
     chart (m,) i32 and uv (m, 3, 2) f64 [m] per scene triangle (-1 where no side is lit), u and v from 0;
     extent (c, 2) f64 [m]; area (c,) f64 [m²]; border (c,) f64: (X + Y)/2 [m]; the first ``rectangles`` are whole
-    rectangles. sides (c,): 1 or 2 lit sides.
+    rectangles. sides (c,): 1 or 2 lit sides. scale (c,): how many times longer than the surface all of these lengths are.
     """
 
     chart: I32
@@ -55,6 +56,7 @@ class Layout:
     border: F64
     rectangles: int
     sides: I32
+    scale: NDArray[np.float64]
 
 
 def parametrize(
@@ -72,9 +74,10 @@ def parametrize(
 
     density [texels/m], or texels: how many to aim at; by default 8 for each lit side, within 32 000 and 2 million, and for
     ``roots`` of quadtrees a sixteenth of that.
-    Rectangles are made of whole patches, so that a small number of texels is met only roughly. Charts that are smaller than a
-    texel have one all the same: where there are so many that a large floor among them would be left with one, too, more
-    texels are made than were asked for. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage,
+    A material's ``lightmap_scale`` is so many times that density; where neither was given, others keep the density that they have
+    without it. Rectangles are made of whole patches, so that a small number of texels is met only roughly. Charts that are
+    smaller than a texel have one all the same: where there are so many that a large floor among them would be left with one, too,
+    more texels are made than were asked for. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage,
     share) is called from time to time and may raise to cancel.
     Raises UserError for a density or number out of range, or when more than 16 777 216 texels are needed.
     """
@@ -88,9 +91,10 @@ def parametrize(
     facet = facets(points, corners, scene.material_ids, scene_size(scene))
     layout, method, warnings = _unfold(scene, lit, points, corners, facet, ends, time_limit, report)
     report("placing pieces side by side", UNFOLDED)
+    plain, layout = layout, _scaled(layout, scene)
     if density is None:
         aim = texels if texels is not None else default_texels(len(lit.triangle), roots)
-        density = _density_for(layout, aim)
+        density = _density_for(plain if texels is None else layout, aim)
     need = _texel_count(layout, density)
     if need > MAX_TEXELS:
         best = _density_for(layout, MAX_TEXELS)
@@ -131,7 +135,7 @@ def parametrize(
 def _too_small(layout: Layout, density: float) -> tuple[str, ...]:
     """What to say of surfaces that are smaller than a texel, where they have much of the area: a density at which nine tenths of
     that are not."""
-    width, area = np.sqrt(layout.area), layout.area * layout.sides
+    width, area = np.sqrt(layout.area), layout.area / layout.scale**2 * layout.sides
     order = np.argsort(width)
     small = order[: np.count_nonzero(width * density < 1)]
     held = np.cumsum(area[small])
@@ -256,7 +260,24 @@ def _measured(chart: I32, uv: F64, rectangle_size: F64, lit: Sides) -> Layout:
     area = totals(owner, np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2, count)
     charts = distinct_rows(chart[lit.triangle], lit.back)[0]
     sides = np.bincount(chart[lit.triangle[charts]], minlength=count).astype(np.int32)
-    return Layout(chart, moved, high - low, area, _borders(owner, local, count), rectangles, sides)
+    return Layout(chart, moved, high - low, area, _borders(owner, local, count), rectangles, sides, np.ones(count))
+
+
+def _scaled(layout: Layout, scene: Scene) -> Layout:
+    """Charts as long as their material's ``lightmap_scale`` makes them: one density then gives each its own."""
+    used = np.flatnonzero(layout.chart >= 0)
+    scale = np.ones(len(layout.area))
+    scale[layout.chart[used]] = np.array([m.lightmap_scale for m in scene.materials])[scene.material_ids[used]]
+    if (scale == 1).all():
+        return layout
+    return dataclasses.replace(
+        layout,
+        uv=layout.uv * scale[layout.chart][:, None, None],
+        extent=layout.extent * scale[:, None],
+        area=layout.area * scale**2,
+        border=layout.border * scale,
+        scale=scale,
+    )
 
 
 def _borders(chart: I32, uv: F64, count: int) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
     [scene]                     # name; unit = "m" | "cm" | "mm" | "in" | "ft": what every length below is
                                 # counted in, also in .obj, .ply and .stl files
     [[material]]                # name; albedo = [r, g, b]; double_sided = false; opacity = 1: light passes by 1 - opacity
+                                # lightmap_scale = 1: so many times the texels along a metre, 1/16 to 16
                                 # emission = [r, g, b] radiance L [W/(sr m²)], or exitance = [r, g, b] πL [W/m²]
                                 # texture = { pattern = "checker" | "stripes", colors = [[r, g, b], [r, g, b]] }
                                 #        or { image = "file beside the TOML" }, both with repeat = [across, up]
@@ -112,6 +113,7 @@ class MaterialTable(Table):
     texture: TextureTable | None = None
     double_sided: bool = False
     opacity: Part01 = 1.0
+    lightmap_scale: Annotated[float, Field(ge=1 / 16, le=16.0)] = 1.0
 
     @model_validator(mode="after")
     def _one_light(self) -> Self:
@@ -341,7 +343,15 @@ class _Builder:
             light = (r / math.pi, g / math.pi, b / math.pi)
         texture = None if table.texture is None else self._texture(f"material.{index}.texture", table.texture)
         albedo = table.albedo or ((0.5, 0.5, 0.5) if texture is None else (1.0, 1.0, 1.0))
-        return Material(table.name, albedo, light, texture, None, table.double_sided, table.opacity)
+        return Material(
+            table.name,
+            albedo,
+            light,
+            texture,
+            double_sided=table.double_sided,
+            opacity=table.opacity,
+            lightmap_scale=table.lightmap_scale,
+        )
 
     def _texture(self, where: str, table: TextureTable) -> Texture:
         scale = np.diag([*table.repeat, 1.0])[:2]

@@ -85,6 +85,7 @@ class _Reader:
             opacity=opacity,
             opacity_texture=opacity_texture,
             opacity_cutoff=cutoff,
+            lightmap_scale=source.extras.lightmap_scale,
         )
 
     def _opacity(

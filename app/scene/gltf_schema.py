@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic.alias_generators import to_camel
 
 from app.scene.lights import OUTER
@@ -145,6 +145,17 @@ class MaterialExtensions(Model):
     unlit: Empty | None = Field(default=None, alias="KHR_materials_unlit")
 
 
+def _table(extras: object) -> object:
+    """Extras may be anything; only a table has something that is ours."""
+    return extras if isinstance(extras, (dict, BaseModel)) else {}
+
+
+class MaterialExtras(Model):
+    """What of a material's extras is ours."""
+
+    lightmap_scale: Annotated[float, Field(ge=1 / 16, le=16.0, alias="lightmap_scale")] = 1.0
+
+
 class Material(Model):
     name: str = ""
     pbr_metallic_roughness: MetallicRoughness = MetallicRoughness()
@@ -154,6 +165,7 @@ class Material(Model):
     alpha_cutoff: Annotated[float, Field(ge=0.0)] = 0.5
     double_sided: bool = False
     extensions: MaterialExtensions = MaterialExtensions()
+    extras: Annotated[MaterialExtras, BeforeValidator(_table)] = MaterialExtras()
 
 
 class Draco(Model):

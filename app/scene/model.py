@@ -59,6 +59,7 @@ class Material:
     opacity: float = 1.0  # [-], in [0, 1]
     opacity_texture: Texture | None = None
     opacity_cutoff: float | None = None
+    lightmap_scale: float = 1.0  # texels along a metre of it, over those along a metre of others
 
     @property
     def opaque(self) -> bool:

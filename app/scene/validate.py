@@ -342,7 +342,14 @@ def _drop_unmapped_textures(
             albedo = _mean_colour(material.albedo, material.albedo_texture)
             emission = _mean_colour(material.emission, material.emission_texture)
             opacity = _mean_colour((material.opacity,) * 3, material.opacity_texture)[0]
-            plain = Material(material.name, albedo, emission, None, None, material.double_sided, opacity)
+            plain = Material(
+                material.name,
+                albedo,
+                emission,
+                double_sided=material.double_sided,
+                opacity=opacity,
+                lightmap_scale=material.lightmap_scale,
+            )
             materials.append(plain)
     if unmapped:
         what = counted(unmapped, "textured triangle", "textured triangles")

@@ -60,6 +60,25 @@ def test_small_charts_leave_half_of_the_texels_to_large_ones() -> None:
     assert _covered(scene, charts) == 500 + floor
 
 
+@pytest.mark.parametrize("scale", [0.5, 2.0, 4.0])
+@pytest.mark.parametrize("density", [20.0, None])
+def test_a_material_has_texels_by_its_lightmap_scale(scale: float, density: float | None) -> None:
+    """As many as its scale squared says, and others those that they have without it."""
+    meshes = [shapes.quad((k * 3.0, 0, 0), (2.4, 0, 0), (0, 2.4, 0)) for k in range(2)]
+    meshes += [shapes.cylinder(1.2, 2.4, 64).moved(6 + k * 4, 0, 0) for k in range(2)]
+    counts = []
+    for times in (1.0, scale):
+        materials = [Material(f"{k}", double_sided=k < 2, lightmap_scale=times if k % 2 else 1.0) for k in range(4)]
+        scene = scene_of(meshes, materials)
+        charts = parametrize(scene, density=density)
+        face = texel_surfaces(scene, charts, uniform_leaves(charts)).face
+        counts.append(np.bincount(scene.material_ids[charts.face_triangle[face[face >= 0]]], minlength=4))
+    before, after = counts
+    assert after[::2] == pytest.approx(before[::2], rel=0.02)  # charts begin elsewhere in the grid
+    # sides of rectangles are rounded to 4 texels, of 24 at least; outlines of others meet texels that they cover in part
+    assert after[1::2] / before[1::2] == pytest.approx(scale**2, rel=0.18)
+
+
 @pytest.mark.parametrize("density", [5.0, 23.0])
 def test_density_is_texels_per_metre(density: float) -> None:
     scene = scene_of(CLUTTER)

@@ -41,6 +41,13 @@ def test_quad_faces_along_u_cross_v_in_its_unit(tmp_path: Path) -> None:
     assert not scene.sides.any() and not scene.emits and scene.cameras == ()
 
 
+def test_a_material_has_its_lightmap_scale(tmp_path: Path) -> None:
+    assert load(tmp_path, ROOM).materials[0].lightmap_scale == 1
+    assert load(tmp_path, PAINT + "lightmap_scale = 2\n" + FLOOR).materials[0].lightmap_scale == 2
+    with pytest.raises(SceneError, match="lightmap_scale"):
+        load(tmp_path, PAINT + "lightmap_scale = 0\n" + FLOOR)
+
+
 def test_exitance_is_pi_times_radiance(tmp_path: Path) -> None:
     lamps = '[[material]]\nname = "a"\nexitance = 2\n[[material]]\nname = "b"\nemission = [1, 2, 3]\n'
     a, b, _ = load(tmp_path, lamps + ROOM).materials

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scene_files import QUAD, QUAD_INDICES, QUAD_UV, png, quad_gltf, written
 
+from app.errors import SceneError
 from app.scene.gltf import load_gltf
 from app.scene.gltf_materials import uv_transform
 from app.scene.gltf_schema import TextureTransform
@@ -218,3 +219,20 @@ def test_of_variants_the_default_is_read(tmp_path: Path) -> None:
     gltf.json["meshes"][0]["primitives"][0]["extensions"] = {"KHR_materials_variants": mappings}
     scene = load(tmp_path, gltf.glb())
     assert scene.materials[scene.material_ids[0]].name == "paint" and scene.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("extras", "scale"), [({"lightmap_scale": 2, "more": [1]}, 2.0), ({}, 1.0), ("any", 1.0), ([1], 1.0)]
+)
+def test_extras_of_a_material_have_its_lightmap_scale(tmp_path: Path, extras: Any, scale: float) -> None:
+    gltf = quad_gltf()
+    gltf.json["materials"][0]["extras"] = extras
+    assert load(tmp_path, gltf.glb()).materials[0].lightmap_scale == scale
+
+
+@pytest.mark.parametrize("scale", [0, -1, 100, "two"])
+def test_a_lightmap_scale_that_is_none_is_one_line(tmp_path: Path, scale: Any) -> None:
+    gltf = quad_gltf()
+    gltf.json["materials"][0]["extras"] = {"lightmap_scale": scale}
+    with pytest.raises(SceneError, match="lightmap_scale"):
+        load(tmp_path, gltf.glb())
