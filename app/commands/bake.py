@@ -15,6 +15,7 @@ from app.commands.steps import estimate, open_scene, session_options, solve
 from app.errors import UserError
 from app.gpu import gpu_context
 from app.options import from_flags
+from app.scene.options import FileOptions
 from app.session.bake import Baked, bake_folder, check_parts, write_light
 from app.session.checkpoint import CHECKPOINT_NAME, Checkpoint, CheckpointOptions
 from app.session.session import Session
@@ -107,7 +108,8 @@ def _all(flags: argparse.Namespace, console: Console) -> int:
 
 
 def _done(flags: argparse.Namespace) -> dict[str, Any] | None:
-    """The report of a bake of this scene with these settings that was finished, and not before the scene's file was changed."""
+    """The report of a bake of this scene with these settings that was finished, whose files are there and newer than the
+    scene's."""
     path = flags.output / REPORT_NAME
     if (flags.output / CHECKPOINT_NAME).exists() or not path.exists():
         return None
@@ -120,6 +122,10 @@ def _done(flags: argparse.Namespace) -> dict[str, Any] | None:
             and (was["solver"], was["light"]) == (flags.solver, flags.light)
             and (was["atlas"], was["lightmap"]) == (asked["atlas"].as_dict(), asked["light"].as_dict())
             and options.items() <= was[flags.solver].items()
+            and was["file"] == from_flags(FileOptions, flags).as_dict()
+            and was["given_sky"] == (None if asked["sky"] is None else asked["sky"].as_dict())
+            and was["bake"] == {**from_flags(BakeOptions, flags).as_dict(), "unwrap": flags.unwrap}
+            and all((flags.output / name).is_file() for name in report["files"])
         )
         source = Path(report["source"])
         newer = source.exists() and source.stat().st_mtime > path.stat().st_mtime

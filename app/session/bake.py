@@ -87,6 +87,7 @@ def write_taken(taken: Taken, folder: Path, how: BakeOptions, *, unwrap: bool = 
     """Write light that was taken, in any thread. Raises UserError."""
     laid, result = taken.light, dict(taken.result)
     result |= _seams(laid)
+    result["parameters"] = {**result["parameters"], "bake": {**how.as_dict(), "unwrap": unwrap}}
     notes: tuple[str, ...] = ()
     if not unwrap and taken.scene.uv1 is not None:
         laid, notes = _own_layout(taken.scene, laid)

@@ -8,8 +8,9 @@ from app import __version__
 from app.render.exposure import exposure_of
 from app.render.options import DisplayOptions
 from app.render.seen import seen_texels
+from app.scene.options import FileOptions
 from app.session.balance import verdict_of
-from app.session.session import Session
+from app.session.session import Reading, Session
 
 __all__ = ["notes", "picture", "report", "summary"]
 
@@ -23,7 +24,7 @@ def report(session: Session) -> dict[str, Any]:
         "source": str(session.source),
         "renderer": session.gpu.limits.renderer,
         "gl_version": session.gpu.limits.version,
-        "parameters": session.parameters,
+        "parameters": session.parameters | _read_as(session.reading),
         "charts": {"count": stats.charts, "method": session.charts.method, "texels_per_metre": session.charts.density},
         "triangles": stats.triangles,
         "texels": stats.texels,
@@ -45,6 +46,12 @@ def report(session: Session) -> dict[str, Any]:
         **({} if session.expected is None else {"expected_error": session.expected._asdict()}),
         "warnings": [*session.scene.warnings, *session.charts.warnings, *notes(session)],
     }
+
+
+def _read_as(reading: Reading) -> dict[str, Any]:
+    """How the file was read, and which sky it was given."""
+    given = None if reading.sky is None else reading.sky.as_dict()
+    return {"file": (reading.file or FileOptions()).as_dict(), "given_sky": given}
 
 
 def picture(session: Session) -> dict[str, Any]:

@@ -189,7 +189,20 @@ def test_of_several_scenes_those_that_are_done_are_not_baked_again(
     third = written()
     assert third[0] == second[0] and third[1] > second[1]
     assert run([*line, "--resume", "--texels", "900"]) == 0
-    assert written()[0] > third[0]  # other settings
+    fourth = written()
+    assert fourth[0] > third[0]  # other settings
+    line += ["--texels", "900", "--resume"]
+    light[0].with_name("scene.glb").unlink()
+    assert run(line) == 0
+    fifth = written()
+    assert fifth[0] > fourth[0]  # a file was lost
+    for other in (["--padding", "4"], ["--sun", "90,30"], ["--unwrap"]):
+        before = written()
+        assert run([*line, *other]) == 0
+        assert written()[0] > before[0], other
+    before = written()
+    assert run([*line, "--unwrap"]) == 0
+    assert written() == before
 
 
 def test_nothing_to_resume_begins(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
