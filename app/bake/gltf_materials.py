@@ -74,8 +74,10 @@ class MaterialWriter:
                 extensions["KHR_materials_emissive_strength"] = {"emissiveStrength": strength}
             if m.emission_texture is not None:
                 item["emissiveTexture"] = self._texture_info(m.emission_texture, slots)
+        if m.lightmap_scale != 1.0:
+            item["extras"] = {"lightmap_scale": m.lightmap_scale}
         if lit:
-            item["extras"] = {"lightmap": self._lightmaps[page]}
+            item.setdefault("extras", {})["lightmap"] = self._lightmaps[page]
             extensions["KHR_materials_specular"] = {"specularFactor": 0.0}
             if self._lightmap_textures:
                 extensions["MOZ_lightmap"] = {"index": self._lightmap_textures[page], "texCoord": 1, "intensity": 1.0}

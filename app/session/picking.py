@@ -88,7 +88,7 @@ def picked_from_hit(lightmap: Lightmap, hit: PickHit, solver: Solver[Any]) -> Pi
 @dataclass(frozen=True)
 class LeafAt:
     """A leaf: its level, (u, v, u, v) in the virtual atlas [texels of level 0], how many of its texels cover a surface, and
-    the edge of a texel at the density aimed at [m]."""
+    the edge of a texel at the density aimed at, the finest where it has several [m]."""
 
     level: int
     rect: tuple[float, float, float, float]
@@ -103,8 +103,11 @@ def leaf_at(lightmap: Lightmap, uv: tuple[float, float]) -> LeafAt | None:
     if slot < 0:
         return None
     level = int(pool.leaves.level[slot])
-    covered = int((pool.surfaces.face[slot] >= 0).sum())
-    return LeafAt(level, pool.atlas_rect(pool.corner(slot), pool.tile), covered, 0.5**level / lightmap.charts.density)
+    face = pool.surfaces.face[slot]
+    shown = pool.scene.material_ids[lightmap.charts.face_triangle[face[face >= 0]]]
+    scale = max((pool.scene.materials[material].lightmap_scale for material in np.unique(shown)), default=1.0)
+    edge = 0.5**level / (lightmap.charts.density * scale)
+    return LeafAt(level, pool.atlas_rect(pool.corner(slot), pool.tile), int((face >= 0).sum()), edge)
 
 
 def _rgb(values: np.ndarray) -> RGB:

@@ -172,6 +172,15 @@ def test_cameras_come_back(tmp_path):
         np.testing.assert_allclose(theirs.world_from_camera, ours.world_from_camera, atol=1e-12)
 
 
+def test_lightmap_scales_come_back(tmp_path):
+    scene = sides_scene()
+    materials = tuple(dataclasses.replace(m, lightmap_scale=1.0 + k) for k, m in enumerate(scene.materials))
+    scene = scene.with_materials(materials)
+    read = load_gltf(baked(tmp_path, scene, sides_charts(scene)).scene)
+    expected = {m.name: m.lightmap_scale for m in materials}
+    assert len(read.materials) > 1 and all(m.lightmap_scale == expected[m.name] for m in read.materials)
+
+
 @pytest.mark.parametrize("moz_lightmap", [False, True])
 def test_lit_materials_name_the_lightmap_and_have_no_specular_lobe(moz_lightmap):
     scene = sides_scene()
