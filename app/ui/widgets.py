@@ -35,6 +35,7 @@ def edit_options(
     starts: Mapping[str, Any] | None = None,
     units: Mapping[str, str] | None = None,
     choices: Mapping[str, tuple[str, ...]] | None = None,
+    names: Mapping[str, Mapping[str, str]] | None = None,
 ) -> OptionsT:
     """One widget per declared option; returns ``options`` itself, or a checked copy where something was changed.
 
@@ -42,7 +43,7 @@ def edit_options(
     ``only`` some of them, in that order, or all but ``skip``. ``off`` says of options that have no effect now why, besides
     what is declared of them: they are grey.
     ``starts`` are the values that optional ones have while they are not given one, and begin with when they are; ``units`` and
-    ``choices`` what is shown instead of those that are declared.
+    ``choices`` what is shown instead of those that are declared; ``names`` what choices are called.
     """
     imgui.push_id(type(options).__name__)
     changes: dict[str, Any] = {}
@@ -55,7 +56,9 @@ def edit_options(
             same = (unit, offered) == (spec.unit, spec.choices)
             shown_as = spec if same else dataclasses.replace(spec, unit=unit, choices=offered)
             reason = (off or {}).get(spec.name) or (spec.off(options) if spec.off is not None else None)
-            edited = edit_option(shown_as, value, (starts or {}).get(spec.name), off=reason)
+            edited = edit_option(
+                shown_as, value, (starts or {}).get(spec.name), off=reason, names=(names or {}).get(spec.name)
+            )
             if edited != value:
                 changes[spec.name] = edited
     imgui.pop_id()
@@ -67,14 +70,17 @@ def _specs(options: type[Options]) -> list[Spec]:
     return specs(options)
 
 
-def edit_option(spec: Spec, value: Any, start: Any = None, *, off: str | None = None) -> Any:
-    """The widget of one option; the legal value that it holds afterwards. off: why it has no effect now, if it has none."""
+def edit_option(
+    spec: Spec, value: Any, start: Any = None, *, off: str | None = None, names: Mapping[str, str] | None = None
+) -> Any:
+    """The widget of one option; the legal value that it holds afterwards. off: why it has no effect now, if it has none. names:
+    what its choices are called, where that is not what they are."""
     labelled(spec.title, changed=value != spec.default and off is None)
     imgui.push_id(spec.name)
     imgui.begin_disabled(off is not None)
     if spec.optional:
         value = _optional(spec, value, start)
-    edited = value if value is None else _editor(spec, value, start)
+    edited = value if value is None else _editor(spec, value, start, names or {})
     imgui.end_disabled()
     edited = edited if off is not None else put_back(edited, spec.default)
     if imgui.is_item_hovered(TOOLTIP):
@@ -110,13 +116,15 @@ def _optional(spec: Spec, value: Any, start: Any) -> Any:
     return value
 
 
-def _editor(spec: Spec, value: Any, start: Any = None) -> Any:
+def _editor(spec: Spec, value: Any, start: Any, names: Mapping[str, str]) -> Any:
     imgui.set_next_item_width(-1)
     if spec.type is bool:
         return imgui.checkbox("##value", value)[1]
     if spec.choices:
         index = spec.choices.index(value)
-        return spec.choices[imgui.combo("##value", index, [str(choice) for choice in spec.choices])[1]]
+        return spec.choices[
+            imgui.combo("##value", index, [names.get(str(choice), str(choice)) for choice in spec.choices])[1]
+        ]
     if spec.type in (int, float):
         return _number(spec, value, start)
     return imgui.input_text("##value", value)[1]

@@ -130,3 +130,22 @@ def test_a_top_that_was_given_stays_where_it_is(desk: Desk) -> None:
     assert watts.false_colour_max == pytest.approx(2.0)
     assert counted(watts, "photometric").false_colour_max == pytest.approx(358.0)
     assert counted(watts, "radiometric") is watts
+
+
+@pytest.mark.parametrize(
+    ("quantities", "names"),
+    [("photometric", ["illuminance", "luminance"]), ("radiometric", ["irradiance", "radiance"])],
+)
+def test_false_colours_are_called_what_they_show(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch, quantities: str, names: list[str]
+) -> None:
+    offered: list[list[str]] = []
+
+    def combo(label: str, now: int, items: list[str]) -> tuple[bool, int]:
+        offered.append(items)
+        return False, now
+
+    monkeypatch.setattr(imgui, "combo", combo)
+    desk.session.display = desk.session.display.replace(quantities=quantities)
+    desk.frames(2)
+    assert ["off", *names] in offered

@@ -29,10 +29,13 @@ def draw(view: View, state: State) -> None:
     skip = SCALED if kind == "off" else DEVELOPED if kind in FALSE_COLOURS else (*SCALED, *DEVELOPED)
     off = _off(view, kind)
     unit = {} if kind == "off" else {"false_colour_max": quantity(kind, view.display.quantities).unit}
+    names = {
+        "false_colour": {each: quantity(each, view.display.quantities).name for each in FALSE_COLOURS if each != "off"}
+    }
     display = view.display if view.display.layer in view.layers else view.shown
     top = {} if state.legend is None else {"false_colour_max": state.legend.maximum}
     edited = widgets.edit_options(
-        display, skip=(*skip, *COMPARED), off=off, starts=top, units=unit, choices={"layer": view.layers}
+        display, skip=(*skip, *COMPARED), off=off, starts=top, units=unit, choices={"layer": view.layers}, names=names
     )
     edited = counted(edited, edited.quantities, before=display.quantities)
     if edited.layer == "error" and view.display.layer != "error":
