@@ -39,7 +39,9 @@ FORMAT = b"glowtree unwrap 2"  # changes when the worker's options or its answer
 # Diagonal of what xatlas sees: it drops triangles smaller than 1e-7 in area, whatever the unit.
 XATLAS_SIZE = 1000.0
 LARGE = 4096  # triangles of a surface, from which on its charts are limited: one chart of as many takes xatlas a second
-CHART = 1024  # triangles of a chart then, if all were of one size: of half as many, seams are seen where light is coarse
+CHART = (
+    1024  # triangles of a chart then, if all were of one size: of half as many, seams are seen where light is coarse
+)
 PIECE = 16384  # triangles of a surface, beyond which it is cut
 # A triangle squeezed to less than this share of its area, or turned over, is unusable in its chart.
 LEAST_SHARE = 1e-4
