@@ -135,13 +135,13 @@ def baked(session: Session, folder: Path, factor: float = 1.0) -> Path:
     return folder
 
 
-def frames(session: Session, until: Callable[[], bool]) -> None:
+def frames(session: Session, until: Callable[[], bool], *, fast: bool = True) -> None:
     """Go on until then, as the window does."""
     end = time.monotonic() + 60
     while not until():
         assert time.monotonic() < end
         session.poll()
-        session.advance(fast=True)
+        session.advance(fast=fast)
 
 
 def test_the_error_against_a_bake_is_that_of_its_light(session: Session, tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ def test_the_error_falls_while_light_is_shot(session: Session, tmp_path: Path, m
     session.restart()
     comparison = session.compared.comparison
     assert comparison is not None and not session.at_rest
-    frames(session, lambda: session.at_rest)
+    frames(session, lambda: session.at_rest, fast=False)
     rms, shots = (comparison.errors.column(name) for name in ("rms", "work"))
     assert len(rms) > 3 and (np.diff(shots) > 0).all() and shots[-1] == session.solver.issued
     assert rms[0] > 0.5 and rms[-1] < 0.02 and (np.diff(rms) < 1e-3).all()
