@@ -7,7 +7,6 @@ whenever that is stopped, the file before it is still whole.
 from __future__ import annotations
 
 import json
-import os
 import zipfile
 from pathlib import Path
 from typing import IO, Any
@@ -17,37 +16,28 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from app.errors import UserError
+from app.util.files import partials_of, replacing
 from app.util.state import State
 
 FORMAT = "glowtree state 1"  # changes when what is written does
 HEAD = "state.json"
 MOST_HEAD = 1 << 28  # bytes
+DAMAGED = (zipfile.BadZipFile, EOFError, LookupError, ValueError, TypeError, RuntimeError)  # what zipfile and numpy say
 
 
 def write_state(path: Path, state: State) -> None:
     """Put the state there at once. Raises UserError where it cannot be written; the file that was there stays then."""
-    beside = _beside(path)
     try:
-        with beside.open("wb") as file:
+        with replacing(path) as partial, partial.open("wb") as file:
             dump_state(file, state)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(beside, path)
-        _sync_folder(path.parent)
     except OSError as error:
         raise UserError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def remove_state(path: Path) -> None:
-    """And what a write that was cut short has left."""
-    for one in (path, _beside(path)):
+    """And what writes that were cut short have left."""
+    for one in (path, *partials_of(path)):
         one.unlink(missing_ok=True)
-
-
-def _beside(path: Path) -> Path:
-    return path.with_name(f".{path.name}.tmp")
 
 
 def read_state(path: Path) -> State:
@@ -84,15 +74,7 @@ def load_state(file: IO[bytes]) -> State:
             if not isinstance(values, dict) or not all(isinstance(name, str) for name in names):
                 raise UserError("is damaged")
             return State(values, {name: _array(archive, _member(nth)) for nth, name in enumerate(names)})
-    except (
-        zipfile.BadZipFile,
-        EOFError,
-        LookupError,
-        ValueError,
-        TypeError,
-        NotImplementedError,
-        RuntimeError,
-    ) as error:
+    except DAMAGED as error:
         raise UserError("is damaged, or no light of glowtree") from error
 
 
@@ -127,16 +109,3 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
             raise ValueError(name)
         data = member.read()  # all of it, so that its check sum is compared
     return np.frombuffer(data, dtype).reshape(shape)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Let the new name be on the disk, too, where the system can say so."""
-    if hasattr(os, "O_DIRECTORY"):
-        descriptor = os.open(folder, os.O_DIRECTORY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
-
-
-__all__ = ["dump_state", "load_state", "read_state", "remove_state", "write_state"]

@@ -198,6 +198,7 @@ def test_what_is_unshot_is_one_number_while_the_sky_shoots(gpu: Gpu) -> None:
     lit.settle()
     book = lit.book
     assert lit.solver.poll().remaining == pytest.approx(book.unshot.sum() / book.emitted.sum(), abs=1e-3)
+    # what is to come is estimated by one mean for all surfaces, as the ambient term of [Cohen88] is: no closed form
     assert early == pytest.approx(np.average(lit.H.mean(1), weights=lit.area), rel=0.2)
     lit.release()
 
