@@ -188,7 +188,7 @@ def _sky(text: str) -> Sky:
     if path.suffix.lower() not in SUFFIXES:
         raise argparse.ArgumentTypeError(f"{text}: must be a file {' or '.join(SUFFIXES)}, clear, or #rrggbb")
     try:
-        return Sky("image", image=read_sky_image(path), name=path.name)
+        return Sky("image", image=read_sky_image(path), name=path.name, path=path)
     except ImageError as error:
         raise argparse.ArgumentTypeError(f"{text}: is not a readable sky: {one_line(str(error))}") from error
 

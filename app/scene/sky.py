@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -63,6 +64,7 @@ class Sky:
     image: F32 | None = None
     rotation: float = 0.0
     name: str = ""  # of the image's file
+    path: Path | None = None  # of that, where it is no file of the scene
 
     def __post_init__(self) -> None:
         assert self.kind != "clear" or self.sun is not None, "a clear sky has a sun"

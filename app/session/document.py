@@ -23,15 +23,19 @@ from app.options import Options
 from app.render.camera import CameraView
 from app.scene.area_lamps import AreaLamp, Key, Surfaces, keys_of, with_surfaces
 from app.scene.gltf_file import first_problem
+from app.scene.images import ImageError
 from app.scene.library import scene_names, scene_path
 from app.scene.lights import Light
 from app.scene.model import Material, Scene
 from app.scene.options import FileOptions
 from app.scene.sky import Sky, Sun
+from app.scene.sky_image import read_sky_image
+from app.scene.validate import one_line
 from app.session.document_tables import (
     AreaLampTable,
     CameraTable,
     Document,
+    FileTable,
     KeyTable,
     LightTable,
     MaterialTable,
@@ -43,6 +47,7 @@ from app.session.session import Reading
 from app.session.versions import Version
 from app.session.view import View
 
+NO_PICTURE = "the picture of its sky is not there, --sky gives it"
 NUMBERS = ("albedo", "emission", "opacity")  # fields of a material that can be edited
 
 
@@ -122,12 +127,23 @@ def _scene(view: View, folder: Path) -> SceneTable:
     sky = reading.sky
     return SceneTable(
         source=_source(session.source, path),
-        relative=None if path is None or _library_name(path) else os.path.relpath(path.resolve(), folder.resolve()),
+        relative=None if path is None or _library_name(path) else _beside(path, folder),
         digest=None if path is None else digest_of(path),
         file={} if reading.file is None else reading.file.as_dict(),
         default_light=reading.default_light,
-        sky=None if sky is None or sky.image is not None else _sky(sky),
+        sky=None if sky is None else _sky(sky).model_copy(update={"picture": _picture(sky, folder)}),
     )
+
+
+def _picture(sky: Sky, folder: Path) -> FileTable | None:
+    path = sky.path
+    if path is None:
+        return None
+    return FileTable(source=str(path.resolve()), relative=_beside(path, folder), digest=digest_of(path))
+
+
+def _beside(path: Path, folder: Path) -> str:
+    return os.path.relpath(path.resolve(), folder.resolve())
 
 
 def _source(source: str | Path, path: Path | None) -> str:
@@ -162,26 +178,44 @@ def found(scene: SceneTable, folder: Path) -> tuple[str | Path, str | None]:
         source: str | Path = scene.source
         path = scene_path(scene.source)
     else:
-        places = [folder / scene.relative] if scene.relative else []
-        path = next((place for place in (*places, Path(scene.source)) if place.is_file()), Path(scene.source))
-        source = path
+        source = path = _place(scene, folder)
         if not path.is_file():
             raise UserError(f"its scene {scene.source} is not there")
-    changed = scene.digest is not None and digest_of(path) != scene.digest
     note = (
         f"{path.name} has changed since the session was saved: edits are applied where their materials are still there"
     )
-    return source, note if changed else None
+    return source, note if _changed(scene, path) else None
 
 
-def reading_of(document: Document) -> Reading:
-    """How its scene was read. Raises UserError."""
+def _place(file: FileTable, folder: Path) -> Path:
+    """Where a file is now, or was."""
+    places = [folder / file.relative] if file.relative else []
+    return next((place for place in (*places, Path(file.source)) if place.is_file()), Path(file.source))
+
+
+def _changed(file: FileTable, path: Path) -> bool:
+    return file.digest is not None and digest_of(path) != file.digest
+
+
+def reading_of(document: Document, folder: Path) -> tuple[Reading, str | None]:
+    """How its scene was read; and what to say of the picture of its sky, where that is not what it was. Raises UserError."""
     scene = document.scene
     try:
         file = FileOptions().replace(**scene.file)
     except (UserError, TypeError) as error:
         raise UserError(f"is no session of glowtree: scene.file: {error}") from None
-    return Reading(file, scene.default_light, None if scene.sky is None else sky_of(scene.sky, None))
+    if scene.sky is None or scene.sky.kind != "image":
+        return Reading(file, scene.default_light, sky_of(scene.sky, None)), None
+    if scene.sky.picture is None:
+        return Reading(file, scene.default_light), NO_PICTURE
+    path = _place(scene.sky.picture, folder)
+    try:
+        picture = Sky("image", image=read_sky_image(path), name=path.name, path=path)
+    except ImageError as error:
+        return Reading(file, scene.default_light), f"{NO_PICTURE}: {path}: {one_line(str(error))}"
+    note = f"{path.name}, the picture of its sky, has changed since the session was saved"
+    changed = _changed(scene.sky.picture, path)
+    return Reading(file, scene.default_light, sky_of(scene.sky, picture)), note if changed else None
 
 
 def version_of(document: Document) -> Version:
@@ -206,10 +240,14 @@ def _sky_then(document: Document, came: Sky | None) -> Sky | None:
     """The sky of a scene that came with that one."""
     if document.no_sky:
         return None
-    image = None if came is None else came.image
-    if document.sky is None or (document.sky.kind == "image" and image is None):
+    if document.sky is None or not _can_be(document.sky, came):
         return came
-    return sky_of(document.sky, image)
+    return sky_of(document.sky, came)
+
+
+def _can_be(table: SkyTable, came: Sky | None) -> bool:
+    """Whether what it takes is there, where a scene came with that sky."""
+    return table.kind != "image" or (came is not None and came.image is not None)
 
 
 # -- put back ----------------------------------------------------------------------------------------------------------
@@ -229,11 +267,10 @@ def put_back(document: Document, view: View) -> list[str]:
     if document.no_sky:
         session.set_sky(None)
     elif document.sky is not None:
-        image = None if came.sky is None else came.sky.image
-        if document.sky.kind == "image" and image is None:
-            notes.append("the picture of its sky is not there: --sky gives it")
-        else:
-            session.set_sky(sky_of(document.sky, image))
+        if _can_be(document.sky, came.sky):
+            session.set_sky(sky_of(document.sky, came.sky))
+        elif document.scene.sky is None:
+            notes.append(NO_PICTURE)
     view.camera = camera_of(document.camera)
     view.bookmarks = {int(place): camera_of(camera) for place, camera in document.bookmarks.items()}
     return notes
@@ -275,11 +312,16 @@ def _key_of(table: KeyTable) -> Key:
     return table.name, table.index
 
 
-def sky_of(table: SkyTable, image: Any) -> Sky:
-    """image: of a sky that is one."""
-    values = table.model_dump(exclude={"sun"})
+def sky_of(table: SkyTable | None, came: Sky | None) -> Sky | None:
+    """came: one with the picture, where it is of that kind."""
+    if table is None:
+        return None
+    values = table.model_dump(exclude={"sun", "picture"})
     sun = None if table.sun is None else Sun(table.sun.azimuth, table.sun.height)
-    return Sky(**values, sun=sun, image=image if table.kind == "image" else None)
+    picture = (
+        {} if came is None or table.kind != "image" else {"image": came.image, "name": came.name, "path": came.path}
+    )
+    return Sky(**values | picture, sun=sun)
 
 
 def camera_of(table: CameraTable) -> CameraView:

@@ -29,8 +29,16 @@ class SunTable(Table):
     height: Annotated[float, Field(ge=0.0, le=90.0)]
 
 
+class FileTable(Table):
+    """A file beside the session. relative: to the folder of the session's; digest: of its content."""
+
+    source: str
+    relative: str | None = None
+    digest: str | None = None
+
+
 class SkyTable(Table):
-    """A picture is not kept here: it is that of the scene."""
+    """picture: where that of a sky is which is none of the scene's."""
 
     kind: SkyKind
     colour: Emitted
@@ -38,6 +46,7 @@ class SkyTable(Table):
     sun: SunTable | None = None
     turbidity: Annotated[float, Field(ge=LEAST_TURBIDITY, le=MOST_TURBIDITY)]
     rotation: float = 0.0
+    picture: FileTable | None = None
 
     @model_validator(mode="after")
     def _sun_of_a_clear_sky(self) -> Self:
@@ -122,12 +131,9 @@ class CameraTable(Table):
         return self
 
 
-class SceneTable(Table):
-    """Where the scene came from and how it was read. relative: to the folder of the file; digest: of the scene's file."""
+class SceneTable(FileTable):
+    """Where the scene came from and how it was read."""
 
-    source: str
-    relative: str | None = None
-    digest: str | None = None
     file: dict[str, Any]
     default_light: bool
     sky: SkyTable | None = None
@@ -156,6 +162,6 @@ class Document(Table):
 
 
 __all__ = [
-    *("AreaLampTable", "CameraTable", "Document", "KeyTable", "LightTable", "MaterialTable", "SceneTable", "SkyTable"),
-    "SunTable",
+    *("AreaLampTable", "CameraTable", "Document", "FileTable", "KeyTable", "LightTable", "MaterialTable", "SceneTable"),
+    *("SkyTable", "SunTable"),
 ]

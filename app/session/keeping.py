@@ -48,7 +48,7 @@ class Coming:
     settings: Settings
     light: State
     path: Path | None
-    note: str | None
+    notes: list[str]
     aside: Path | None
 
 
@@ -127,8 +127,9 @@ class Keeping:
         try:
             document = read_document(state.values.get(DOCUMENT, ""))
             settings = checked(document.settings, "settings", self._tables)
-            source, note = found(document.scene, (path or file).parent)
-            reading = reading_of(document)
+            folder = (path or file).parent
+            source, of_scene = found(document.scene, folder)
+            reading, of_sky = reading_of(document, folder)
         except UserError as error:
             raise UserError(f"{file}: {error}") from None
         session = view.session
@@ -139,7 +140,8 @@ class Keeping:
         )
         session.open(source, reading=reading, cut=cut, version=version_of(document))
         assert session.loading is not None
-        self._coming = Coming(session.loading, document, settings, state.part(LIGHT), path, note, aside)
+        notes = [note for note in (of_scene, of_sky) if note is not None]
+        self._coming = Coming(session.loading, document, settings, state.part(LIGHT), path, notes, aside)
 
     def poll(
         self, view: View, tables: Callable[[], Mapping[str, Options]], put: Callable[[Settings], None]
@@ -169,7 +171,7 @@ class Keeping:
 
     def _arrive(self, view: View, coming: Coming, put: Callable[[Settings], None]) -> list[str]:
         session = view.session
-        notes = [] if coming.note is None else [coming.note]
+        notes = list(coming.notes)
         put(coming.settings)
         notes += put_back(coming.document, view)
         if coming.light.values:

@@ -13,11 +13,14 @@ import numpy as np
 import pytest
 
 from app.atlas.options import AtlasOptions
+from app.bake.sky_file import write_sky
 from app.errors import UserError
 from app.gpu import Gpu
 from app.scene.area_lamps import Surfaces
 from app.scene.library import scene_path
 from app.scene.lights import Light
+from app.scene.sky import Sky
+from app.scene.sky_image import read_sky_image
 from app.session import keeping as module
 from app.session.keeping import Keeping, check_session, drop
 from app.session.session import Session
@@ -242,6 +245,33 @@ def test_lights_for_which_a_scene_was_cut_anew_are_kept(place: Callable[..., Pla
     two = place().open(one.save(tmp_path / "a.glow"))
     assert two.notes == [] and two.session.edited_scene.lights == one.session.edited_scene.lights
     assert two.session.solver.issued == one.session.solver.issued > 0
+
+
+def test_the_picture_of_a_sky_goes_with_the_session(place: Callable[..., Place], tmp_path: Path) -> None:
+    """By its place beside the session's file; where it has changed, or is gone, that is said."""
+    picture = tmp_path / "sky.exr"
+    half = Sky("image", image=np.linspace(0, 1, 8 * 16 * 3, dtype=np.float32).reshape(8, 16, 3))
+    write_sky(picture, half)
+    one = place()
+    one.session.sky = Sky("image", image=read_sky_image(picture), name=picture.name, path=picture)
+    scene = copied(tmp_path)
+    one.open(scene)
+    one.session.set_sky(dataclasses.replace(one.session.sky, strength=2.0, rotation=90.0))
+    one.save(tmp_path / "a.glow")
+    (tmp_path / "there").mkdir()
+    for name in ("a.glow", "sky.exr", scene.name):
+        (tmp_path / name).rename(tmp_path / "there" / name)
+    file = tmp_path / "there" / "a.glow"
+    two = place().open(file)
+    sky = two.session.edited_scene.sky
+    assert two.notes == [] and sky is not None and sky.image is not None
+    assert np.array_equal(sky.image, one.session.sky.image) and (sky.strength, sky.rotation) == (2.0, 90.0)
+    write_sky(tmp_path / "there" / "sky.exr", dataclasses.replace(half, strength=3.0))
+    assert any("sky.exr" in note and "has changed" in note for note in place().open(file).notes)
+    (tmp_path / "there" / "sky.exr").unlink()
+    three = place().open(file)
+    assert any("the picture of its sky is not there" in note for note in three.notes)
+    assert three.session.edited_scene.sky is None
 
 
 def test_a_failed_scene_leaves_all_as_it_was(place: Callable[..., Place], tmp_path: Path) -> None:
