@@ -130,7 +130,7 @@ def write_bake(
                 staged(EMBEDDED_NAME).write_bytes(embedded)
             if options.web:
                 shown = staged.read(SCENE_NAME, *lightmaps, SKY_NAME)
-                page = web_page(scene.name, shown, report, find_three(options.three))
+                page = web_page(scene.name, shown, report, find_three(options.three), sky=scene.sky)
                 staged(PAGE_NAME).write_text(page, encoding="utf-8")
             text = staged(REPORT_NAME)
             files = sorted(path.name for path in staged.paths)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import UserError
+from app.scene.sky import SUN_ANGLE, Sky
 
 HERE = Path(__file__).parent / "web"
 OLDEST = 152  # release of three.js whose lightmaps choose their texture coordinates
@@ -44,9 +45,13 @@ def find_three(given: str | None = None) -> Path:
     )
 
 
-def web_page(title: str, files: Mapping[str, bytes], report: Mapping[str, Any], three: Path) -> str:
-    """The page. files: scene.glb, its lightmaps and the sky, by name; report: of the bake; three: the folder of the package."""
-    about = json.dumps({name: report[name] for name in SHOWN}).replace("<", "\\u003c")
+def web_page(
+    title: str, files: Mapping[str, bytes], report: Mapping[str, Any], three: Path, *, sky: Sky | None = None
+) -> str:
+    """The page. files: scene.glb, its lightmaps and the sky, by name; report: of the bake; three: the folder of the package; sky:
+    of the scene, whose sun is none of those files."""
+    known = {name: report[name] for name in SHOWN} | {"sun": None if sky is None else _sun(sky)}
+    about = json.dumps(known).replace("<", "\\u003c")
     data = [f'<script type="application/json" id="about">{about}</script>']
     for name, content in files.items():
         data.append(f'<script type="text/plain" id="{html.escape(name)}">{base64.b64encode(content).decode()}</script>')
@@ -58,6 +63,13 @@ def web_page(title: str, files: Mapping[str, bytes], report: Mapping[str, Any], 
     }
     page = (HERE / "page.html").read_text(encoding="utf-8")
     return re.sub(r"<!--(\w+)-->", lambda found: parts[found[1]], page)
+
+
+def _sun(sky: Sky) -> dict[str, Any] | None:
+    """Its disc: where it is, its angle across and its radiance [W/(sr m²)]."""
+    if sky.sun is None:
+        return None
+    return {"towards": sky.sun.direction.tolist(), "angle": SUN_ANGLE, "radiance": sky.sun_radiance.tolist()}
 
 
 def _modules(three: Path) -> dict[str, str]:

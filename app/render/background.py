@@ -58,7 +58,6 @@ class Background:
         world_from_ndc = view.world_from_camera[:3, :3] @ np.diag([height * aspect, height, -1.0]) @ back
         towards = np.zeros(3) if sky.sun is None else sky.sun.direction
         cosine = np.cos(SUN_ANGLE / 2)
-        disc = sky.sun_irradiance / (np.pi * np.sin(SUN_ANGLE / 2) ** 2)
         self._sky[shader].draw(
             target,
             textures={"t_sky": self._map_of(sky)},
@@ -68,7 +67,7 @@ class Background:
                 "u_world_from_ndc": tuple(world_from_ndc.T.ravel().tolist()),
                 "u_scale": tuple(sky.scale.tolist()),
                 "u_sun": (*towards.tolist(), float(cosine)),
-                "u_sun_radiance": tuple(disc.tolist()),
+                "u_sun_radiance": tuple(sky.sun_radiance.tolist()),
             },
             depth=True,
         )

@@ -115,6 +115,11 @@ class Sky:
         """(3,) on a surface that faces the sun, of the sun alone [W/m²]; 0 without one."""
         return np.zeros(3) if self.sun is None else self.scale * sun_irradiance(self.sun.height, self.turbidity)
 
+    @property
+    def sun_radiance(self) -> F64:
+        """(3,) of the sun's disc, even [W/(sr m²)]; 0 without one."""
+        return np.asarray(self.sun_irradiance / (np.pi * np.sin(SUN_ANGLE / 2) ** 2))
+
     @functools.cached_property
     def sun_light(self) -> Light | None:
         """The sun as a directional light; none without one, or where it is dark."""

@@ -67,7 +67,21 @@ const controls = new OrbitControls(camera, renderer.domElement);
 controls.target.copy(target);
 controls.update();
 
-const draw = () => renderer.render(scene, camera);
+// The sun's disc, which is not in the map of the sky: behind all else, wherever the camera goes.
+const sun = about.sun && new THREE.Vector3(...about.sun.towards);
+const disc = sun && new THREE.Mesh(
+  new THREE.CircleGeometry(Math.tan(about.sun.angle / 2), 32),
+  new THREE.MeshBasicMaterial({ color: new THREE.Color(...about.sun.radiance) }));
+if (disc) scene.add(disc);
+
+function draw() {
+  if (disc) {
+    disc.scale.setScalar(0.95 * camera.far);
+    disc.position.copy(camera.position).addScaledVector(sun, 0.95 * camera.far);
+    disc.lookAt(camera.position);
+  }
+  renderer.render(scene, camera);
+}
 function resize() {
   renderer.setSize(innerWidth, innerHeight);
   camera.aspect = innerWidth / innerHeight;
