@@ -25,6 +25,7 @@ ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 MAX_FACETS = (1 << 24) - 2  # item ids are held as floats, see common/item.glsl
 TABLE_WIDTH = 2048  # columns of the facet table
+FACET_ENTRIES = 3  # of a facet in it, as in common/facet.glsl
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,12 +317,19 @@ class TilePool:
         return self.slot_tables | {"t_facets": self._facet_table(), "t_materials": self.material_table(self.scene)}
 
     def _facet_table(self) -> F32:
-        """(rows, TABLE_WIDTH, 4): per facet, from 1, two entries: ∂p/∂u per texel of level 0 and its chart; ∂p/∂v."""
-        rows = -(-2 * (self.charts.facet_count + 1) // TABLE_WIDTH)
+        """(rows, TABLE_WIDTH, 4): per facet, from 1, see common/facet.glsl: ∂p/∂u per texel of level 0 and its chart; ∂p/∂v; its
+        plane."""
+        charts, count = self.charts, self.charts.facet_count
+        rows = -(-FACET_ENTRIES * (count + 1) // TABLE_WIDTH)
         table = np.zeros((rows * TABLE_WIDTH, 4), np.float32)
-        table[2 : 2 * len(self.dpdu) + 2 : 2, :3] = self.dpdu
-        table[2 * self.charts.face_facet + 2, 3] = self.charts.face_chart
-        table[3 : 2 * len(self.dpdv) + 3 : 2, :3] = self.dpdv
+        of_u, of_v, of_plane = (table[FACET_ENTRIES + k :: FACET_ENTRIES][:count] for k in range(FACET_ENTRIES))
+        of_u[:, :3], of_v[:, :3] = self.dpdu, self.dpdv
+        of_u[charts.face_facet, 3] = charts.face_chart
+        normal = np.cross(self.dpdu, self.dpdv)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+        of_plane[:, :3] = normal
+        corner = self.space.local_from_world(self.scene.corners[charts.face_triangle, 0])
+        of_plane[charts.face_facet, 3] = np.einsum("ij,ij->i", normal[charts.face_facet], corner)
         return table.reshape(rows, TABLE_WIDTH, 4)
 
     def _tile_texels(self, tiles: Tiles) -> TileTexels:

@@ -79,6 +79,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "LIGHT": FLAG,
     "LIGHTS": FLAG,
     "PIXELS": (1024,),
+    "MARGIN": (4,),
     "GATHERED": FLAG,
     "TRACED": FLAG,
     "FINER": FLAG,

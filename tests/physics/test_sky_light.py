@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from solver_scenes import NOISE, Solution, begin, grey, quads_scene
+from solver_scenes import NOISE, Solution, begin, grey, quads_scene, room
 
 from app.atlas.parametrize import parametrize
 from app.errors import UserError
@@ -13,6 +13,8 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.tile_pool import TilePool
 from app.scene.model import F64, Scene
 from app.scene.sky import Sky, Sun
+from app.scene.sky_directions import directions_of
+from app.session.balance import FINE
 from app.solvers.pairs.options import PairsOptions
 from app.solvers.pairs.solver import Pairs
 
@@ -53,13 +55,34 @@ def wall_factor(points: F64) -> F64:
 
 @EVERY_SKY_SOLVER
 def test_an_open_plane_receives_pi_times_the_radiance(gpu: Gpu, solver: str) -> None:
-    """Nothing stands before the sky: there is no noise, whatever the colour."""
+    """Nothing stands before the sky: there is no noise, whatever the colour. Maps know what was sent to a sample along the
+    edges."""
     scene = quads_scene([FLOOR], [grey(0.5)]).with_sky(Sky("uniform", (0.5, 1.0, 2.0), 3.0))
     lit = solved(gpu, scene, solver)
     assert np.allclose(lit.H, np.pi * 3 * np.array([0.5, 1, 2]), rtol=1e-4)
     book = lit.book
-    assert np.allclose(book.emitted, 4 * np.pi * 3 * np.array([0.5, 1, 2]), rtol=1e-4)
+    assert np.allclose(book.emitted, 4 * np.pi * 3 * np.array([0.5, 1, 2]), rtol=1e-3)
     assert np.allclose([book.absorbed, book.escaped], book.emitted / 2, rtol=1e-3)
+    lit.release()
+
+
+@pytest.mark.parametrize("solver", ["shooting", "quadtrees"])
+def test_what_is_sent_out_is_the_silhouette_and_what_arrives_balances_it(gpu: Gpu, solver: str) -> None:
+    """Each direction sends out its irradiance times the area that a box shows to it, which maps measure by their samples, along
+    its edges off by a tenth of one in the mean of many directions. On the texels as much arrives; beside the roof of a stand
+    within what counts as fine: its shadow's edge lies somewhere on coarse texels."""
+    sky = Sky("clear", (1.0, 0.8, 0.5), sun=Sun(60, 30))
+    size = np.array([1.0, 2.0, 3.0])
+    lit = solved(gpu, quads_scene(room(size)[:, ::-1], [grey(0.5)]).with_sky(sky), solver)
+    towards, irradiance = directions_of(sky)
+    shown = np.abs(towards) @ [size[1] * size[2], size[2] * size[0], size[0] * size[1]]
+    assert np.allclose(lit.book.emitted, shown @ irradiance, rtol=1e-3)
+    assert abs(lit.book.imbalance_share) < 2e-3
+    lit.release()
+    roof = [[0.5, 0.5, 1.5], [1.5, 0.5, 1.5], [1.5, 0.5, 0.5], [0.5, 0.5, 0.5]]
+    stand = quads_scene([FLOOR, WALL, roof], [grey(0.5, double_sided=True)]).with_sky(sky)
+    lit = solved(gpu, stand, solver)
+    assert abs(lit.book.imbalance_share) < FINE
     lit.release()
 
 
@@ -117,7 +140,8 @@ def test_the_sun_falls_on_a_floor_as_the_cosine(gpu: Gpu, solver: str) -> None:
     lit = solved(gpu, floor, solver)
     expected = 0.5 * sky.sun_irradiance
     assert np.allclose(lit.H, expected, rtol=1e-3)
-    assert np.allclose(lit.book.emitted, 4 * expected, rtol=1e-3)
+    # maps know what was sent to a sample along the edges, and all directions of the sun see the floor on nearly the same ones
+    assert np.allclose(lit.book.emitted, 4 * expected, rtol=4e-3)
     lit.release()
     wide = [[-1, 0, 0], [3, 0, 0], [3, 2, 0], [-1, 2, 0]]
     lit = solved(gpu, quads_scene([FLOOR, wide], [grey(0.0, double_sided=True)]).with_sky(sky), solver)

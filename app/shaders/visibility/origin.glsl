@@ -1,6 +1,7 @@
 // Where rays of a texel start: anywhere on its square where one flat surface fills it, so that the mean over its rays is that over
 // its area; else in the middle of the surface that it covers.
 #include "common/atlas.glsl"
+#include "common/facet.glsl"
 #include "common/hemisphere.glsl"
 #include "common/item.glsl"
 #include "common/leaves.glsl"
@@ -10,7 +11,6 @@
 uniform sampler2D t_origin;  // point, solver space; w: 0 nothing here, 1 that point, 2 all of the square around it
 uniform usampler2D t_origin_normal;
 uniform usampler2D t_normal_ids;
-uniform sampler2D t_facets;
 
 struct Origin {
     vec3 position;
@@ -20,11 +20,6 @@ struct Origin {
     vec3 u, v;    // along the edges of the square
     ivec3 place;  // of the texel in the atlas, for its random numbers
 };
-
-vec3 facet_tangent(int entry) {
-    int width = textureSize(t_facets, 0).x;
-    return texelFetch(t_facets, ivec2(entry % width, entry / width), 0).xyz;
-}
 
 Origin load_origin(ivec2 texel_px) {
     Origin o;
@@ -37,9 +32,9 @@ Origin load_origin(ivec2 texel_px) {
     o.place = ivec3(ivec2(leaf.xy) * TILE + texel_px % TILE, int(1.0 / max(leaf.z, 1e-6)));
     o.u = o.v = vec3(0.0);
     if (o.square) {
-        int entry = 2 * int(facet_from_ids(texelFetch(t_normal_ids, texel_px, 0).y));
-        o.u = facet_tangent(entry) * leaf.z;
-        o.v = facet_tangent(entry + 1) * leaf.z;
+        uint facet = facet_from_ids(texelFetch(t_normal_ids, texel_px, 0).y);
+        o.u = facet_entry(facet, 0).xyz * leaf.z;
+        o.v = facet_entry(facet, 1).xyz * leaf.z;
     }
     return o;
 }

@@ -19,8 +19,8 @@ const float DEPTH_SLACK = 1.0 / 16384.0;
 uniform sampler2D t_items;
 uniform sampler2D t_depth;  // in units of FAR
 
-// axes: of local vectors, in the solver space
-float visible(float facet, vec3 local, vec3 normal_local, mat3 axes, int shot) {
+// position: of the receiver, axes: of local vectors, both in the solver space
+float visible(float facet, vec3 position, vec3 local, vec3 normal_local, mat3 axes, int shot) {
     int view = view_from_direction(local);
     vec3 point = view_from_local(view, local), normal = view_from_local(view, normal_local);
     vec4 bounds = view_bounds_px(view);
@@ -46,8 +46,7 @@ float visible(float facet, vec3 local, vec3 normal_local, mat3 axes, int shot) {
     if (any(seen) && !all(seen)) {
         for (int i = 0; i < 4; ++i) {
             vec2 px = middle + vec2(i == 1 || i == 2 ? 0.5 : -0.5, i < 2 ? 0.5 : -0.5);
-            vec3 sight = local_from_view(view, sight_from_px(view, px));
-            if (!seen[i]) seen[i] = !behind(items[i], shown[i] * sight - local, sight, axes);
+            if (!seen[i]) seen[i] = !behind(items[i], position, axes * local_from_view(view, sight_from_px(view, px)));
         }
     }
 #endif

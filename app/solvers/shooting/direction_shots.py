@@ -27,6 +27,8 @@ from app.visibility.occluders import Occluders
 # px along the edge of a map, for each of a full face of a patch's map: a texel is at least one sample there, and two here, since
 # one direction of a sharp sun casts an edge by itself
 PER_FACE_PIXEL = 2
+MARGIN = 4  # px of a map that the sphere around the scene leaves free, both sides together
+SENT_BLOCK = 32  # samples along the edge of a block that direction_sent.frag.glsl sums
 
 
 class DirectionShots:
@@ -38,7 +40,7 @@ class DirectionShots:
         self._gpu, self._lightmap, self._occluders, self._shooters = gpu, lightmap, occluders, shooters
         pixels = self._pixels = PER_FACE_PIXEL * resolution
         self._most_maps = max(1, min(BATCH, MAPS_TEXELS // pixels**2))
-        defines: dict[str, object] = {"PIXELS": pixels, **IN_BLOCKS}
+        defines: dict[str, object] = {"PIXELS": pixels, "MARGIN": MARGIN, **IN_BLOCKS}
         kinds: dict[bool, dict[str, object]] = {one.sheer: {"OPACITY": True} if one.sheer else {} for one in occluders}
         self._draw = {
             sheer: Pass(gpu, "solvers/shooting/direction_map", defines=defines | more, slots=RECORDS)
@@ -52,16 +54,17 @@ class DirectionShots:
         self._items = gpu.texture((pixels, pixels * self._most_maps), 1, "f4")
         self._depth = gpu.depth_texture(self._items.size)
         self._target = gpu.target(self._items, depth=self._depth)
+        self._count = Pass(gpu, "solvers/shooting/direction_sent", defines={"BLOCK": SENT_BLOCK})
+        blocks = self._blocks = pixels // SENT_BLOCK
+        self._sent = gpu.texture((blocks, blocks * BATCH), 1, "f4")
+        self._sent_target = gpu.target(self._sent)
 
     def shoot(self, shots: Sequence[OutsideShot], ledger: Ledger, bands: int) -> Generator[None, None, None]:
         """These, up to a batch, in parts."""
         self._write(shots)
-        with ledger.directions_shoot(len(shots)):
-            yield from self._shoot(len(shots), bands)
-
-    def _shoot(self, shots: int, bands: int) -> Generator[None, None, None]:
-        for first, some in self._groups(shots):
+        for first, some in self._groups(len(shots)):
             self._draw_maps(first, some)
+            self._count_sent(first, some)
             yield
             for band in range(bands):
                 self._receive.draw(
@@ -73,6 +76,7 @@ class DirectionShots:
                     scissor=band_of(self._lightmap.size, band, bands),
                 )
                 yield
+        ledger.enter_directions(self._sent, len(shots), (2.0 / (self._pixels - MARGIN)) ** 2)
 
     def replay(self, shots: Sequence[OutsideShot], target: Framebuffer, rects: Mesh) -> Generator[None, None, None]:
         """Add these once more to a target, on some rectangles of texels only, in parts."""
@@ -114,6 +118,12 @@ class DirectionShots:
                 depth=True,
             )
 
+    def _count_sent(self, first: int, shots: int) -> None:
+        """Count the samples of the maps that were drawn last that show sides with texels."""
+        place = 0, first * self._blocks, self._blocks, shots * self._blocks
+        items = {"t_items": self._items}
+        self._count.draw(self._sent_target, textures=items, uniforms={"u_row": place[1]}, viewport=place)
+
     def _write(self, shots: Sequence[OutsideShot]) -> None:
         """Write these shots as the shooters of the batch."""
         records = np.zeros(BATCH, SHOOTER.dtype)
@@ -126,7 +136,7 @@ class DirectionShots:
         self._shooters.share()
 
     def release(self) -> None:
-        self._gpu.release_all(self._target, self._items, self._depth)
+        self._gpu.release_all(self._target, self._items, self._depth, self._sent_target, self._sent)
 
 
 __all__ = ["DirectionShots"]

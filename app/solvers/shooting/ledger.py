@@ -4,13 +4,10 @@
 
 Before a batch shoots, what it is about to shoot is taken from the residual of its patches; the ledger then adds up how much of
 that left the scene, or was lost on black sides without texels. What texels absorbed and still hold is summed tile by tile. A
-direction of the sky sends out what texels receive of it: all that misses them is none of the scene's.
+direction of the sky sends out what its map shows of sides with texels: all that misses them is none of the scene's.
 """
 
 from __future__ import annotations
-
-import contextlib
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -45,7 +42,6 @@ class Ledger:
             for keeps in (False, True)
         }
         self._add_tiles = Pass(gpu, "solvers/shooting/tile_energy", defines=lightmap.defines("TILE") | reads)
-        self._sum_received = Pass(gpu, "solvers/shooting/tile_received", defines=lightmap.defines("TILE"))
         self._enter_directions = Pass(gpu, "solvers/shooting/ledger_directions", slots=RECORDS)
         self.lamps, self.albedo, self.area = np.zeros(3), (0.0, 0.0, 0.0), 0.0
         self.directions = self.points = self.to_come = np.zeros(3)
@@ -55,8 +51,6 @@ class Ledger:
         size = self._lightmap.columns, self._lightmap.rows
         self._tiles = [self._gpu.texture(size, 4, "f4") for _ in range(3)]
         self._tile_target = self._gpu.target(*self._tiles)
-        self._received = self._gpu.texture(size, 4, "f4")
-        self._received_target = self._gpu.target(self._received)
 
     @property
     def watt(self) -> float:
@@ -107,22 +101,15 @@ class Ledger:
             viewport=(0, 0, shots, LEDGER.rows),
         )
 
-    @contextlib.contextmanager
-    def directions_shoot(self, shots: int) -> Iterator[None]:
-        """Add to the ledger what texels receive meanwhile, as what so many directions send out."""
-        self._enter_received(-1.0, 0)
-        yield
-        self._enter_received(1.0, shots)
-
-    def _enter_received(self, sign: float, shots: int) -> None:
-        reads = self._lightmap.textures("t_position_area", "t_irradiance")
-        self._sum_received.draw(self._received_target, textures=reads)
+    def enter_directions(self, sent: Texture, shots: int, sample: float) -> None:
+        """Add to the ledger what so many directions of the batch sent out. sent: samples of their maps that show sides with
+        texels, in pieces, of each shot as many rows; sample: area of one, solver space."""
         self._enter_directions.draw(
             self.target,
-            textures={"t_received": self._received},
-            uniforms={"u_sign": sign, "u_shots": float(shots)},
+            textures={"t_sent": sent, "t_shooters": self._shooters.texture},
+            uniforms={"u_blocks": sent.height // BATCH, "u_sample": sample},
             blend="add",
-            viewport=(0, 0, 1, LEDGER.rows),
+            viewport=(0, 0, shots, LEDGER.rows),
         )
 
     def tile_sums(self) -> tuple[F64, F64, F64]:
@@ -179,4 +166,4 @@ class Ledger:
         self._gpu.release_all(self.target, self.texture)
 
     def _release_tiles(self) -> None:
-        self._gpu.release_all(self._tile_target, *self._tiles, self._received_target, self._received)
+        self._gpu.release_all(self._tile_target, *self._tiles)

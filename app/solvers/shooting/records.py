@@ -35,7 +35,7 @@ SHOOTER = Struct(
     "vec3 exitance, int signed_size",
 )
 # Of one column of shots: power that left the scene, how many shots; power that black sides took; all that was shot; and
-# what came from directions, all of which texels received [stored units · area].
+# what directions sent to sides with texels [stored units · area].
 LEDGER = Struct("Ledger", "vec3 escaped, float shots", "vec3 blackened", "vec3 shot", "vec3 directions")
 # Of the lightmap as it was: unshot: power, Σ |Σ r A| over tiles; to_shoot: of all patches, with the overshoot; strongest: of one
 # patch. escaped, shots and directions: of the ledger so far.

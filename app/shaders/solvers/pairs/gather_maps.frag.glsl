@@ -21,7 +21,7 @@ void main() {
         float F = form_factor(texel.position, texel.normal, s);
         if (F <= 0.0) continue;
         mat3 axes = frame_of(s.normal);
-        float V = visible(float(texel.facet), (texel.position - s.position) * axes, texel.normal * axes, axes, k);
+        float V = visible(float(texel.facet), texel.position, (texel.position - s.position) * axes, texel.normal * axes, axes, k);
         out_received += F * V * vec4(texelFetch(t_sent, row_px(u_range.x + k), 0).rgb, 1.0);
     }
 }

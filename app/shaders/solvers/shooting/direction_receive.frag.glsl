@@ -21,7 +21,8 @@ layout(location = 1) out vec4 out_residual;
 
 const float SLACK = 1.0 / 8192.0;  // of the scene's radius: rounding of depths, as in visibility/visible.glsl
 
-float visible(vec3 local, vec3 normal, float facet, mat3 axes, int shot) {
+// position: in the solver space; local, normal: in the axes of the map
+float visible(vec3 position, vec3 local, vec3 normal, float facet, vec3 sight, int shot) {
     vec2 at = px_of(local) - 0.5, base = floor(at), f = at - base;
     vec2 uv = (base + 1.0 + vec2(0.0, MAP * float(shot))) / vec2(MAP, MAP * float(u_maps));
     vec4 x = vec4(0.0, 1.0, 1.0, 0.0) - f.x, y = vec4(1.0, 1.0, 0.0, 0.0) - f.y;  // [px] from the receiver, as textureGather has them
@@ -31,10 +32,8 @@ float visible(vec3 local, vec3 normal, float facet, mat3 axes, int shot) {
     bvec4 same = equal(items, vec4(facet)), open = lessThanEqual(shown, max(plane + SLACK, -1.0));
     bvec4 seen = bvec4(same.x || open.x, same.y || open.y, same.z || open.z, same.w || open.w);
     if (any(seen) && !all(seen)) {
-        for (int i = 0; i < 4; ++i) {
-            vec3 to_shown = vec3(vec2(x[i], y[i]) * (2.0 / (WIDTH * MAP)), shown[i] - local.z);
-            if (!seen[i]) seen[i] = !behind(items[i], to_shown, vec3(0.0, 0.0, -1.0), axes);
-        }
+        for (int i = 0; i < 4; ++i)
+            if (!seen[i]) seen[i] = !behind(items[i], position, sight);
     }
     return dot(vec4(seen), vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)));
 }
@@ -50,7 +49,7 @@ void main() {
         vec3 normal = texel.normal * axes;
         if (normal.z <= 0.0) continue;
         vec4 light = normal.z * vec4(s.exitance, dot(abs(s.exitance), vec3(1.0)));
-        out_irradiance += light * visible(texel.position * axes, normal, float(texel.facet), axes, shot);
+        out_irradiance += light * visible(texel.position, texel.position * axes, normal, float(texel.facet), -s.normal, shot);
         out_residual.a += light.a;
     }
     out_residual.rgb = albedo_of(t_materials, texel.material, px) * out_irradiance.rgb;

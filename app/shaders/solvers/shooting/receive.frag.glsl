@@ -37,12 +37,12 @@ vec2 received(vec3 position, vec3 normal, float facet, Shooter s, int shot) {
     mat3 axes = world_axes(s);
     vec3 local = (position - s.origin) * axes;
 #if LIGHT
-    vec2 FV = vec2(unoccluded(load_light(s.patch_x), position, normal).r, visible(facet, local, normal * axes, axes, shot));
-    return local.z > 0.0 ? FV : vec2(0.0);
+    float F = unoccluded(load_light(s.patch_x), position, normal).r, least = 0.0;
 #else
-    vec2 FV = vec2(form_factor(position, normal, s), visible(facet, local, normal * axes, axes, shot));
-    return local.z > COPLANAR ? FV : vec2(0.0);
+    float F = form_factor(position, normal, s), least = COPLANAR;
 #endif
+    float V = visible(facet, position, local, normal * axes, axes, shot);
+    return local.z > least ? vec2(F, V) : vec2(0.0);
 }
 
 void main() {
