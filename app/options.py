@@ -178,7 +178,7 @@ def add_flags(
     defaults: Mapping[str, Any] | None = None,
 ) -> None:
     """Give ``parser`` one flag per declared option, or for some ``only``; booleans become ``--name`` / ``--no-name``. defaults:
-    other ones than those declared, by name."""
+    other ones than those declared, by name, that ``from_flags`` is given, too."""
     own = defaults or {}
     group = parser.add_argument_group(options.__name__.removesuffix("Options").lower())
     for spec in specs(options):
@@ -189,16 +189,20 @@ def add_flags(
         default = "" if value is None else f" (default {value})"
         text = (spec.help + unit + default).replace("%", "%%")
         if spec.type is bool:
-            group.add_argument(spec.flag, action=argparse.BooleanOptionalAction, default=own.get(spec.name), help=text)
+            group.add_argument(spec.flag, action=argparse.BooleanOptionalAction, default=None, help=text)
         else:
             meta = "{" + ",".join(map(str, spec.choices)) + "}" if spec.choices else spec.type.__name__.upper()
-            group.add_argument(spec.flag, type=_reader(spec), default=own.get(spec.name), metavar=meta, help=text)
+            group.add_argument(spec.flag, type=_reader(spec), metavar=meta, help=text)
 
 
-def from_flags(options: type[OptionsT], flags: argparse.Namespace) -> OptionsT:
-    """The options that the parsed flags ask for; flags not given keep the default."""
+def from_flags(
+    options: type[OptionsT], flags: argparse.Namespace, defaults: Mapping[str, Any] | None = None
+) -> OptionsT:
+    """The options that the parsed flags ask for; flags not given keep the default. defaults: as of ``add_flags``."""
+    own = defaults or {}
     given = {s.name: getattr(flags, s.name, None) for s in specs(options)}
-    return options(**{name: value for name, value in given.items() if value is not None})
+    values = {name: own.get(name) if value is None else value for name, value in given.items()}
+    return options(**{name: value for name, value in values.items() if value is not None})
 
 
 def _reader(spec: Spec) -> Any:

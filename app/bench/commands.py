@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from app.atlas.options import AtlasOptions
+from app.bench.choices import CURVES_END
 from app.commands.command import SOLVER_OF, Command, add_commands
-from app.commands.flags import Parser, json_flag, output_flag, positive, scene_flags, solver_flags
+from app.commands.flags import Parser, json_flag, output_flag, positive, scene_flags, settings_flag, solver_flags
 from app.lightmap.options import LightmapOptions
 from app.options import add_flags, specs
 from app.solvers import SOLVERS, Family
 
 ERROR_SCENES = ("furnace", "cornell-box")
 EDIT_RAYS = 192  # of each texel
-CURVES_END = {"noise": 1e-3}  # of `bench error`: later than a bake, for what a method comes to
 EDIT_SCENES = ("cornell-box", "museum")
 RAY_SCENES = ("cornell-box", "museum", "grotto")
 PRESET_SCENES = ("cornell-box", "textured-room")
@@ -53,6 +53,7 @@ def _scenes_flag(parser: Parser, default: Sequence[str]) -> None:
 
 
 def _shots_flags(shots: Parser, family: Family) -> None:
+    settings_flag(shots)
     json_flag(shots)
     add_flags(shots, SOLVERS["shooting"].options)
     add_flags(shots, LightmapOptions, only=("storage",))
@@ -173,6 +174,7 @@ def _error_flags(error: Parser, family: Family) -> None:
         metavar="N",
         help="from each point of a path-traced reference (default 16384)",
     )
+    settings_flag(error)
     json_flag(error)
     for row in SOLVERS.values():
         add_flags(error, row.options, defaults=CURVES_END)
@@ -183,6 +185,7 @@ def _presets_flags(presets: Parser, family: Family) -> None:
     _scenes_flag(presets, PRESET_SCENES)
     help = "from each point of a path-traced reference (default %(default)s)"
     presets.add_argument("--paths", type=positive(int), default=16384, metavar="N", help=help)
+    settings_flag(presets)
     json_flag(presets)
 
 

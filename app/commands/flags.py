@@ -97,13 +97,13 @@ def settings_named(arguments: Sequence[str]) -> Settings:
 
 
 def fill(flags: argparse.Namespace, solver: str, settings: Settings) -> None:
-    """Give the flags that were not given the values of settings, as far as the command has such flags. solver: that is asked for
-    by a flag or settings."""
+    """Give the flags that were not given the values of settings, as far as the command has such flags: no two options share one.
+    solver: that is asked for by a flag or settings."""
     flags.given = settings
     if getattr(flags, "solver", None) is not None:
         flags.solver = solver
-    for table, values in settings.tables.items():
-        for name, value in values.items() if table == solver or table not in SOLVERS else ():
+    for values in settings.tables.values():
+        for name, value in values.items():
             if getattr(flags, name, 0) is None:
                 setattr(flags, name, value)
 

@@ -106,8 +106,8 @@ def test_a_command_may_have_other_defaults() -> None:
     parser = argparse.ArgumentParser()
     add_flags(parser, Sample, defaults={"size": 96})
     assert "edge [px] (default 96)" in " ".join(parser.format_help().split())
-    assert from_flags(Sample, parser.parse_args([])).size == 96
-    assert from_flags(Sample, parser.parse_args(["--size", "32"])).size == 32
+    assert from_flags(Sample, parser.parse_args([]), {"size": 96, "of others": 1}).size == 96
+    assert from_flags(Sample, parser.parse_args(["--size", "32"]), {"size": 96}).size == 32
 
 
 @pytest.mark.parametrize(("options", "spec"), FIELDS, ids=[f"{o.__name__}.{s.name}" for o, s in FIELDS])

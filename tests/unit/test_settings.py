@@ -11,6 +11,9 @@ import pytest
 
 from app import cli
 from app.atlas.options import AtlasOptions
+from app.bench import commands
+from app.bench.accuracy.methods import METHODS
+from app.bench.choices import CURVES_END
 from app.errors import UserError
 from app.render.options import DisplayOptions
 from app.session.settings import PRESETS, TABLES, Settings, checked, settings_of, settings_text, write_settings
@@ -124,8 +127,10 @@ def parsed(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> argparse.Namespa
     seen: list[argparse.Namespace] = []
     for command in ("_bake", "_shot", "_info", "_view"):
         monkeypatch.setattr(cli, command, lambda flags: seen.append(flags) or 0)
+    for command in ("_bench_error", "_bench_shots", "_bench_presets"):
+        monkeypatch.setattr(commands, command, lambda flags: seen.append(flags) or 0)
     assert cli.run(list(arguments)) == 0
-    return seen[0]
+    return seen[-1]
 
 
 def test_flags_come_before_settings(monkeypatch: pytest.MonkeyPatch, file: Path) -> None:
@@ -137,6 +142,18 @@ def test_flags_come_before_settings(monkeypatch: pytest.MonkeyPatch, file: Path)
 def test_a_named_solver_has_its_own_table(monkeypatch: pytest.MonkeyPatch, file: Path) -> None:
     flags = parsed(monkeypatch, "bake", "x", "-o", "y", f"--settings={file}", "--solver", "shooting")
     assert flags.solver == "shooting" and flags.level == 1 and not hasattr(flags, "noise")
+
+
+def test_benches_take_what_they_have_of_settings(monkeypatch: pytest.MonkeyPatch, file: Path) -> None:
+    """Of all solvers at once; what they have defaults of their own for, too."""
+    settings = f"--settings={file}"
+    error = parsed(monkeypatch, "bench", "error", "x", "-o", "y", settings)
+    assert (error.noise, error.level) == (0.005, 1)
+    assert METHODS["gathering"].setup(None, error).options.noise == 0.005
+    unset = parsed(monkeypatch, "bench", "error", "x", "-o", "y")
+    assert METHODS["gathering"].setup(None, unset).options.noise == CURVES_END["noise"]
+    assert parsed(monkeypatch, "bench", "shots", settings).level == 1
+    assert parsed(monkeypatch, "bench", "presets", settings).given.solver == "gathering"
 
 
 def test_without_settings_all_is_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:

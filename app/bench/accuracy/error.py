@@ -21,6 +21,7 @@ from app.bench.accuracy.error_curve import look_at, solve_curve
 from app.bench.accuracy.error_report import SceneCurves, document, plot, write
 from app.bench.accuracy.methods import METHODS, Setup
 from app.bench.accuracy.reference_picture import reference_picture
+from app.bench.choices import CURVES_END
 from app.bench.machine import load, machine
 from app.bench.peers.peers import PEERS, Task
 from app.errors import UserError
@@ -75,7 +76,7 @@ def bench_error(flags: argparse.Namespace) -> int:
         values |= {"load": load(), "seconds": plan.seconds, "texels": plan.texels}
         values |= {"lightmap": from_flags(LightmapOptions, flags).as_dict()}
         solvers = dict.fromkeys(METHODS[name].solver for name in plan.methods)
-        values |= {name: from_flags(SOLVERS[name].options, flags).as_dict() for name in solvers}
+        values |= {name: from_flags(SOLVERS[name].options, flags, CURVES_END).as_dict() for name in solvers}
         interrupted = not _measured(gpu, scenes, plan, console, tell)
     done = [one for one in scenes if one.curves]
     if not done:

@@ -9,7 +9,7 @@ from typing import Any
 
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import ROOT_SHARE
-from app.bench.choices import chosen_names
+from app.bench.choices import CURVES_END, chosen_names
 from app.lightmap.options import LightmapOptions
 from app.options import Options, from_flags
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
@@ -61,7 +61,7 @@ class Method:
         if self.adaptive and texels is not None:
             texels = max(texels // ROOT_SHARE, 1)
         light = from_flags(LightmapOptions, flags).replace(**({"adaptive": False} | self.light))
-        options = from_flags(SOLVERS[self.solver].options, flags).replace(**self.options)
+        options = from_flags(SOLVERS[self.solver].options, flags, CURVES_END).replace(**self.options)
         return Setup(AtlasOptions(texels=texels), light, self.solver, options)
 
 

@@ -1,6 +1,7 @@
-"""``glowtree bench presets``: what the settings that come along cost and how far off their light is, scene by scene.
+"""``glowtree bench presets``: what the settings that come along, and those of a file, cost and how far off their light is, by
+scene.
 
-Each preset is solved from nothing until converged; the clock stands while it is compared with a reference, at random points,
+Each is solved from nothing until converged; the clock stands while it is compared with a reference, at random points,
 see reference/irradiance.py.
 """
 
@@ -19,7 +20,7 @@ from app.reference.irradiance import ReferenceIrradiance, choose_reference, refe
 from app.scene.load import NO_LIGHT, load_scene
 from app.scene.model import Scene
 from app.session.batch import opened
-from app.session.settings import PRESETS, settings_of
+from app.session.settings import PRESETS, Settings, settings_of
 from app.solvers import DEFAULT_SOLVER, SOLVERS
 from app.util.console import Console
 from app.util.tables import Column, Row, markdown_table
@@ -40,6 +41,9 @@ NOTE = "Seconds of solving until converged, without loading; irradiance against 
 def bench_presets(flags: argparse.Namespace) -> int:
     """Print the table. Raises UserError. Ctrl-C ends it with what was measured."""
     console, rows, interrupted = Console(quiet=flags.json), list[Row](), False
+    chosen = {name: settings_of(name) for name in PRESETS}
+    if flags.settings is not None:
+        chosen[Path(flags.settings).stem] = flags.given
     with gpu_context() as gpu, console.progress("presets") as tell:
         renderer = gpu.limits.renderer
         try:
@@ -50,11 +54,10 @@ def bench_presets(flags: argparse.Namespace) -> int:
                 kind = choose_reference(scene, None)
                 scene = cut_at_contacts(scene).scene  # as solvers see it: points are told by its triangles
                 reference = reference_irradiance(scene, kind, flags.paths, tell)
-                for nth, preset in enumerate(PRESETS):
-                    tell(f"{Path(source).stem}, {preset}", nth / len(PRESETS))
-                    rows.append(
-                        {"scene": Path(source).stem, "preset": preset} | measured(gpu, scene, reference, preset)
-                    )
+                for nth, (name, settings) in enumerate(chosen.items()):
+                    tell(f"{Path(source).stem}, {name}", nth / len(chosen))
+                    row = measured(gpu, scene, reference, settings)
+                    rows.append({"scene": Path(source).stem, "preset": name} | row)
         except KeyboardInterrupt:
             interrupted = True
     table = markdown_table(COLUMNS, rows)
@@ -62,9 +65,8 @@ def bench_presets(flags: argparse.Namespace) -> int:
     return 130 if interrupted else 0
 
 
-def measured(gpu: Gpu, scene: Scene, reference: ReferenceIrradiance, preset: str) -> Row:
-    """Time and error of one of PRESETS."""
-    settings = settings_of(preset)
+def measured(gpu: Gpu, scene: Scene, reference: ReferenceIrradiance, settings: Settings) -> Row:
+    """Time and error by these settings."""
     name = settings.solver or DEFAULT_SOLVER
     family = SOLVERS[name]
     atlas, light = settings.of("texels", AtlasOptions()), settings.of("lightmap", LightmapOptions())
