@@ -65,7 +65,7 @@ class CarriedGlb(GlbBuilder):
     def _embed(self, image: dict[str, Any], uri: str) -> None:
         """An image by its bytes; as it is where its file cannot be read."""
         data = self._file.resource(uri)
-        kind = next((kind for magic, kind in MAGIC.items() if data is not None and data.startswith(magic)), None)
+        kind = None if data is None else kind_of(data)
         if data is None or kind is None:
             return
         if not uri.startswith("data:"):
@@ -105,6 +105,11 @@ class CarriedGlb(GlbBuilder):
         about = self.given["bufferViews"][index]
         extra = {name: about[name] for name in ("byteStride", "target", "name", "extras") if name in about}
         return self.add_view(bytes(self._file.view(index)), extra)
+
+
+def kind_of(picture: bytes) -> str | None:
+    """The media type of a picture, by its first bytes."""
+    return next((kind for magic, kind in MAGIC.items() if picture.startswith(magic)), None)
 
 
 def drop(item: dict[str, Any], kind: str, name: str) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from app.bake.glb import GlbBuilder
+from app.bake.gltf_looks import Looks
 from app.scene.model import F32, F64, Material, Texture
 
 WRAPS = {"repeat": 10497, "clamp": 33071, "mirror": 33648}
@@ -29,6 +30,7 @@ class MaterialWriter:
         self._glb, self._materials, self._lightmaps, self._lightmap_textures = glb, materials, lightmaps, textures
         self._written: dict[tuple[int, bool, bool, int], int] = {}
         self._images: dict[int, int] = {}
+        self._looks = Looks(glb)
         self._with_alpha = [_with_alpha(material) for material in materials]
         self._samplers: dict[tuple[int, int, bool], int] = {}
         self._textures: dict[tuple[int, int], int] = {}
@@ -40,6 +42,7 @@ class MaterialWriter:
         """
         m = self._materials[material]
         used = {t.texcoord for t in (self._with_alpha[material][0], m.emission_texture) if t is not None}
+        used |= self._looks.texcoords(m) & {0, 1}
         if used == {1}:
             return {1: 0}
         return {0: 0, 1: 2 if lit else 1} if 1 in used else {0: 0}
@@ -62,6 +65,7 @@ class MaterialWriter:
         if texture is not None:
             surface["baseColorTexture"] = self._texture_info(texture, slots)
         item: dict[str, Any] = {"name": m.name, "pbrMetallicRoughness": surface, "doubleSided": double_sided}
+        self._looks.put(item, m, slots)
         if m.opacity_cutoff is not None:
             item |= {"alphaMode": "MASK", "alphaCutoff": m.opacity_cutoff}
         elif not m.opaque:

@@ -16,6 +16,7 @@ WITHOUT_SPECULAR = (
 )  # these have no such lobe to leave out
 STRENGTH = "KHR_materials_emissive_strength"
 GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
+SCALE = "lightmap_scale"  # of extras
 
 
 class OwnMaterials:
@@ -97,6 +98,9 @@ class OwnMaterials:
             if strength > 1.0:
                 item.setdefault("extensions", {})[STRENGTH] = {"emissiveStrength": strength}
                 self._glb.use_extension(STRENGTH)
+        if now.lightmap_scale != before.lightmap_scale:
+            extras = item.get("extras")
+            item["extras"] = {**(extras if isinstance(extras, dict) else {}), SCALE: now.lightmap_scale}
 
 
 def _second_uses(item: Any) -> list[dict[str, Any]]:

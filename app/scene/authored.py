@@ -47,10 +47,11 @@ from app.scene import shapes
 from app.scene.cameras import look_at
 from app.scene.gltf import load_gltf
 from app.scene.gltf_file import first_problem
+from app.scene.gltf_pose import turned_normals
 from app.scene.images import ImageError, path_inside, read_image
 from app.scene.lights import OUTER, Light, LightKind
 from app.scene.meshfile import load_meshfile
-from app.scene.model import Camera, Material, Scene, Texture
+from app.scene.model import SCALES, Camera, Material, Scene, Texture
 from app.scene.options import UNITS
 from app.scene.orientation import WITHOUT_UNIT
 from app.scene.procedural import Procedural
@@ -113,7 +114,7 @@ class MaterialTable(Table):
     texture: TextureTable | None = None
     double_sided: bool = False
     opacity: Part01 = 1.0
-    lightmap_scale: Annotated[float, Field(ge=1 / 16, le=16.0)] = 1.0
+    lightmap_scale: Annotated[float, Field(ge=SCALES[0], le=SCALES[1])] = 1.0
 
     @model_validator(mode="after")
     def _one_light(self) -> Self:
@@ -421,7 +422,10 @@ class _Builder:
         if table.material is not None:
             material_ids = np.full(len(part.triangles), self._id(table.material, f"{where}.material"))
         else:
-            self.materials += part.materials
+            own = MESH_LOADERS[found.suffix.lower()] is load_gltf
+            self.materials += [
+                dataclasses.replace(m, gltf=(found, k)) if own else m for k, m in enumerate(part.materials)
+            ]
         prefix = f"{table.name}: " if table.name else ""
         self.parts.append(
             Part(
@@ -431,6 +435,7 @@ class _Builder:
                 material_ids,
                 None if part.uv0 is None else part.uv0[:, order],
                 None if part.uv1 is None else part.uv1[:, order],
+                normals=None if part.normals is None else turned_normals(matrix[:3, :3], part.normals)[:, order],
                 colours=None if part.colours is None else part.colours[:, order],
             )
         )

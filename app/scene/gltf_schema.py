@@ -11,6 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic.alias_generators import to_camel
 
 from app.scene.lights import OUTER
+from app.scene.model import SCALES
 
 Index = Annotated[int, Field(ge=0, lt=2**31)]
 Size = Annotated[int, Field(ge=0, lt=2**53)]
@@ -153,7 +154,7 @@ def _table(extras: object) -> object:
 class MaterialExtras(Model):
     """What of a material's extras is ours."""
 
-    lightmap_scale: Annotated[float, Field(ge=1 / 16, le=16.0, alias="lightmap_scale")] = 1.0
+    lightmap_scale: Annotated[float, Field(ge=SCALES[0], le=SCALES[1], alias="lightmap_scale")] = 1.0
 
 
 class Material(Model):

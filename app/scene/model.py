@@ -23,6 +23,7 @@ I32 = NDArray[np.int32]
 RGB = tuple[float, float, float]
 
 MOST_ALBEDO = 0.99  # of the whitest diffuser that is made, sintered PTFE; in a closed room of albedo 1 light never ends
+SCALES = (1 / 16, 16.0)  # of texels along a metre, that a material may have more or fewer than others
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,10 @@ class Material:
     opacity: float = 1.0  # [-], in [0, 1]
     opacity_texture: Texture | None = None
     opacity_cutoff: float | None = None
-    lightmap_scale: float = 1.0  # texels along a metre of it, over those along a metre of others
+    gltf: tuple[Path, int] | None = (
+        None  # the file of a mesh, and its material there, whose roughness and maps a bake keeps
+    )
+    lightmap_scale: float = 1.0  # texels along a metre of it, over those along a metre of others, in SCALES
 
     @property
     def opaque(self) -> bool:

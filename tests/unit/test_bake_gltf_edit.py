@@ -187,14 +187,40 @@ def test_edits_are_written_and_nothing_else_changes(tmp_path, rich):
     def edit(scene):
         wall, lamp, *rest = scene.materials
         lamp = dataclasses.replace(lamp, emission=(8.0, 4.0, 2.0))
-        return scene.with_materials((dataclasses.replace(wall, albedo=(0.2, 0.3, 0.4)), lamp, *rest))
+        wall = dataclasses.replace(wall, albedo=(0.2, 0.3, 0.4), lightmap_scale=2.0)
+        return scene.with_materials((wall, lamp, *rest))
 
     _, _, files = baked(tmp_path, rich, edit=edit)
     wall, lamp, *_ = document_of(files.scene)[0]["materials"]
     assert wall["pbrMetallicRoughness"]["baseColorFactor"] == [0.2, 0.3, 0.4, 1.0]
     assert wall["pbrMetallicRoughness"]["roughnessFactor"] == 0.25
+    assert wall["extras"]["lightmap_scale"] == 2.0 and "lightmap" in wall["extras"]
     assert lamp["emissiveFactor"] == [1.0, 0.5, 0.25]
     assert lamp["extensions"]["KHR_materials_emissive_strength"] == {"emissiveStrength": 8.0}
+
+
+def test_meshes_of_a_scene_written_by_hand_keep_their_looks(tmp_path, rich):
+    """Roughness, normal map with its picture byte for byte, and smooth normals, turned as the mesh is."""
+    scene = tmp_path / "street.toml"
+    scene.write_text(
+        f'[[mesh]]\nfile = "{rich.name}"\nrotate = [0, 90, 0]\n'
+        '[[material]]\nname = "lamp of mine"\nemission = 5\n'
+        '[[quad]]\nmaterial = "lamp of mine"\ncorners = [[0, 9, 0], [1, 9, 0], [1, 9, 1], [0, 9, 1]]\n'
+    )
+    read, _, files = baked(tmp_path, scene)
+    document, binary = document_of(files.scene)
+    wall = next(m for m in document["materials"] if m["name"] == "wall")
+    surface, bumps = wall["pbrMetallicRoughness"], wall["normalTexture"]
+    assert (surface["roughnessFactor"], surface["metallicFactor"], bumps["scale"]) == (0.25, 0.0, 0.5)
+    source = document["textures"][bumps["index"]]["source"]
+    assert picture(document, binary, source) == jpeg() and document["images"][source]["mimeType"] == "image/jpeg"
+    assert bumps["texCoord"] == 2, "TEXCOORD_1 is the lightmap's"
+    mesh = next(p for m in document["meshes"] for p in m["primitives"] if document["materials"][p["material"]] is wall)
+    assert "TEXCOORD_2" in mesh["attributes"]
+    of_wall = np.array([m.name == "wall" for m in read.materials])[read.material_ids]
+    assert np.allclose(np.abs(read.normals[of_wall]), (1, 0, 0), atol=1e-6), "along z before"
+    serious = {message["code"] for message in validator_messages(files.scene) if message["severity"] < 2}
+    assert serious <= {"MESH_PRIMITIVE_GENERATED_TANGENT_SPACE"}, "readers make the tangents"
 
 
 def test_light_is_kept_where_the_file_is_another_by_now(tmp_path, rich):
