@@ -24,7 +24,7 @@ from app.bake.gltf_writer import glb_bytes
 from app.bake.light_files import IRRADIANCE_NAME, LIGHT_NAME, page_names, write_light
 from app.bake.options import BakeOptions
 from app.bake.sky_file import write_sky
-from app.bake.staged import Staged
+from app.bake.staged import Staged, remove_partials
 from app.bake.web_page import find_three, web_page
 from app.errors import SceneError, UserError
 from app.lightmap.seams import finished
@@ -47,6 +47,7 @@ SKY_NAME = "sky.exr"
 EMBEDDED_NAME = "embedded.glb"
 PAGE_NAME = "index.html"
 OPTIONAL = (EMBEDDED_NAME, SKY_NAME, PAGE_NAME)
+ALL = (SCENE_NAME, REPORT_NAME, *OPTIONAL)  # names of a bake's files, but for those of the light
 
 
 @dataclass(frozen=True)
@@ -68,12 +69,14 @@ class BakeFiles:
 
 
 def prepare_directory(directory: Path) -> Path:
-    """Make ``directory`` if need be and try to write there: call it before a long bake. UserError if it cannot be."""
+    """Make ``directory`` if need be, try to write there, and remove what bakes that were killed have left half written: call it
+    before a long bake. UserError if it cannot be."""
     probe = directory / f".probe.{os.getpid()}"
     try:
         directory.mkdir(parents=True, exist_ok=True)
         probe.touch()
         probe.unlink()
+        remove_partials(directory, lambda name: name in ALL or LIGHT_NAME.fullmatch(name) is not None)
     except OSError as error:
         raise UserError(f"{directory}: cannot write here ({error.strerror or error})") from error
     return directory

@@ -4,8 +4,20 @@ leaves what was there."""
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
+
+PARTIAL = re.compile(r"\.(.+)\.\d+(\.\w+)")
+
+
+def remove_partials(folder: Path, ours: Callable[[str], bool]) -> None:
+    """Remove what writes that were killed have left of files with names that are ``ours``."""
+    for path in folder.iterdir():
+        partial = PARTIAL.fullmatch(path.name)
+        if partial is not None and ours("".join(partial.groups())):
+            path.unlink(missing_ok=True)
 
 
 class Staged:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -38,9 +39,22 @@ def bake(flags: argparse.Namespace) -> int:
     console = Console(quiet=flags.json)
     if len(flags.scenes) > 1:
         return _all(flags, console)
-    baked, whole = _one(_for_scene(flags, flags.scenes[0], flags.output), console)
+    only = _for_scene(flags, flags.scenes[0], flags.output)
+    done = _done(only)
+    if done is not None:
+        *_, left, _, state = _row(flags.scenes[0], done)
+        console.result(done, f"{flags.output}: finished already ({state}, {left}); without --resume it is baked anew")
+        return 0
+    baked, whole = _one(only, console)
     console.result(baked.result, f"{flags.output}: {baked.line}")
+    _say_resume([flags.output], console)
     return _code(baked, whole)
+
+
+def _say_resume(folders: Sequence[Path], console: Console) -> None:
+    """That bakes which were stopped can go on, where that is so."""
+    if any((folder / CHECKPOINT_NAME).exists() for folder in folders):
+        console.warn("stopped: the same line with --resume goes on from here")
 
 
 def _one(flags: argparse.Namespace, console: Console) -> tuple[Baked, bool]:
@@ -76,11 +90,10 @@ def _all(flags: argparse.Namespace, console: Console) -> int:
     rows: list[tuple[str, ...]] = [("scene", "texels", "seconds", "left", "expected error", "")]
     results, codes = [], []
     for scene, folder in zip(flags.scenes, folders, strict=True):
-        done = _done(_for_scene(flags, scene, folder)) if flags.resume else None
+        done = _done(_for_scene(flags, scene, folder))
         if done is not None:
-            console.warn(f"{folder} is done: its light is kept, without --resume it is baked once more")
-            results.append({**done, "done_before": True})
-            rows.append((*_row(scene, done)[:-1], "done before"))
+            results.append(done)
+            rows.append((*_row(scene, done)[:-1], "finished already"))
             codes.append(0)
             continue
         try:
@@ -104,14 +117,15 @@ def _all(flags: argparse.Namespace, console: Console) -> int:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     console.result({"bakes": results}, "\n".join(table))
+    _say_resume(folders, console)
     return max(codes)
 
 
 def _done(flags: argparse.Namespace) -> dict[str, Any] | None:
-    """The report of a bake of this scene with these settings that was finished, whose files are there and newer than the
-    scene's."""
+    """With --resume, the report of a bake of this scene with these settings that was finished, whose files are there and newer
+    than the scene's."""
     path = flags.output / REPORT_NAME
-    if (flags.output / CHECKPOINT_NAME).exists() or not path.exists():
+    if not flags.resume or (flags.output / CHECKPOINT_NAME).exists() or not path.exists():
         return None
     try:
         report = json.loads(path.read_text(encoding="utf-8"))
@@ -132,7 +146,7 @@ def _done(flags: argparse.Namespace) -> dict[str, Any] | None:
         _row(flags.scene, report)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, StopIteration):  # no report of ours
         return None
-    return report if same and not newer else None
+    return {**report, "done_before": True} if same and not newer else None
 
 
 def _row(scene: str, result: dict[str, Any]) -> tuple[str, ...]:

@@ -122,9 +122,10 @@ def _counts(
 
 def _estimates(outline: Outline, atlas: AtlasOptions, light: LightmapOptions) -> dict[str, Any]:
     """The same by area alone. How quadtrees begin follows from their charts: only their roots are known."""
-    aim = atlas.texels or default_texels(outline.sides, light.adaptive)
-    density = atlas.density or math.sqrt(aim / outline.area)
-    texels = round(outline.area * density**2)
+    default = default_texels(outline.sides, light.adaptive)
+    aim, area = (default, outline.area) if atlas.texels is None else (atlas.texels, outline.texel_area)
+    density = atlas.density or math.sqrt(aim / area)
+    texels = round(outline.texel_area * density**2)
     values: dict[str, Any] = {"lit_sides": outline.sides, "texels_per_metre": density}
     if light.adaptive:
         return values | {"texels_of_roots": texels, "texels_if_uniform": texels << 2 * light.depth}

@@ -87,12 +87,15 @@ def outline_gltf(path: Path, most: int) -> Outline | None:
         return None
     materials, notes = reader.read_materials()
     sides = [1 + materials[placed.material].double_sided for placed in reader.placed]
+    areas = [n * _area(placed) for n, placed in zip(sides, reader.placed, strict=True)]
+    scales = [materials[placed.material].lightmap_scale for placed in reader.placed]
     boxes = np.concatenate([_boxes(placed) for placed in reader.placed if placed.triangles])
     return Outline(
         name=path.stem,
         triangles=sum(placed.triangles for placed in reader.placed),
         sides=sum(n * placed.triangles for n, placed in zip(sides, reader.placed, strict=True)),
-        area=sum(n * _area(placed) for n, placed in zip(sides, reader.placed, strict=True)),
+        area=sum(areas),
+        texel_area=sum(area * scale**2 for area, scale in zip(areas, scales, strict=True)),
         lower=boxes.min(axis=(0, 1)),
         upper=boxes.max(axis=(0, 1)),
         objects=len(reader.objects),

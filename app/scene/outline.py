@@ -13,8 +13,8 @@ from app.scene.model import F64, Material, Scene
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """Counts, and of all sides that may be lit the area [m²]; a box around everything, lower and upper corner [m]; textures: of
-    albedo and of emission, 0 to 2.
+    """Counts, and of all sides that may be lit the area [m²]; texel_area: the same, each times the square of its material's
+    ``lightmap_scale``; a box around everything, lower and upper corner [m]; textures: of albedo and of emission, 0 to 2.
 
     exact: else triangles without area and those that are listed twice are counted too, and the box is around boxes.
     """
@@ -23,6 +23,7 @@ class Outline:
     triangles: int
     sides: int
     area: float
+    texel_area: float
     lower: F64
     upper: F64
     objects: int
@@ -38,12 +39,15 @@ class Outline:
     @staticmethod
     def of(scene: Scene) -> Outline:
         sides = 1 + scene.sides.astype(np.int64)
+        area = scene.normals_areas[1] * sides
+        scale = np.array([m.lightmap_scale for m in scene.materials])[scene.material_ids]
         lower, upper = scene.bounds
         return Outline(
             name=scene.name,
             triangles=len(scene.triangles),
             sides=int(sides.sum()),
-            area=float((scene.normals_areas[1] * sides).sum()),
+            area=float(area.sum()),
+            texel_area=float((area * scale**2).sum()),
             lower=lower,
             upper=upper,
             objects=len(scene.objects),

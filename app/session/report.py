@@ -35,7 +35,7 @@ def report(session: Session) -> dict[str, Any]:
         "converged": stats.converged,
         "interrupted": run.interrupted,
         "resumed": run.earlier > 0,
-        "seconds": {**session.load_seconds, "shoot": stats.seconds},
+        "seconds": {**session.load_seconds, "solve": stats.seconds},
         "energy_w": {
             name: [float(x) for x in getattr(balance, name)]
             for name in ("emitted", "absorbed", "escaped", "unshot", "imbalance")

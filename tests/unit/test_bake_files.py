@@ -199,6 +199,20 @@ def test_failing_half_way_keeps_the_files_of_the_last_bake(tmp_path, inputs, mon
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+def test_what_a_killed_bake_left_half_written_goes_at_the_next(tmp_path):
+    for name in (
+        "scene.7.glb",
+        "irradiance-direct.rgbe.7.png",
+        "report.7.json",
+        "index.7.html",
+        "mine.7.glb",
+        "scene.x.glb",
+    ):
+        (tmp_path / f".{name}").write_text("")
+    prepare_directory(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".mine.7.glb", ".scene.x.glb"]
+
+
 def test_folder_that_cannot_be_made(tmp_path, inputs):
     (tmp_path / "file").write_text("")
     for folder in (tmp_path / "file", tmp_path / "file" / "below"):

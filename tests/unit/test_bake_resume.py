@@ -19,10 +19,10 @@ from app.session.checkpoint import CHECKPOINT_NAME
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 120.0  # s
-KILLS = 3
 OTHER_DRIVERS = 1e-3  # of the mean light; the software rasteriser repeats itself bit for bit
 BAKES = {
     "gathering": ["--texels", "1500", "--noise", "1e-4", "--rays", "600"],
+    "shooting": ["--solver", "shooting", "--texels", "1500", "--shots", "1000"],
     "shooting on quadtrees": ["--solver", "shooting", "--texels", "300", "--adaptive", "--shots", "1000"],
 }
 GATHERING = BAKES["gathering"][:4]
@@ -72,7 +72,7 @@ def same_light(one: Path, other: Path) -> bool:
 @pytest.mark.long
 @pytest.mark.parametrize("name", BAKES)
 def test_killed_at_any_moment_it_goes_on_to_the_same_light(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
 ) -> None:
     at_once, stopped, flags = tmp_path / "at once", tmp_path / "stopped", BAKES[name]
     assert run(bake(at_once, *flags, "--checkpoint", "0")) == 0
@@ -80,8 +80,11 @@ def test_killed_at_any_moment_it_goes_on_to_the_same_light(
     rng = np.random.default_rng(seed)
     print(f"seed {seed}")
     line = bake(stopped, *flags, "--checkpoint", "0.1", "--resume")
-    kills = sum(killed(line, stopped / CHECKPOINT_NAME, rng.uniform(0, 0.4)) for _ in range(KILLS))
+    kills = sum(
+        killed(line, stopped / CHECKPOINT_NAME, rng.uniform(0, 0.4)) for _ in range(request.config.getoption("--kills"))
+    )
     assert kills > 0, "it was never killed"
+    print(f"{name}: killed {kills} times")
     assert run(line) == 0
     assert same_light(stopped, at_once)
     names = sorted(path.name for path in stopped.iterdir())
@@ -99,7 +102,8 @@ def test_after_ctrl_c_it_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[s
         time.sleep(0.01)
     worker.send_signal(signal.SIGINT)
     out, err = worker.communicate(timeout=PATIENCE)
-    assert worker.returncode == 130 and "stopped early" in out and err == ""
+    assert worker.returncode == 130 and "stopped early" in out
+    assert err.splitlines()[-1] == "glowtree: note: stopped: the same line with --resume goes on from here"
     report = json.loads((stopped / "report.json").read_text())
     assert report["interrupted"] and not report["resumed"]
     capsys.readouterr()
@@ -107,7 +111,7 @@ def test_after_ctrl_c_it_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "goes on after" in capsys.readouterr().err
     assert same_light(stopped, at_once)
     after = json.loads((stopped / "report.json").read_text())
-    assert after["resumed"] and not after["interrupted"] and after["seconds"]["shoot"] > report["seconds"]["shoot"]
+    assert after["resumed"] and not after["interrupted"] and after["seconds"]["solve"] > report["seconds"]["solve"]
     assert not (stopped / CHECKPOINT_NAME).exists()
 
 
@@ -203,6 +207,18 @@ def test_of_several_scenes_those_that_are_done_are_not_baked_again(
     before = written()
     assert run([*line, "--unwrap"]) == 0
     assert written() == before
+
+
+def test_a_bake_that_is_finished_is_not_baked_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line, light = bake(tmp_path, *GATHERING, "--rays", "8"), tmp_path / "irradiance.exr"
+    assert run(line) == 0
+    first = light.stat().st_mtime_ns
+    capsys.readouterr()
+    assert run([*line, "--resume"]) == 0
+    out, err = capsys.readouterr()
+    assert "finished already" in out and err == "" and light.stat().st_mtime_ns == first
+    assert run(line) == 0
+    assert light.stat().st_mtime_ns > first, "without --resume it is"
 
 
 def test_nothing_to_resume_begins(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
