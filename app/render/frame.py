@@ -151,6 +151,11 @@ class FrameRenderer:
             return self._atlas.image
         return self._atlas.draw(self._surfaces, size, turned=turned)
 
+    @property
+    def shown(self) -> Lightmap | None:
+        """Of what the last frame was."""
+        return None if self._last is None else self._last[0]
+
     def pick(self, x_px: float, y_px: float) -> PickHit | None:
         """The surface under a pixel of the last frame, counted from its top left corner; None for the background."""
         if self._last is None:

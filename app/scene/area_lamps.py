@@ -1,7 +1,9 @@
-"""Lamps with area that are added to a scene, and surfaces that are taken from it, as plain values; one function makes it so."""
+"""Lamps with area that are added to a scene, surfaces that are taken from it, and how finely some are cut into texels, as plain
+values; one function makes it so."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -40,10 +42,18 @@ class AreaLamp:
 
 @dataclass(frozen=True)
 class Surfaces:
-    """What surfaces a scene has besides its own, and which of its own it has not. removed: the materials that these are of."""
+    """What surfaces a scene has besides its own, which of its own it has not, and which are cut more or less finely than its file
+    says. removed: the materials that these are of. scales: the ``lightmap_scale`` of materials."""
 
     lamps: tuple[AreaLamp, ...] = ()
     removed: tuple[Key, ...] = ()
+    scales: tuple[tuple[Key, float], ...] = ()
+
+    def with_scale(self, key: Key, scale: float, came: float) -> Surfaces:
+        """That material cut so finely. came: its ``lightmap_scale`` in the file, which needs no mention."""
+        others = {other: value for other, value in self.scales if other != key}
+        scales = others if scale == came else others | {key: scale}
+        return dataclasses.replace(self, scales=tuple(sorted(scales.items())))
 
 
 def with_surfaces(scene: Scene, surfaces: Surfaces) -> Scene:
@@ -58,7 +68,19 @@ def with_surfaces(scene: Scene, surfaces: Surfaces) -> Scene:
             shift = np.array(lamp.position) - middle_of(scene, index[lamp.of])
             made = with_copy(made, index[lamp.of], shift, lamp.name, lamp.emission)
     removed = [index[key] for key in surfaces.removed if key in index]
-    return without_surfaces(made, removed) if removed else made
+    made = without_surfaces(made, removed) if removed else made
+    scales = dict(surfaces.scales)
+    if not scales:
+        return made
+    pairs = zip(keys_of(made.materials), made.materials, strict=True)
+    return made.with_materials(tuple(with_scale(material, scales.get(key)) for key, material in pairs))
+
+
+def with_scale(material: Material, scale: float | None) -> Material:
+    """The material with that ``lightmap_scale``; itself where that is its own, or None."""
+    if scale is None or scale == material.lightmap_scale:
+        return material
+    return dataclasses.replace(material, lightmap_scale=scale)
 
 
 def keys_of(materials: Iterable[Material]) -> list[Key]:
@@ -77,4 +99,4 @@ def middle_of(scene: Scene, index: int) -> F64:
     return np.asarray((corners.min(axis=0) + corners.max(axis=0)) / 2)
 
 
-__all__ = ["AreaLamp", "Key", "Surfaces", "keys_of", "middle_of", "with_surfaces"]
+__all__ = ["AreaLamp", "Key", "Surfaces", "keys_of", "middle_of", "with_scale", "with_surfaces"]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import itertools
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from app.lightmap.seams import jumps
 from app.scene.model import Scene
 from app.session.report import picture, report, summary
 from app.session.session import Session
+from app.session.texel_use import texel_note, texel_use
 from app.solvers import SOLVERS, Family
 
 __all__ = ["Baked", "Taken", "bake_folder", "check_parts", "take_light", "write_light", "write_taken"]
@@ -31,13 +33,14 @@ __all__ = ["Baked", "Taken", "bake_folder", "check_parts", "take_light", "write_
 class Taken:
     """The light of a session at one moment, ready to be written: what is to be read of the GPU has been. scene: as edited;
     unedited: its surfaces, but materials, lights and sky as they were read. result, line: the report so far, and that in a line.
-    lost: texels whose light is no number."""
+    notes: what the user should know; lost: texels whose light is no number."""
 
     scene: Scene
     unedited: Scene
     light: Laid
     result: dict[str, Any]
     line: str
+    notes: tuple[str, ...]
     lost: int
 
 
@@ -65,8 +68,9 @@ def check_parts(family: Family, options: BakeOptions) -> None:
         raise UserError(f"--parts: {family.title} does not know direct and indirect light apart, {able} does")
 
 
-def take_light(session: Session, *, parts: bool = False) -> Taken:
-    """The light as it is now, with the scene as it was edited. parts: its direct part, too. Waits for the GPU."""
+def take_light(session: Session, *, parts: bool = False, look: Mapping[str, Any] | None = None) -> Taken:
+    """The light as it is now, with the scene as it was edited. parts: its direct part, too. look: how it is to be shown, as the
+    viewer would if None. Waits for the GPU."""
     clock = time.perf_counter()
     lightmap = session.lightmap
     light = [lightmap.irradiance(ambient=True)]
@@ -76,11 +80,22 @@ def take_light(session: Session, *, parts: bool = False) -> Taken:
     session.load_seconds["read back"] = time.perf_counter() - clock
     finite = np.asarray(np.isfinite(irradiance).all(-1))
     lost = int((covered & ~finite).sum())
-    result = report(session) | picture(session) | {"texels_not_finite": lost}
+    result = report(session) | dict(look or picture(session)) | {"texels_not_finite": lost}
+    uses = texel_use(session, light[0])
+    notes = tuple(note for note in (texel_note(uses),) if note is not None)
+    result["texel_use"] = [dataclasses.asdict(use) for use in uses]
+    result["warnings"] = [*result["warnings"], *notes]
     irradiance = np.where(finite[..., None], np.maximum(irradiance, 0), np.float32(0))  # no light is still owed
     laid = Laid(session.charts, irradiance, covered & finite)
-    unedited = session.unedited.with_lights(session.read.lights).with_sky(session.read.sky)
-    return Taken(session.edited_scene, unedited, laid, result, summary(session, result), lost)
+    unedited = _as_read(session)
+    return Taken(session.edited_scene, unedited, laid, result, summary(session, result), notes, lost)
+
+
+def _as_read(session: Session) -> Scene:
+    """The surfaces that are open, with materials, lights and sky as they were read."""
+    scene, read = session.unedited, session.read
+    materials = (*read.materials, *scene.materials[len(read.materials) :])
+    return scene.with_materials(materials).with_lights(read.lights).with_sky(read.sky)
 
 
 def write_taken(taken: Taken, folder: Path, how: BakeOptions, *, unwrap: bool = False) -> Baked:
@@ -88,10 +103,10 @@ def write_taken(taken: Taken, folder: Path, how: BakeOptions, *, unwrap: bool = 
     laid, result = taken.light, dict(taken.result)
     result |= _seams(laid)
     result["parameters"] = {**result["parameters"], "bake": {**how.as_dict(), "unwrap": unwrap}}
-    notes: tuple[str, ...] = ()
+    notes = taken.notes
     if not unwrap and taken.scene.uv1 is not None:
-        laid, notes = _own_layout(taken.scene, laid)
-        result["warnings"] = [*result["warnings"], *notes]
+        laid, of_layout = _own_layout(taken.scene, laid)
+        result["warnings"], notes = [*result["warnings"], *of_layout], (*notes, *of_layout)
     light = laid.charts, laid.irradiance, laid.covered
     files = write_bake(folder, taken.scene, *light, result, how, unedited=taken.unedited)
     result |= {"atlas": list(files.atlas), "pages": files.pages, "warnings": [*result["warnings"], *files.notes]}

@@ -5,8 +5,10 @@ It is the light that one sees. Nothing waits: surfaces are cut, checkpoints and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,10 +25,11 @@ from app.session.light_state import restore_light, settings_of
 from app.session.run import Stop
 from app.session.session import Session
 from app.util.background import BackgroundTask
-from app.util.state import State
+from app.util.state import State, fitting
 from app.util.state_file import read_state
 
 NEVER = Stop()
+ORDER = "order"  # of a bake, in its checkpoint
 FIXED = "they are being baked; stop the bake first"
 ASK_AGAIN = 1.5  # times as long as until the error was last estimated, when it is again
 FIRST_LOOK = 5.0  # s of solving, before the first
@@ -58,13 +61,15 @@ class Goal(Options):
 
 @dataclass(frozen=True)
 class Order:
-    """What is asked of a bake. atlas: how surfaces are to be cut; None as they are."""
+    """What is asked of a bake. atlas: how surfaces are to be cut; None as they are. look: how the files are to be shown, see
+    ``report.look_of``; None as the viewer would at first."""
 
     folder: Path
     goal: Goal = field(default_factory=Goal)
     files: BakeOptions = field(default_factory=BakeOptions)
     keep: CheckpointOptions = field(default_factory=CheckpointOptions)
     atlas: AtlasOptions | None = None
+    look: Mapping[str, Any] | None = None
 
 
 class Baking:
@@ -92,7 +97,9 @@ class Baking:
         prepare_directory(order.folder)
         session.fixed = FIXED
         path = order.folder / CHECKPOINT_NAME
-        self._checkpoint = Checkpoint(session, path, order.keep.checkpoint, self._say, aside=True)
+        self._checkpoint = Checkpoint(
+            session, path, order.keep.checkpoint, self._say, aside=True, beside=_kept_of(order)
+        )
         if resume:
             self._reading, self.stage = BackgroundTask(str(path), lambda tell: read_state(path)), READING
         else:
@@ -131,7 +138,9 @@ class Baking:
         session.set_options_of(settings.solver, settings.options)
         session.set_solver(settings.solver)
         session.set_light(settings.light.replace(adaptive=session.light.adaptive))
-        self._kept = state
+        self._kept, self.order = state, _order_of(state, self.order)
+        self._checkpoint.beside = _kept_of(self.order)
+        check_options(self.order.files)
         self._cut(settings.atlas, adaptive=settings.light.adaptive)
 
     def _cut(self, atlas: AtlasOptions | None, *, adaptive: bool | None = None) -> None:
@@ -187,7 +196,7 @@ class Baking:
         self._write()
 
     def _write(self) -> None:
-        taken, order = take_light(self._session, parts=self.order.files.parts), self.order
+        taken, order = take_light(self._session, parts=self.order.files.parts, look=self.order.look), self.order
         self._writing = BackgroundTask("this bake", lambda tell: write_taken(taken, order.folder, order.files))
         self.stage = WRITING
 
@@ -244,6 +253,21 @@ class Baking:
         if self._writing is not None:
             _ = self._writing.ended or self._writing.result
         self._checkpoint.close()
+
+
+def _kept_of(order: Order) -> dict[str, Any]:
+    """What of an order is kept with the light: when to stop, and which files."""
+    return {ORDER: {"goal": order.goal.as_dict(), "files": order.files.as_dict()}}
+
+
+def _order_of(state: State, order: Order) -> Order:
+    """The order that light was kept of, in the folder and as often as this one says; this one where none was kept, as by a
+    command. Raises UserError for one that is damaged."""
+    if ORDER not in state.values:
+        return order
+    with fitting():
+        kept = state.values[ORDER]
+        return replace(order, goal=Goal(**kept["goal"]), files=BakeOptions(**kept["files"]))
 
 
 def why_not(session: Session) -> str | None:

@@ -6,9 +6,10 @@ Whatever ends the program, the last checkpoint is whole, and no more is lost tha
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from app.errors import UserError
 from app.options import Options, option
@@ -39,10 +40,19 @@ class Checkpoint:
     """Of one session's solve, in one file. say: is told once why it cannot be written, if so; the solve goes on."""
 
     def __init__(
-        self, session: Session, path: Path, seconds: float, say: Callable[[str], None], *, aside: bool = False
+        self,
+        session: Session,
+        path: Path,
+        seconds: float,
+        say: Callable[[str], None],
+        *,
+        aside: bool = False,
+        beside: Mapping[str, Any] | None = None,
     ) -> None:
-        """seconds: between two, 0 for never. aside: written in a thread of its own, which nothing waits for."""
+        """seconds: between two, 0 for never. aside: written in a thread of its own, which nothing waits for. beside: plain values
+        that are kept with the light."""
         self._session, self.path, self._seconds, self._say, self._aside = session, path, seconds, say, aside
+        self.beside = dict(beside or {})
         self._works = seconds > 0
         self._writing: BackgroundTask[None] | None = None
         self.begin()
@@ -74,6 +84,7 @@ class Checkpoint:
         self._end_writing()
         if self._works:
             state = light_state(self._session)
+            state.values |= self.beside
             self._writing = BackgroundTask(str(self.path), lambda tell: write_state(self.path, state))
             if not self._aside:
                 self._end_writing()

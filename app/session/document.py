@@ -39,6 +39,7 @@ from app.session.document_tables import (
     KeyTable,
     LightTable,
     MaterialTable,
+    ScaleTable,
     SceneTable,
     SkyTable,
     SunTable,
@@ -63,6 +64,7 @@ def document_of(view: View, tables: Mapping[str, Options], folder: Path) -> Docu
         settings={"solver": session.chosen_solver} | {name: _given(options) for name, options in tables.items()},
         area_lamps=[_area_lamp(lamp) for lamp in session.asked_surfaces.lamps],
         removed=[_key(key) for key in session.asked_surfaces.removed],
+        scales=[_scale(key, scale) for key, scale in session.asked_surfaces.scales],
         materials=_edited(session.unedited.materials, now.materials),
         lights=None if now.lights == came.lights else [_light(light) for light in now.lights],
         sky=None if now.sky is came.sky or now.sky is None else _sky(now.sky),
@@ -105,6 +107,10 @@ def _area_lamp(lamp: AreaLamp) -> AreaLampTable:
 
 def _key(key: Key) -> KeyTable:
     return KeyTable(name=key[0], index=key[1])
+
+
+def _scale(key: Key, scale: float) -> ScaleTable:
+    return ScaleTable(name=key[0], index=key[1], lightmap_scale=scale)
 
 
 def _sky(sky: Sky) -> SkyTable:
@@ -230,9 +236,11 @@ def version_of(document: Document) -> Version:
 
 
 def surfaces_of(document: Document) -> Surfaces:
-    """That were added and removed."""
+    """That were added, removed, and are cut more or less finely."""
     return Surfaces(
-        tuple(area_lamp_of(lamp) for lamp in document.area_lamps), tuple(_key_of(key) for key in document.removed)
+        tuple(area_lamp_of(lamp) for lamp in document.area_lamps),
+        tuple(_key_of(key) for key in document.removed),
+        tuple((_key_of(scale), scale.lightmap_scale) for scale in document.scales),
     )
 
 
@@ -277,11 +285,13 @@ def put_back(document: Document, view: View) -> list[str]:
 
 
 def _missing(document: Document, came: tuple[Material, ...]) -> list[str]:
-    """What to say of surfaces that are not there to be copied or removed."""
+    """What to say of surfaces that are not there to be copied, removed or cut more finely."""
     known, surfaces = set(keys_of(came)), surfaces_of(document)
     asked = [*(lamp.of for lamp in surfaces.lamps if lamp.of is not None), *surfaces.removed]
+    asked += [key for key, _ in surfaces.scales if key[0] not in {lamp.name for lamp in surfaces.lamps}]
     names = list(dict.fromkeys(name or "a material without name" for name, _ in set(asked) - known))
-    return [f"the scene has no {', '.join(names[:3])} any more: lamps of it are lost"] if names else []
+    what = "what was made of its surfaces is lost"
+    return [f"the scene has no {', '.join(names[:3])} any more: {what}"] if names else []
 
 
 def _put_materials(edits: list[MaterialTable], came: tuple[Material, ...]) -> tuple[tuple[Material, ...], list[str]]:

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from app.scene.lights import LightKind
+from app.scene.model import SCALES
 from app.scene.sky import LEAST_TURBIDITY, MOST_TURBIDITY, SkyKind
 
 RIGID = 1e-6  # of a camera's axes, how far from orthonormal they may be
@@ -94,6 +95,12 @@ class KeyTable(Table):
     index: Annotated[int, Field(ge=0)]
 
 
+class ScaleTable(KeyTable):
+    """How finely a material is cut into texels, where that is not as its file says."""
+
+    lightmap_scale: Annotated[float, Field(ge=SCALES[0], le=SCALES[1])]
+
+
 class AreaLampTable(Table):
     """A lamp with area that was added."""
 
@@ -140,14 +147,15 @@ class SceneTable(FileTable):
 
 
 class Document(Table):
-    """lights, sky: all of them, where they were edited. area_lamps, removed: lamps with area that were added, and materials whose
-    surfaces were removed. settings: as of ``settings.checked``."""
+    """lights, sky: all of them, where they were edited. area_lamps, removed, scales: lamps with area that were added, materials
+    whose surfaces were removed, and those that are cut more or less finely. settings: as of ``settings.checked``."""
 
     glowtree: str
     scene: SceneTable
     settings: dict[str, Any]
     area_lamps: list[AreaLampTable] = []
     removed: list[KeyTable] = []
+    scales: list[ScaleTable] = []
     materials: list[MaterialTable] = []
     lights: list[LightTable] | None = None
     sky: SkyTable | None = None
@@ -158,10 +166,11 @@ class Document(Table):
     @property
     def edits(self) -> tuple[object, ...]:
         """What of it was made by hand and would be missed."""
-        return self.area_lamps, self.removed, self.materials, self.lights, self.sky, self.no_sky, self.bookmarks
+        surfaces = self.area_lamps, self.removed, self.scales
+        return *surfaces, self.materials, self.lights, self.sky, self.no_sky, self.bookmarks
 
 
 __all__ = [
-    *("AreaLampTable", "CameraTable", "Document", "FileTable", "KeyTable", "LightTable", "MaterialTable", "SceneTable"),
-    *("SkyTable", "SunTable"),
+    *("AreaLampTable", "CameraTable", "Document", "FileTable", "KeyTable", "LightTable", "MaterialTable", "ScaleTable"),
+    *("SceneTable", "SkyTable", "SunTable"),
 ]

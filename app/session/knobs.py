@@ -101,6 +101,9 @@ def _solvers(before: Mapping[str, Options], after: Mapping[str, Options]) -> str
 
 
 def _surfaces(before: Surfaces, after: Surfaces) -> str:
+    if before.scales != after.scales:
+        names = {name for (name, _), _ in set(before.scales) ^ set(after.scales)}
+        return f"texel density of {', '.join(sorted(names)) or 'the material'}"
     if before.removed != after.removed:
         return f"lamp {'added' if len(after.removed) < len(before.removed) else 'removed'}"
     return _things(before.lamps, after.lamps, "lamp")

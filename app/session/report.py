@@ -8,11 +8,14 @@ from app import __version__
 from app.render.exposure import exposure_of
 from app.render.options import DisplayOptions
 from app.render.seen import seen_texels
+from app.scene.load import NO_LIGHT
+from app.scene.model import F64
 from app.scene.options import FileOptions
 from app.session.balance import verdict_of
 from app.session.session import Reading, Session
+from app.session.view import View
 
-__all__ = ["notes", "picture", "report", "summary"]
+__all__ = ["look_of", "notes", "picture", "report", "summary"]
 
 
 def report(session: Session) -> dict[str, Any]:
@@ -44,8 +47,14 @@ def report(session: Session) -> dict[str, Any]:
         "balance": ("fine", "fair", "bad")[verdict_of(stats.imbalance, session.family).level],
         **_error(session),
         **({} if session.expected is None else {"expected_error": session.expected._asdict()}),
-        "warnings": [*session.scene.warnings, *session.charts.warnings, *notes(session)],
+        "warnings": [*_of_scene(session), *session.charts.warnings, *notes(session)],
     }
+
+
+def _of_scene(session: Session) -> list[str]:
+    """What was repaired or left out of the scene; not that it has no light, where it was given some since."""
+    lit = session.edited_scene.emits
+    return [warning for warning in session.scene.warnings if not (lit and warning == NO_LIGHT)]
 
 
 def _read_as(reading: Reading) -> dict[str, Any]:
@@ -55,17 +64,24 @@ def _read_as(reading: Reading) -> dict[str, Any]:
 
 
 def picture(session: Session) -> dict[str, Any]:
-    """How the viewer would show the light at first: the camera, its exposure [EV] and the tone curve. Waits for the GPU."""
+    """How the viewer would show the light at first, as ``look_of`` has it of a view: camera, exposure [EV], tone curve. Waits
+    for the GPU."""
     camera, balance = session.scene.cameras[0], session.run.energy
     seen = seen_texels(session.lightmap.pool, camera.world_from_camera, camera.yfov)
     unshot, emitted = (power / max(balance.area, 1e-300) for power in (balance.unshot, balance.emitted))
     exposure = exposure_of(session.lightmap, seen, unshot, emitted)
-    pose = camera.world_from_camera.tolist()
-    return {
-        "camera": {"name": camera.name, "yfov": camera.yfov, "world_from_camera": pose},
-        "exposure": exposure,
-        "tone_map": DisplayOptions().tone_map,
-    }
+    return _look(camera.name, camera.world_from_camera, camera.yfov, exposure, DisplayOptions().tone_map)
+
+
+def look_of(view: View) -> dict[str, Any]:
+    """How a view shows the light: its camera, exposure [EV] and tone curve."""
+    camera, display = view.camera, view.display
+    return _look("view", camera.world_from_camera, camera.yfov, display.exposure, display.tone_map)
+
+
+def _look(name: str, world_from_camera: F64, yfov: float, exposure: float, tone_map: str) -> dict[str, Any]:
+    camera = {"name": name, "yfov": yfov, "world_from_camera": world_from_camera.tolist()}
+    return {"camera": camera, "exposure": exposure, "tone_map": tone_map}
 
 
 def _error(session: Session) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from app.scene.area_lamps import Key, Surfaces, keys_of
+from app.scene.area_lamps import Key, Surfaces, keys_of, with_scale
 from app.scene.model import Material, Scene
 
 MaterialEdits = Mapping[Key, Material]  # those that are others than they came
@@ -30,8 +30,9 @@ def edits_of(came: tuple[Material, ...], now: tuple[Material, ...]) -> dict[Key,
 
 
 def with_edits(came: tuple[Material, ...], edits: MaterialEdits) -> tuple[Material, ...]:
-    """Materials as edited; edits of others than these do nothing."""
-    return tuple(edits.get(key, material) for key, material in zip(keys_of(came), came, strict=True))
+    """Materials as edited, cut as finely as they are; edits of others than these do nothing."""
+    pairs = zip(keys_of(came), came, strict=True)
+    return tuple(with_scale(edits.get(key, material), material.lightmap_scale) for key, material in pairs)
 
 
 __all__ = ["MaterialEdits", "Version", "edits_of", "with_edits"]

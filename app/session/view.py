@@ -29,6 +29,7 @@ from app.render.surfaces import Rect
 from app.scene.model import Camera
 from app.session.picking import Picked, picked_from_hit
 from app.session.session import Session
+from app.session.texel_use import texel_note, texel_use
 from app.solvers import HEMISPHERE, Inspection, Rays
 
 SIZE = (1280, 720)  # px, of a picture before the first one
@@ -55,6 +56,7 @@ class View:
         self._flat_drawn: object = None
         self._renderer, self._rays = FrameRenderer(session.gpu), RayPicture(session.gpu)
         self._seams = SeamJumps(session.gpu)
+        self._texel_note: tuple[object, str | None] = (None, None)  # and of which light
         self._rays_of: object = None
         self._rays_due = 0.0
         session.follow(self._prepare, self._opened)
@@ -237,6 +239,15 @@ class View:
         """The virtual atlas with what was drawn last, v up or to the right; None before the first picture."""
         return self._renderer.atlas(self.session.lightmap, size, turned=turned)
 
+    @property
+    def texel_note(self) -> str | None:
+        """Which materials have too few texels or too many for their light, in a line; looked at while the light stands still."""
+        session = self.session
+        still = not session.run.running or session.run.converged
+        if still and session.solver.issued > 0 and self._texel_note[0] != session.state:
+            self._texel_note = session.state, texel_note(texel_use(session))
+        return self._texel_note[1] if self._texel_note[0] == session.state else None
+
     # -- what the solver shows of itself -------------------------------------------------------------------------------
 
     def inspect(self, texel: tuple[int, int] | None = None) -> Inspection:
@@ -277,8 +288,8 @@ class View:
     # -- what lies under a pixel ---------------------------------------------------------------------------------------
 
     def pick(self, x_px: int, y_px: int) -> Picked | None:
-        """What surface is at that pixel of the last frame, and the light on it."""
-        hit = self._renderer.pick(x_px, y_px)
+        """What surface is at that pixel of the last frame, and the light on it; nothing where that was of another lightmap."""
+        hit = self._renderer.pick(x_px, y_px) if self._renderer.shown is self.session.lightmap else None
         return None if hit is None else picked_from_hit(self.session.lightmap, hit, self.session.solver)
 
     def under(self, x_px: int, y_px: int) -> Picked | None:

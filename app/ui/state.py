@@ -111,7 +111,8 @@ class State:
     reveal_material: the list scrolls to the selected one. draw_lights: lamps without area, in the view. reference: of a solve
     in the background; layer: to go back to from the error. edits: of the open scene; held: whether a hand was at a control in
     the last frame. used: of which scene, the materials that are somewhere. version: of the open scene, that
-    edits are noted of. lamp_place: of a lamp with area, by name, as long as a hand moves it [m]. keeping: saves and opens
+    edits are noted of. lamp_place: of a lamp with area, by name, as long as a hand moves it [m]. scale: of a material's
+    texel density, by index, the same. keeping: saves and opens
     sessions; asides: what crashes have left, to be asked about; leaving: a wish that is to be answered;
     after_saving: what waits for a session to be saved. order: of the next bake, as
     far as it was edited; baking: the last.
@@ -169,6 +170,7 @@ class State:
     version: object = None
     light_held: bool = False
     lamp_place: tuple[str, RGB] | None = None
+    scale: tuple[int, float] | None = None
     area_held: bool = False
     draw_lights: bool = True
     atlas: AtlasOptions | None = None
@@ -226,6 +228,7 @@ class State:
             self.picked = self.atlas = self.adaptive = None
         if scene is not self._known[0]:
             self.flight, self.material, self.light, self.area_lamp = None, 0, 0, 0
+            self.scale = None
             self.order = None
             self.emission_colours.clear()
             self.edits = EditHistory()

@@ -108,7 +108,8 @@ def _optional(spec: Spec, value: Any, start: Any) -> Any:
     changed, on = imgui.checkbox("##given", value is not None)
     if changed:
         first = spec.default if start is None else start
-        value = (spec.type(spec.minimum or 0) if first is None else first) if on else None
+        least = "" if spec.type is str else spec.type(spec.minimum or 0)
+        value = (least if first is None else first) if on else None
     if value is not None or start is not None:
         imgui.same_line()
     if value is None and start is not None:

@@ -25,7 +25,7 @@ from app.gpu import Gpu
 from app.session import keeping
 from app.session.session import Session
 from app.session.view import View
-from app.ui import widgets
+from app.ui import light_gizmos, slider, widgets
 from app.viewer.window import run_window
 
 EVERY = 3  # frames between two reports
@@ -55,6 +55,17 @@ class ReportingView(View):
 
         return noting
 
+    def note_point(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """``function``, but the point that it finds is remembered as that of a handle."""
+
+        def noting(*args: Any, **more: Any) -> Any:
+            at = function(*args, **more)
+            if at is not None:
+                self.places["handle"] = at.x, at.y
+            return at
+
+        return noting
+
     def note_tab(self, panel: str) -> None:
         """Remember where the tab of a docked panel is."""
         window = imgui.internal.find_window_by_name(panel)
@@ -76,7 +87,9 @@ class ReportingSession(Session):
         pyglet.app.platform_event_loop.dispatch_posted_events()  # of the test; at rest the window does it
         self.frame += 1
         if self.frame % EVERY == 0:
-            self.view.note_tab("Bake")
+            for panel in ("Bake", "Lights", "Materials"):
+                self.view.note_tab(panel)
+            self.view.places["row"] = 0.0, imgui.get_text_line_height_with_spacing()
             state = {
                 "frame": self.frame,
                 "name": self.name,
@@ -88,6 +101,9 @@ class ReportingSession(Session):
                 "picked": self.view.picked,
                 "has_picked": self.view.marked is not None,
                 "places": self.view.places,
+                "layer": self.view.display.layer,
+                "lights": [light.position for light in self.edited_scene.lights] if self.opened else [],
+                "scales": [m.lightmap_scale for m in self.unedited.materials] if self.opened else [],
             }
             report = self.folder / "state.new"
             report.write_text(json.dumps(state))
@@ -115,6 +131,8 @@ def main() -> None:
     def make_view(gpu: Gpu) -> View:
         session = ReportingSession(gpu, folder)
         imgui.button = session.view.note(imgui.button, lambda label, *_: label.split("###")[-1])
+        slider.slide = session.view.note(slider.slide, lambda label, *_: label)
+        light_gizmos.on_screen = session.view.note_point(light_gizmos.on_screen)
         widgets._editor = session.view.note(widgets._editor, lambda spec, *_: spec.name)
         session.open("cornell-box")
         return session.view

@@ -17,6 +17,9 @@ import psutil
 import pytest
 from PIL import Image
 
+from app.render.layers import layers_with
+from app.solvers import SOLVERS
+
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
 SIZE = (1280, 720)
@@ -247,6 +250,37 @@ def test_a_bake_from_the_panel_is_stopped_and_goes_on(window: Driven, tmp_path: 
     assert sorted(path.name for path in folder.iterdir()) == ["irradiance.exr", "report.json", "scene.glb"]
     report = json.loads((folder / "report.json").read_text())
     assert report["converged"] and report["resumed"]
+
+
+def test_a_layer_is_chosen_a_lamp_dragged_and_a_material_cut_more_finely(window: Driven) -> None:
+    state = window.until(lambda s: s["shots"] > 5 and "layer" in s["places"])
+    click(window, state, "layer")
+    (x, y), row = state["places"]["layer"], state["places"]["row"][1]
+    choices = layers_with(SOLVERS["shooting"].layers)
+    window.do("mousemove", round(x), round(y + (choices.index("density") + 1.3) * row))
+    window.do("click", 1)
+    window.until(lambda s: s["layer"] == "density")
+
+    click(window, window.state(), "tab Lights")
+    click(window, window.until(lambda s: "add Point" in s["places"]), "add Point")
+    state = window.until(lambda s: s["lights"] and "handle" in s["places"])
+    (before,) = state["lights"]
+    dragged(window, state["places"]["handle"], 60)
+    window.until(lambda s: s["lights"] and s["lights"][0] != before)
+    window.do("key", "ctrl+z")
+    window.until(lambda s: s["lights"] == [before])
+
+    click(window, window.state(), "tab Materials")
+    dragged(window, window.until(lambda s: "##density" in s["places"])["places"]["##density"], 30)
+    window.until(lambda s: max(s["scales"]) > 1.9 and s["running"])
+
+
+def dragged(window: Driven, place: tuple[float, float], by: int) -> None:
+    x, y = (round(v) for v in place)
+    window.do("mousemove", x, y, "mousedown", 1)
+    for step in (by // 3, 2 * by // 3, by):
+        window.do("mousemove", x + step, y)
+    window.do("mouseup", 1)
 
 
 def click(window: Driven, state: dict[str, Any], place: str) -> None:

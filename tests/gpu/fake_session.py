@@ -186,6 +186,10 @@ class FakeSession:
     def on_its_way(self) -> SimpleNamespace | None:
         return self.loading
 
+    @property
+    def texel_note(self) -> str | None:
+        return "texels: too few on red wall (23 px wide, light off by 6.0% between them)"
+
     def drop_reference(self) -> None:
         self.calls.append(("drop_reference",))
 

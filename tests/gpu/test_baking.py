@@ -14,6 +14,7 @@ import solver_scenes
 from solver_scenes import grey, quads_scene, room
 
 from app.atlas.options import AtlasOptions
+from app.bake.options import BakeOptions
 from app.bake.read import read_bake
 from app.errors import UserError
 from app.gpu import Gpu
@@ -23,7 +24,9 @@ from app.session.baking import DONE, SOLVING, STOPPED, WRITING, Baking, Goal, Or
 from app.session.checkpoint import CHECKPOINT_NAME
 from app.session.goal import options_for_error, seconds_left
 from app.session.history import History
+from app.session.report import look_of
 from app.session.session import Session
+from app.session.view import View
 from app.solvers import SOLVERS, ShootingOptions
 
 PATIENCE = 120.0  # s
@@ -60,7 +63,11 @@ def names(folder: Path) -> list[str]:
 def test_the_scene_as_edited_is_written_with_its_light(gpu: Gpu, tmp_path: Path) -> None:
     session = opened(gpu, table_room())
     session.set_material(0, grey(0.25))
-    baking = Baking(session, Order(tmp_path / "out"))
+    view = View(session)
+    view.look_through(session.scene.cameras[0])
+    view.camera.orbit(0.3, 0.1)
+    view.display = view.display.replace(exposure=1.5)
+    baking = Baking(session, Order(tmp_path / "out", look=look_of(view)))
     frames(session, baking, lambda: not baking.active)
     assert baking.stage == DONE, baking.note
     assert names(tmp_path / "out") == NAMES
@@ -69,13 +76,16 @@ def test_the_scene_as_edited_is_written_with_its_light(gpu: Gpu, tmp_path: Path)
     assert bake.report["expected_error"]["median"] > 0
     assert any(np.allclose(material.albedo, 0.25, atol=1e-3) for material in bake.scene.materials)
     assert bake.irradiance.max() > 0
+    assert bake.report["exposure"] == 1.5, "to be shown as it was seen"
+    assert np.allclose(bake.report["camera"]["world_from_camera"], view.camera.world_from_camera)
+    view.release()
     session.release()
 
 
 def test_stopped_it_keeps_its_light_and_goes_on(gpu: Gpu, tmp_path: Path) -> None:
-    """In another session, which has other settings: it takes those of the bake."""
+    """In another session, which has other settings: it takes those of the bake, and writes the files that were asked for."""
     session = opened(gpu, table_room(), residual=1e-4)
-    baking = Baking(session, Order(tmp_path))
+    baking = Baking(session, Order(tmp_path, files=BakeOptions(hdr=True)))
     frames(session, baking, lambda: session.run.progress.done > 50)
     baking.stop()
     done = session.solver.poll(wait=True).done
@@ -91,7 +101,7 @@ def test_stopped_it_keeps_its_light_and_goes_on(gpu: Gpu, tmp_path: Path) -> Non
     assert session.atlas.texels == 1500
     frames(session, baking, lambda: not baking.active)
     assert baking.stage == DONE, baking.note
-    assert names(tmp_path) == NAMES
+    assert names(tmp_path) == sorted([*NAMES, "irradiance.hdr"])
     assert json.loads((tmp_path / "report.json").read_text())["resumed"]
     session.release()
 

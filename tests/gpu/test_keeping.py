@@ -19,9 +19,11 @@ from app.gpu import Gpu
 from app.scene.area_lamps import Surfaces
 from app.scene.library import scene_path
 from app.scene.lights import Light
+from app.scene.load import load_scene
 from app.scene.sky import Sky
 from app.scene.sky_image import read_sky_image
 from app.session import keeping as module
+from app.session.baking import DONE, SOLVING, Baking, Order
 from app.session.keeping import Keeping, check_session, drop
 from app.session.session import Session
 from app.session.view import View
@@ -217,6 +219,52 @@ def test_lamps_with_area_come_back_with_their_light(place: Callable[..., Place],
     assert emitters(two) == [own], "as the scene is"
 
 
+def test_a_bake_that_was_stopped_goes_on_in_a_session_that_was_opened_again(
+    place: Callable[..., Place], tmp_path: Path
+) -> None:
+    """With a lamp that was added, and a material cut more finely."""
+    one, folder = place().open("cornell-box"), tmp_path / "baked"
+    new_lamps.KINDS[0].add(one.view, one.state)
+    settle(one)
+    one.session.change_surfaces(one.session.surfaces.with_scale(("red", 0), 2.0, 1.0))
+    settle(one)
+
+    def solved(at: Place, baking: Baking, until: Callable[[], bool]) -> None:
+        def turn() -> bool:
+            at.session.advance(fast=True)
+            baking.poll()
+            return until()
+
+        at.frames_until(turn)
+
+    baking = Baking(one.session, Order(folder))
+    solved(one, baking, lambda: one.session.run.progress.done > 30)
+    baking.stop()
+    done = one.session.solver.poll(wait=True).done
+    two = place().open(one.save(tmp_path / "a.glow"))
+    assert two.notes == [] and two.session.surfaces == one.session.surfaces
+    baking = Baking(two.session, Order(folder), resume=True)
+    solved(two, baking, lambda: baking.stage == SOLVING)
+    assert two.session.run.progress.done >= done > 0
+    solved(two, baking, lambda: not baking.active)
+    assert baking.stage == DONE, baking.note
+    assert sorted(path.name for path in folder.iterdir()) == ["irradiance.exr", "report.json", "scene.glb"]
+    red = next(m for m in load_scene(folder / "scene.glb").materials if m.name == "red")
+    assert red.lightmap_scale == 2.0
+
+
+def test_texel_densities_come_back(place: Callable[..., Place], tmp_path: Path) -> None:
+    one = place().open("cornell-box")
+    one.session.change_surfaces(Surfaces().with_scale(("red", 0), 2.0, 1.0))
+    settle(one)
+    one.session.work(4)
+    one.session.run.settle()
+    two = place().open(one.save(tmp_path / "a.glow"))
+    assert two.notes == [] and two.session.surfaces == one.session.surfaces
+    assert two.session.solver.issued == one.session.solver.issued > 0
+    np.testing.assert_array_equal(two.session.lightmap.irradiance(), one.session.lightmap.irradiance())
+
+
 def test_lamps_of_a_scene_that_has_changed_are_said(place: Callable[..., Place], tmp_path: Path) -> None:
     scene = copied(tmp_path)
     one = place().open(scene)
@@ -227,7 +275,7 @@ def test_lamps_of_a_scene_that_has_changed_are_said(place: Callable[..., Place],
     one.save(tmp_path / "a.glow")
     scene.write_text(scene.read_text().replace(f'"{name}"', '"another"'))
     two = place().open(tmp_path / "a.glow")
-    assert any(f"no {name} any more: lamps of it are lost" in note for note in two.notes)
+    assert any(f"no {name} any more: what was made of its surfaces is lost" in note for note in two.notes)
     assert len(two.session.materials) == len(one.session.materials) - 1
 
 

@@ -159,6 +159,40 @@ def test_an_added_lamp_is_undone_in_one_step_and_done_again(dark: Dark, kind: Ki
     assert dark.view.display.exposure == lit
 
 
+def test_a_texel_density_is_an_edit(dark: Dark) -> None:
+    """It is undone and done again; edits of the material and the eye stay; light begins again."""
+    session, state = dark.session, dark.state
+    dark.add(SURFACES[0])
+    frame(dark)
+    came, density = session.unedited.materials[1], session.charts.density
+    session.set_material(1, dataclasses.replace(came, albedo=(0.6, 0.1, 0.1)))
+    frame(dark)
+    finer = session.asked_surfaces.with_scale((came.name, 1), 2.0, 1.0)
+
+    def texels() -> int:
+        pool = session.lightmap.pool
+        face = pool.surfaces.face[pool.surfaces.face >= 0]
+        return int((session.unedited.material_ids[session.charts.face_triangle[face]] == 1).sum())
+
+    before, eye = texels(), dark.view.camera.world_from_camera.copy()
+    session.change_surfaces(finer)
+    frame(dark)
+    settle(dark)
+    assert texels() > 2 * before and session.materials[1].lightmap_scale == 2.0
+    assert session.materials[1].albedo == (0.6, 0.1, 0.1) and (dark.view.camera.world_from_camera == eye).all()
+    assert session.charts.density < density, "a number of texels was asked for"
+    assert state.edits.undoable == f"texel density of {came.name}"
+    edits.undo(dark.view, state)
+    state.run_actions()
+    settle(dark)
+    assert texels() == before and session.materials[1].albedo == (0.6, 0.1, 0.1)
+    edits.redo(dark.view, state)
+    state.run_actions()
+    settle(dark)
+    assert texels() > 2 * before and session.materials[1].albedo == (0.6, 0.1, 0.1)
+    assert state.edits.redoable is None
+
+
 def test_a_lamp_that_was_removed_again_comes_back(dark: Dark) -> None:
     """Adding and removing it are two steps, in a scene that shines without it, too."""
     dark.add(SURFACES[0])

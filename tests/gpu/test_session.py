@@ -410,6 +410,8 @@ def test_a_picked_point_is_found_again_in_a_tree_that_grew(gpu: Gpu) -> None:
     for at, picked in again.items():
         assert picked.position == first[at].position and picked.triangle == first[at].triangle
         assert picked.H == view.pick(*at).H != first[at].H, "as if picked now"
+    session.open_now("furnace")
+    assert view.pick(32, 24) is None, "what was drawn last is not what is open"
     view.release()
     session.release()
     gpu.release_all(target, texture)

@@ -50,6 +50,18 @@ def test_the_exposure_moves_by_steps_that_an_eye_sees(desk: Desk, where: dict[st
     assert desk.session.display.exposure == 24, "all that is legal can be reached"
 
 
+def test_a_texel_density_is_cut_once_when_it_is_let_go(desk: Desk, strength: dict[str, tuple[float, float]]) -> None:
+    session = desk.session
+    desk.front("Materials")
+    dragged(desk, strength["##density"], DECADE_PX * 0.30103)
+    desk.frames(2)
+    assert [call[0] for call in session.calls].count("change_surfaces") == 1
+    assert dict(session.surfaces.scales)["white wall", 0] == 2.0, "as it is shown: three digits"
+    assert desk.ui.state.edits.undoable == "texel density of white wall"
+    desk.click(*strength["##density"], button=1)
+    assert session.surfaces.scales == (), "as in the file"
+
+
 def test_shift_is_fine(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
     desk.frames()
     desk.ui.io.add_key_event(imgui.Key.mod_shift, True)

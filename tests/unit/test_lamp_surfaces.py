@@ -106,6 +106,18 @@ def test_what_a_scene_has_not_is_left_out(scene: Scene) -> None:
     assert len(made.triangles) == len(scene.triangles) + 2
 
 
+def test_materials_are_cut_as_finely_as_is_asked(scene: Scene) -> None:
+    """Edits of other kinds do not change that, nor do scales of what the scene has not."""
+    red = keys_of(scene.materials)[1]
+    asked = Surfaces().with_scale(red, 2.0, 1.0).with_scale(("no such", 0), 2.0, 1.0)
+    fine = with_surfaces(scene, asked)
+    assert [m.lightmap_scale for m in fine.materials] == [2.0 if k == 1 else 1.0 for k in range(len(fine.materials))]
+    edited = dataclasses.replace(scene.materials[1], albedo=(0.1, 0.2, 0.3))
+    both = with_edits(fine.materials, {red: edited})[1]
+    assert (both.albedo, both.lightmap_scale) == (edited.albedo, 2.0)
+    assert asked.with_scale(red, 1.0, 1.0) == Surfaces().with_scale(("no such", 0), 2.0, 1.0), "as the file says"
+
+
 def test_materials_of_one_name_are_told_apart(scene: Scene) -> None:
     names = [dataclasses.replace(scene.materials[0], name=name) for name in ("a", "b", "a", "")]
     assert keys_of(names) == [("a", 0), ("b", 0), ("a", 1), ("", 0)]

@@ -12,6 +12,7 @@ from imgui_bundle import imgui
 from app.session.baking import JUDGING, SOLVING, Baking, Order, why_not
 from app.session.checkpoint import CHECKPOINT_NAME
 from app.session.goal import seconds_left
+from app.session.report import look_of
 from app.ui import theme, widgets, words
 from app.ui.state import State
 from app.util.desktop import show_folder
@@ -40,7 +41,7 @@ def draw(view: View, state: State) -> None:
     _estimate(view, state)
     _light(view, state)
     if widgets.fold("Files", opened=False):
-        files = widgets.edit_options(state.order.files, skip=("three",))
+        files = widgets.edit_options(state.order.files, skip=() if state.order.files.web else ("three",))
         state.order = replace(state.order, files=files, keep=widgets.edit_options(state.order.keep))
 
 
@@ -108,7 +109,7 @@ def _estimate(view: View, state: State) -> None:
     rows = [("Texels", f"{'about ' if times != 1 else ''}{stats.texels * times:,.0f}")]
     memory = f"about {stats.memory_mib * times:,.0f} MiB"
     if hasattr(session.options, "ray_memory"):
-        memory += f", rays up to {session.options.ray_memory:,}"
+        memory += f", rays up to {session.options.ray_memory:,} MiB"
     rows.append(("Memory", memory))
     if state.measured:
         left = seconds_left(session.family, threshold(view), stats, session.run.history)
@@ -117,6 +118,8 @@ def _estimate(view: View, state: State) -> None:
         rows.append(("Time", "not known yet" if left is None else f"about {roughly(left)}"))
     widgets.facts("estimate", rows)
     widgets.tooltip("Estimates: of texels as the surfaces' area has it, of time from the solve so far")
+    if (note := view.texel_note) is not None:
+        widgets.one_line(f"{note[:1].upper()}{note[1:]}", theme.AMBER)
 
 
 def _begin(view: View, state: State) -> None:
@@ -145,6 +148,7 @@ def _start(view: View, state: State, *, resume: bool) -> None:
     """Raises UserError."""
     session, order = view.session, state.order
     assert order is not None
+    order = replace(order, look=look_of(view))
     if state.atlas is not None and state.atlas != session.atlas:
         order = replace(order, atlas=state.atlas)
     state.baking = Baking(session, order, resume=resume)
@@ -155,14 +159,17 @@ def _under_way(view: View, state: State, baking: Baking) -> None:
     session = view.session
     loading = session.on_its_way
     stage, share = (baking.stage, baking.share) if loading is None else (loading.stage, loading.fraction)
-    widgets.wrapped(f"{stage[:1].upper()}{stage[1:]}")
-    imgui.progress_bar(share, imgui.ImVec2(-1, 0), f"{share:.0%}")
     stats = state.stats
     assert stats is not None
+    left = None
+    if state.measured and baking.stage == SOLVING:
+        left = seconds_left(session.family, threshold(view), stats, session.run.history)
+        share = share if left is None else stats.seconds / max(stats.seconds + left, 1e-9)
+    widgets.wrapped(f"{stage[:1].upper()}{stage[1:]}")
+    imgui.progress_bar(share, imgui.ImVec2(-1, 0), f"{share:.0%}")
     remains = f"{widgets.percent(stats.remaining)}, to {widgets.percent(threshold(view))}"
     rows = [(words.title(stats.remains), remains)]
     if state.measured and baking.stage == SOLVING:
-        left = seconds_left(session.family, threshold(view), stats, session.run.history)
         rows.append(("Time left", "not known yet" if left is None else f"about {roughly(left)}"))
     widgets.facts("baking", rows)
     if baking.stage == SOLVING and not session.run.running:

@@ -8,14 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from imgui_bundle import imgui
 
-from app.scene.model import MOST_ALBEDO, Material
-from app.ui import colour, lamp, theme, widgets
+from app.scene.area_lamps import keys_of
+from app.scene.model import MOST_ALBEDO, SCALES, Material
+from app.ui import colour, lamp, new_lamps, slider, theme, widgets
 from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
     from app.session.view import View
 
 ROWS_SHOWN = 12  # of the list before it scrolls
+DENSITY = slider.Range(*SCALES, usual=(0.25, 4.0), logarithmic=True)
+SCALED = (
+    "So many times as many texels along a metre of it as of others (lightmap_scale), for light that needs more of them, or less: "
+    "all surfaces are cut anew in the background once it is let go. Where a number of texels is asked for, others have the rest; "
+    f'the layer "density" shows it. {widgets.AS_READ}'
+)
 
 
 def draw(view: View, state: State) -> None:
@@ -60,6 +67,7 @@ def _editor(view: View, state: State, material: Material) -> None:
     imgui.push_id("material")
     albedo, light = _albedo(material, came), emission(view, state, material, came, index)
     edited = dataclasses.replace(material, albedo=albedo, emission=light)
+    _density(view, state, index)
     imgui.pop_id()
     if (edited.albedo, edited.emission) != (material.albedo, material.emission):
         state.act(lambda: view.session.set_material(index, edited))
@@ -68,6 +76,34 @@ def _editor(view: View, state: State, material: Material) -> None:
         notes.append("both sides")
     if notes:
         widgets.dim(", ".join(notes))
+
+
+def _density(view: View, state: State, index: int) -> None:
+    """How finely it is cut into texels. The draft stays while a hand is at it: surfaces are cut once, when it is let go."""
+    session, draft = view.session, state.scale
+    key, surfaces = keys_of(session.unedited.materials)[index], session.asked_surfaces
+    came = _came(view, index)
+    asked = dict(surfaces.scales).get(key, came)
+    shown = asked if draft is None or draft[0] != index else draft[1]
+    widgets.labelled("Texel density", changed=shown != came)
+    imgui.set_next_item_width(-1)
+    imgui.begin_disabled(session.fixed is not None)
+    slid = slider.slide("##density", shown, DENSITY, "× %.3g")
+    edited = widgets.put_back(slid if slid == shown else float(f"{slid:.3g}"), came)  # it is what it shows
+    held = imgui.is_item_active()
+    imgui.end_disabled()
+    widgets.tooltip(SCALED if session.fixed is None else f"{SCALED}\nNot now: {session.fixed}")
+    state.scale = (index, edited) if held and session.fixed is None else None
+    if not held and edited != asked and session.fixed is None:
+        state.act(lambda: session.change_surfaces(surfaces.with_scale(key, edited, came)))
+
+
+def _came(view: View, index: int) -> float:
+    """The texel density of a material in the file; of the copy of a lamp, that of the lamp."""
+    read, added = view.session.read.materials, new_lamps.added_lamp(view, index)
+    if added is None:
+        return read[index].lightmap_scale
+    return 1.0 if added.of is None else read[keys_of(read).index(added.of)].lightmap_scale
 
 
 def _albedo(material: Material, came: Material) -> RGB:
