@@ -18,6 +18,7 @@ from app.session.keeping import SUFFIX, check_session
 from app.session.session import Session
 from app.session.settings import Settings
 from app.session.view import View
+from app.ui import text_size
 from app.ui.state import Pace
 from app.util.console import Console
 from app.util.kept import keep, kept
@@ -71,7 +72,7 @@ def view(flags: argparse.Namespace) -> int:
             session.open(flags.scene, from_flags(FileOptions, flags), reference=flags.reference)
         return view
 
-    frames, seconds = run_window(
+    drawn = run_window(
         make_view,
         size=flags.size,
         scenes=scene_names(),
@@ -79,14 +80,15 @@ def view(flags: argparse.Namespace) -> int:
         layout_file=None if folder is None else folder / "layout.ini",
         state_folder=None if flags.frames is not None else user_state_path("glowtree"),
         pace=flags.given.of("pace", Pace()),
+        text_size=text_size.legal(None if folder is None else kept(folder).get("text_size")),
         first=Path(flags.scene) if session_file else None,
         frames=flags.frames,
     )
     if folder is not None:
         for made in views:
-            keep(folder, quantities=made.display.quantities)
+            keep(folder, quantities=made.display.quantities, text_size=drawn.text_size)
     if flags.frames is not None:
-        Console().result({}, f"drew {frames} frames in {seconds:.1f} s")
+        Console().result({}, f"drew {drawn.frames} frames in {drawn.seconds:.1f} s")
     return 0
 
 

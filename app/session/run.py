@@ -86,6 +86,7 @@ class Run:
         self.progress = Progress(0, 1.0, np.zeros(3))
         self._pace, self._energy = Pacer(gpu), EnergyWatch()
         self._message: Callable[[str], str] = str
+        self._noted = 0
 
     def begin(self, solver: Solver[Any], family: Family, message: Callable[[str], str]) -> None:
         """With another solver, from the light that there is now. message: of a solve whose light is
@@ -111,6 +112,7 @@ class Run:
         self._gpu.timers.reset()
         self.history = History()
         self.progress = self.solver.poll()
+        self._noted = self.progress.done  # others ask the solver, too: what was heard is not what history has
         self.history.add(0, 0.0, self.progress.remaining, 0.0)
 
     # -- kept for later ------------------------------------------------------------------------------------------------
@@ -220,7 +222,7 @@ class Run:
     def poll(self, *, energy: bool = True, interactive: bool = False) -> bool:
         """Take in what the solver reports; the energy balance now and then, and once when solving has stopped. interactive: a
         hand is at the controls, what can wait does. Whether that took long. Raises NotFiniteError and pauses."""
-        before, slow = self.progress.done, False
+        slow = False
         wanted = energy and self._energy.may_measure(interactive=interactive)
         self.progress = self.solver.poll()
         if self.running and not np.isfinite(self.progress.remaining):
@@ -237,7 +239,8 @@ class Run:
         self.furthest = max(self.furthest, self.share_done(NEVER))
         if self.converged:
             self.effort.converged(self.progress.done)
-        if self.progress.done != before and not self.settled:
+        if self.progress.done != self._noted and not self.settled:
+            self._noted = self.progress.done
             self.history.add(self.progress.done, self.seconds, self.progress.remaining, self.escaped_share)
         return slow
 

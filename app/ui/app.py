@@ -29,16 +29,18 @@ FPS_MEMORY = 0.9  # share of the last value in the running mean
 class Ui:
     """Owns the Dear ImGui and ImPlot contexts; whoever makes it releases it, after the renderer of its frames.
 
-    scale: size of text and spacing, 1 on an ordinary screen. layout_file: where the places of the panels are kept
-    between runs. state_folder: where recent files are, and what a crash would lose. scenes: names or files offered in the menu.
-    suffixes: of the files that can be opened; none: all files. measured: whether numbers that depend on the machine's speed are
-    shown. live: whether frames follow each other.
+    scale: of the screen: how large text and spacing are there, 1 on an ordinary one; the user's choice, ``state.text_size``,
+    comes on top. layout_file: where the places of the panels are kept between runs, beside it those of other sizes of text.
+    state_folder: where recent files are, and what a crash would lose. scenes: names or files offered in the menu. suffixes: of
+    the files that can be opened; none: all files. measured: whether numbers that depend on the machine's speed are shown. live:
+    whether frames follow each other.
     """
 
     def __init__(
         self,
         *,
         scale: float = 1.0,
+        text_size: float = 1.0,
         layout_file: Path | None = None,
         state_folder: Path | None = None,
         scenes: Sequence[str] = (),
@@ -53,9 +55,11 @@ class Ui:
         io = imgui.get_io()
         io.config_flags |= imgui.ConfigFlags_.docking_enable
         io.config_windows_move_from_title_bar_only = True
-        io.set_ini_filename(str(layout_file) if layout_file else None)
-        theme.apply(scale)
-        self.state = State(measured=measured, live=live, scenes=tuple(scenes))
+        theme.load_fonts()
+        self.scale, self._applied, self._layout_file = scale, 0.0, layout_file
+        self.state = State(measured=measured, live=live, scenes=tuple(scenes), text_size=text_size)
+        self._apply_scale()
+        self.state.rebuild_layout = False
         self.state.keeping = Keeping(None if state_folder is None else state_folder / "aside", KNOWN)
         self.state.recent = Recent(None if state_folder is None else state_folder / "recent.json")
         self.state.asides = self.state.keeping.asides()
@@ -100,6 +104,7 @@ class Ui:
         if view.session.opened:
             state.remember(view.session.edited, view.session.lightmap)
         self._files.keep(view, state)
+        self._apply_scale()
         imgui.new_frame()
         self._build(view, io.delta_time)
         imgui.render()
@@ -159,6 +164,20 @@ class Ui:
         self.use()
         implot.destroy_context(self._plots)
         imgui.destroy_context(self._context)
+
+    def _apply_scale(self) -> None:
+        """Text and spacing as large as the screen and the user want them; panels are laid out for that, or as they were left at
+        that size."""
+        wanted = self.scale * self.state.text_size
+        if wanted == self._applied:
+            return
+        self._applied = wanted
+        theme.apply(wanted)
+        file = self._layout_file
+        if file is not None and wanted != 1.0:
+            file = file.with_stem(f"{file.stem}-{wanted:.2f}")
+        self.io.set_ini_filename(None if file is None else str(file))
+        self.state.rebuild_layout = True
 
     def _build(self, view: View, seconds: float) -> None:
         state = self.state

@@ -72,8 +72,8 @@ def _draw(view: View, state: State, lamp: AreaLamp, at: imgui.ImVec2) -> None:
         rim = [on_screen(view, state, corner, outside=True) for corner in corners]
         for one, other in zip(rim, rim[1:] + rim[:1], strict=True):
             if one is not None and other is not None:
-                lines.add_line(one, other, colour, 1.0)
-    lines.add_circle_filled(at, HANDLE_EM * em + 2, dark)
+                lines.add_line(one, other, colour, theme.px(1.0))
+    lines.add_circle_filled(at, HANDLE_EM * em + theme.px(2.0), dark)
     lines.add_circle_filled(at, HANDLE_EM * em, colour)
 
 

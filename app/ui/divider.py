@@ -48,8 +48,8 @@ def _draw(state: State, x: float) -> None:
         theme.colour_u32((0, 0, 0, 0.6)),
         theme.colour_u32(theme.TEXT),
     )
-    lines.add_line(imgui.ImVec2(x, top), imgui.ImVec2(x, top + height), dark, 3.0)
-    lines.add_line(imgui.ImVec2(x, top), imgui.ImVec2(x, top + height), light, 1.0)
+    lines.add_line(imgui.ImVec2(x, top), imgui.ImVec2(x, top + height), dark, theme.px(3.0))
+    lines.add_line(imgui.ImVec2(x, top), imgui.ImVec2(x, top + height), light, theme.px(1.0))
     lines.add_circle_filled(imgui.ImVec2(x, top + height / 2), GRIP_EM * em, light)
     widths = [imgui.calc_text_size(name).x for name in names]
     room = (x - left - 2 * NAME_EM * em, left + width - x - 2 * NAME_EM * em)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.ui import bookmarks
+from app.ui import bookmarks, text_size
 from app.ui.edits import let_go, redo, undo
 from app.ui.files import save, save_as
 from app.ui.navigation import focus
@@ -155,6 +155,7 @@ def dispatch(view: View, state: State) -> None:
         if not modal and imgui.is_key_pressed(Key.escape, False):
             imgui.internal.close_popup_to_level(0, True)
         return
+    text_size.answer(state, control=io.key_ctrl or io.key_super)
     if view.session.opened and not io.want_text_input:
         bookmarks.answer(view, state, control=io.key_ctrl or io.key_super)
     for shortcut in SHORTCUTS:

@@ -92,17 +92,17 @@ def _draw(view: View, state: State, light: Light, at: imgui.ImVec2, *, chosen: b
     if light.from_afar:
         end = on_screen(view, state, space.centre, outside=True)
         if end is not None:
-            lines.add_line(at, end, dark, 3.0)
-            lines.add_line(at, end, colour, 1.0)
+            lines.add_line(at, end, dark, theme.px(3.0))
+            lines.add_line(at, end, colour, theme.px(1.0))
     elif light.kind == "spot" and chosen:
         rim = [on_screen(view, state, p, outside=True) for p in cone(place, light, REACH * space.scale)]
         for one, other in zip(rim, rim[1:] + rim[:1], strict=True):
             if one is not None and other is not None:
-                lines.add_line(one, other, colour, 1.0)
+                lines.add_line(one, other, colour, theme.px(1.0))
         for one in rim[:: SIDES // 4]:
             if one is not None:
-                lines.add_line(at, one, colour, 1.0)
-    lines.add_circle_filled(at, HANDLE_EM * em + 2, dark)
+                lines.add_line(at, one, colour, theme.px(1.0))
+    lines.add_circle_filled(at, HANDLE_EM * em + theme.px(2.0), dark)
     lines.add_circle_filled(at, HANDLE_EM * em, colour)
 
 

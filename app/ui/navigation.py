@@ -28,7 +28,7 @@ FAST, SLOW = 4.0, 0.25  # with Shift, with Alt
 FOCUS_SHARE = 0.15  # of the scene's radius fills the view after a focus on a point
 FOCUS_SECONDS = 0.35
 REFRESH_SECONDS = 0.25  # between two looks at the picked texel while light is being shot
-MARKER_PX = 5.0
+MARKER_PX = 6.0
 
 Key = imgui.Key
 FLY = ((Key.d, Key.a), (Key.e, Key.q), (Key.w, Key.s))  # right, up, forward: plus and minus
@@ -58,7 +58,7 @@ def navigate(view: View, state: State, seconds: float) -> None:
 
 def _drag(view: View, state: State, x: float, y: float, height: float) -> None:
     io, button = imgui.get_io(), state.drag_button
-    moved = io.mouse_drag_max_distance_sqr[button] > CLICK_PX**2
+    moved = io.mouse_drag_max_distance_sqr[button] > theme.px(CLICK_PX) ** 2
     if not imgui.is_mouse_down(button):
         state.drag_button = -1
         if button == 0 and not moved:
@@ -152,5 +152,5 @@ def _marker(view: View, state: State) -> None:
     if at is None:
         return
     draw_list = imgui.get_background_draw_list()
-    draw_list.add_circle(at, MARKER_PX + 1, theme.colour_u32((0, 0, 0, 0.6)), 0, 3.0)
-    draw_list.add_circle(at, MARKER_PX + 1, theme.colour_u32(theme.AMBER), 0, 1.5)
+    for colour, thick in (((0, 0, 0, 0.6), 3.0), (theme.AMBER, 1.5)):
+        draw_list.add_circle(at, theme.px(MARKER_PX), theme.colour_u32(colour), 0, theme.px(thick))

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from app.render.units import QUANTITIES, UNITS
 from app.session.balance import verdict_of
-from app.ui import bookmarks, edits, files, new_lamps, pointer, theme, widgets
+from app.ui import bookmarks, edits, files, new_lamps, pointer, text_size, theme, widgets
 from app.ui.keys import POINTER, SHORTCUTS, flip_pace
 from app.ui.layout import PANELS
 from app.ui.panels.display import counted
@@ -79,6 +79,9 @@ def _view_menu(view: View, state: State) -> None:
             units = ", ".join(dict.fromkeys(unit for _, unit in QUANTITIES[quantities].values()))
             if imgui.menu_item(f"{quantities.capitalize()}: {units}", "", view.display.quantities == quantities)[0]:
                 view.display = counted(view.display, quantities)
+        imgui.end_menu()
+    if imgui.begin_menu("Text size"):
+        text_size.menu(state)
         imgui.end_menu()
     if imgui.menu_item("Reset layout", "", False)[0]:
         state.hidden_panels.clear()
@@ -172,7 +175,7 @@ def help_overlay(state: State) -> None:
     imgui.set_next_window_pos(middle, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
     imgui.begin("##help", None, FLOATING)
     if imgui.begin_table("keys", 2, imgui.TableFlags_.sizing_fixed_fit):
-        for label, meaning in (*((s.label, s.help) for s in SHORTCUTS), *bookmarks.KEYS, *POINTER):
+        for label, meaning in (*((s.label, s.help) for s in SHORTCUTS), *bookmarks.KEYS, *text_size.KEYS, *POINTER):
             imgui.table_next_row()
             imgui.table_next_column()
             imgui.text_colored(imgui.ImVec4(*theme.AMBER), label)

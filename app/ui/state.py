@@ -115,11 +115,12 @@ class State:
     texel density, by index, the same. keeping: saves and opens
     sessions; asides: what crashes have left, to be asked about; leaving: a wish that is to be answered;
     after_saving: what waits for a session to be saved. order: of the next bake, as
-    far as it was edited; baking: the last.
+    far as it was edited; baking: the last. text_size: over what the screen asks for.
     """
 
     measured: bool = True
     live: bool = True
+    text_size: float = 1.0
     scenes: tuple[str, ...] = ()
     texture_id: Callable[[Any], int] | None = None
     legend: Legend | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import imgui_bundle
 from imgui_bundle import icons_fontawesome_6, imgui, implot
@@ -94,9 +95,10 @@ _COLOURS: dict[imgui.Col_, RGBA] = {
 
 
 def apply(scale: float = 1.0) -> None:
-    """Set fonts, colours and spacing of the current Dear ImGui and ImPlot contexts; ``scale`` enlarges all of it."""
-    _load_fonts()
-    style = imgui.get_style()
+    """Set colours and spacing of the current Dear ImGui and ImPlot contexts; ``scale`` enlarges all of it. Between two frames."""
+    style, plain = imgui.get_style(), imgui.Style()
+    for name in _lengths(plain):
+        setattr(style, name, getattr(plain, name))  # scaling what is scaled already would add up
     for index, colour in _COLOURS.items():
         style.set_color_(index, imgui.ImVec4(*colour))
     style.window_rounding = style.child_rounding = style.frame_rounding = style.popup_rounding = 4.0
@@ -115,20 +117,37 @@ def apply(scale: float = 1.0) -> None:
     style.color_button_position = imgui.Dir.left
     style.scale_all_sizes(scale)
     style.font_scale_dpi = scale
-    _style_plots()
+    _style_plots(scale)
 
 
-def _load_fonts() -> None:
+def px(length: float) -> float:
+    """So many pixels of an ordinary screen, as large as text is here."""
+    return length * imgui.get_style().font_scale_dpi
+
+
+def load_fonts() -> None:
+    """Text and icons, once for each context."""
     fonts = imgui.get_io().fonts
     fonts.add_font_from_file_ttf(str(TEXT_FONT), FONT_PX)
     icons = imgui.ImFontConfig()
     icons.merge_mode = True
     icons.glyph_offset = imgui.ImVec2(0, 1)
+    icons.glyph_min_advance_x = FONT_PX  # a narrow one does not touch the word after it
     fonts.add_font_from_file_ttf(str(ICON_FONT), ICON_PX, icons)
 
 
-def _style_plots() -> None:
-    style = implot.get_style()
+def _lengths(style: Any) -> list[str]:
+    """Which fields of a style are lengths; those of fonts are not."""
+    names = [name for name in dir(style) if not name.startswith(("_", "font"))]
+    return [name for name in names if isinstance(getattr(style, name), (float, imgui.ImVec2))]
+
+
+def _style_plots(scale: float) -> None:
+    style, plain = implot.get_style(), implot.Style()
+    for name in _lengths(plain):
+        length = getattr(plain, name)
+        larger = length * scale if isinstance(length, float) else imgui.ImVec2(length.x * scale, length.y * scale)
+        setattr(style, name, larger)
     for index, colour in {
         implot.Col_.frame_bg: _rgba(0x000000, 0.0),
         implot.Col_.plot_bg: _rgba(0x000000, 0.0),
@@ -141,10 +160,10 @@ def _style_plots() -> None:
         implot.Col_.crosshairs: AMBER,
     }.items():
         style.set_color_(index, imgui.ImVec4(*colour))
-    style.plot_padding = imgui.ImVec2(16, 4)  # half a label stands out on the right
-    style.label_padding = imgui.ImVec2(4, 3)
-    style.legend_inner_padding = imgui.ImVec2(6, 4)
-    style.legend_padding = imgui.ImVec2(8, 2)
+    style.plot_padding = imgui.ImVec2(16 * scale, 4 * scale)  # half a label stands out on the right
+    style.label_padding = imgui.ImVec2(4 * scale, 3 * scale)
+    style.legend_inner_padding = imgui.ImVec2(6 * scale, 4 * scale)
+    style.legend_padding = imgui.ImVec2(8 * scale, 2 * scale)
     style.minor_alpha = 0.35
 
 

@@ -165,7 +165,7 @@ def tooltip(text: str) -> None:
 
 
 def facts(name: str, rows: Sequence[tuple[str, str]]) -> None:
-    """A table of labels and values, the values wrapped at the panel's edge."""
+    """A table of labels and values, both wrapped in their columns."""
     if not rows or not imgui.begin_table(name, 2, imgui.TableFlags_.sizing_stretch_prop):
         return
     imgui.table_setup_column("label", imgui.TableColumnFlags_.width_stretch, LABEL_SHARE)
@@ -173,11 +173,9 @@ def facts(name: str, rows: Sequence[tuple[str, str]]) -> None:
     for label, value in rows:
         imgui.table_next_row()
         imgui.table_next_column()
-        dim(label)
+        wrapped(label, theme.DIM)
         imgui.table_next_column()
-        imgui.push_text_wrap_pos(0.0)
-        imgui.text_unformatted(value)
-        imgui.pop_text_wrap_pos()
+        wrapped(value)
         copied_by_click(value)
     imgui.end_table()
 

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from imgui_bundle import imgui
 from moderngl_window import activate_context
@@ -25,6 +25,7 @@ from app.session.pacing import Turns
 from app.session.view import View
 from app.ui.app import Ui
 from app.ui.state import Pace, PictureFile, Request
+from app.viewer.mouse import Mouse
 from app.viewer.picture import save_picture
 from app.viewer.ui_frame import UiFrame, save_screenshot
 
@@ -79,6 +80,14 @@ CURSORS = {
 }
 
 
+class Shown(NamedTuple):
+    """What became of a window: how many frames were drawn, in how many seconds, and how large text was in the end."""
+
+    frames: int
+    seconds: float
+    text_size: float
+
+
 def run_window(
     make_view: Callable[[Gpu], View],
     *,
@@ -89,16 +98,16 @@ def run_window(
     state_folder: Path | None = None,
     first: Path | None = None,
     pace: Pace | None = None,
+    text_size: float = 1.0,
     vsync: bool = True,
     frames: int | None = None,
-) -> tuple[int, float]:
-    """Open the window, run until it is closed, release everything. Returns how many frames were drawn, and in how many seconds.
+) -> Shown:
+    """Open the window, run until it is closed, release everything.
 
-    make_view: makes a view of a session once there is a context. size: of the window [display units]. scenes: names for
-    the menu. suffixes: of the files that can be opened. layout_file: keeps the places of the panels.
-    state_folder: keeps recent files, and what a crash would lose. first: a file to open. pace: to begin with. frames: close
-    after so many (for tests and measurements). Raises UserError where no window can be opened, and what
-    ``make_view`` raises.
+    make_view: makes a view of a session once there is a context. size: of the window, in pixels of an ordinary screen. scenes:
+    names for the menu. suffixes: of the files that can be opened. layout_file: keeps the places of the panels. state_folder:
+    keeps recent files, and what a crash would lose. first: a file to open. pace, text_size: to begin with. frames: close after
+    so many (for tests and measurements). Raises UserError where no window can be opened, and what ``make_view`` raises.
     """
     window = _open(size, vsync)
     gpu = Gpu(window.ctx)
@@ -112,6 +121,7 @@ def run_window(
         raise
     ui = Ui(
         scale=_text_scale(window),
+        text_size=text_size,
         layout_file=layout_file,
         state_folder=state_folder,
         scenes=scenes,
@@ -126,7 +136,7 @@ def run_window(
         viewer, start = ViewerWindow(window, timer, view, frame, ui, frames), time.perf_counter()
         viewer.main_loop()
         ui.state.keeping.end()
-        return viewer.frames, time.perf_counter() - start
+        return Shown(viewer.frames, time.perf_counter() - start, ui.state.text_size)
     finally:
         frame.release()
         ui.release()
@@ -165,6 +175,9 @@ def _open(size: tuple[int, int], vsync: bool) -> Any:
         raise UserError(f"no window with OpenGL {GL_VERSION[0]}.{GL_VERSION[1]}: {_reason(error)}; {hint}") from None
     window.exit_key = None  # Esc closes what lies over the view
     window.fullscreen_key = None
+    if (scale := _text_scale(window)) > 1:
+        screen = window._window.screen
+        window._window.set_size(min(round(size[0] * scale), screen.width), min(round(size[1] * scale), screen.height))
     activate_context(window=window)
     return window
 
@@ -184,7 +197,7 @@ class ViewerWindow(WindowConfig):
     ) -> None:
         super().__init__(ctx=window.ctx, wnd=window, timer=timer)
         self._view, self._session, self._frame, self._ui, self._frames_left = view, view.session, frame, ui, frames
-        self._keys = _keys()
+        self._keys, self._mouse = _keys(), Mouse(lambda: ui.io)
         self._pyglet = window._window
         self._held: set[imgui.Key] = set()
         self._let_go: set[imgui.Key] = set()
@@ -202,7 +215,8 @@ class ViewerWindow(WindowConfig):
             on_close=self._asked_to_close,
             on_activate=lambda: ui.io.add_focus_event(True),
             on_deactivate=self._on_deactivate,
-            on_mouse_leave=lambda x, y: ui.io.add_mouse_pos_event(NOWHERE, NOWHERE),
+            on_mouse_leave=lambda x, y: self._mouse.move(NOWHERE, NOWHERE),
+            on_scale=self._on_scale,
         )
         self._pyglet.push_handlers(**dict.fromkeys(EVENTS, self._wake))
 
@@ -255,6 +269,8 @@ class ViewerWindow(WindowConfig):
         target, ratio = self.wnd.fbo, self.wnd.pixel_ratio
         requests = self._frame.draw(self._view, target, size=self.wnd.size, ratio=ratio, seconds=frame_time, look=look)
         session.run.drawn()
+        if self._mouse.frame():
+            self._wake()
         for known in self._let_go:
             self._key(known, False)
         self._let_go.clear()
@@ -331,37 +347,38 @@ class ViewerWindow(WindowConfig):
 
     def on_mouse_position_event(self, x: int, y: int, dx: int, dy: int) -> None:
         """The mouse moved."""
-        self._ui.io.add_mouse_pos_event(x, y)
+        self._mouse.move(x, y)
 
     def on_mouse_drag_event(self, x: int, y: int, dx: int, dy: int) -> None:
         """The mouse moved with a button down."""
-        self._ui.io.add_mouse_pos_event(x, y)
+        self._mouse.move(x, y)
 
     def on_mouse_press_event(self, x: int, y: int, button: int) -> None:
         """A mouse button went down."""
-        self._button(x, y, button, True)
+        self._mouse.button(x, y, BUTTONS[button], True)
 
     def on_mouse_release_event(self, x: int, y: int, button: int) -> None:
         """A mouse button went up."""
-        self._button(x, y, button, False)
+        self._mouse.button(x, y, BUTTONS[button], False)
 
     def on_mouse_scroll_event(self, x_offset: float, y_offset: float) -> None:
         """The wheel turned."""
-        self._ui.io.add_mouse_wheel_event(x_offset, y_offset)
+        self._mouse.scroll(x_offset, y_offset)
 
     def on_files_dropped_event(self, x: int, y: int, paths: list[str]) -> None:
         """Files were dropped: the first one is opened."""
         if paths:
             self._ui.drop(self._view, Path(paths[0]))
 
-    def _button(self, x: int, y: int, button: int, down: bool) -> None:
-        self._ui.io.add_mouse_pos_event(x, y)
-        self._ui.io.add_mouse_button_event(BUTTONS[button], down)
-
     def _asked_to_close(self) -> bool:
         """The window's own button: the interface may have a question first. True: pyglet does nothing of its own."""
         self._ui.state.quit()
         return True
+
+    def _on_scale(self, scale: float, dpi: int) -> None:
+        """The window has come to a screen whose pixels are of another size."""
+        self._ui.scale = _text_scale(self.wnd)
+        self._wake()
 
     def _on_deactivate(self) -> None:
         self._held.clear()

@@ -119,6 +119,17 @@ def test_a_solve_that_still_shoots_is_not_all_done(session: Session) -> None:
     assert session.run.share_done(Stop(work=session.solver.issued)) == 1  # all that was asked for
 
 
+def test_history_has_all_that_was_heard_of_whoever_asked(session: Session) -> None:
+    """The window asks the solver between two polls, when it says where the eye is."""
+    for _ in range(6):
+        session.advance(fast=False, interactive=False)
+        session.gpu.ctx.finish()
+        session.observe(np.zeros(3))
+        session.poll()
+    work = session.run.history.column("work")
+    assert len(work) > 4 and work[-1] == session.run.progress.done
+
+
 # -- what begins again -------------------------------------------------------------------------------------------------
 
 

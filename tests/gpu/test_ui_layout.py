@@ -151,3 +151,26 @@ def test_pictures_of_the_same_state_are_the_same(gpu: Gpu) -> None:
 def test_a_picture_of_a_size_that_cannot_be(gpu: Gpu, size: tuple[int, int]) -> None:
     with pytest.raises(UserError, match=f"{size[0]}×{size[1]}"):
         ui_image(FakeSession(gpu=gpu), size)
+
+
+def test_text_is_as_large_as_the_user_wants_it(gpu: Gpu, tmp_path: Path) -> None:
+    """By keys and at once; panels follow."""
+    desk = Desk(gpu, FakeSession(), (1920, 1080), ui=Ui(layout_file=tmp_path / "layout.ini"))
+    sizes, state = [], desk.ui.state
+
+    def look() -> None:
+        desk.frames(3)
+        sizes.append((imgui.get_style().font_scale_dpi, state.view_px[0]))
+
+    look()
+    for key in (imgui.Key.equal, imgui.Key.keypad_add, imgui.Key._0):
+        desk.key(key, control=True)
+        look()
+    first, larger, largest, again = sizes
+    assert again == first
+    for small, large in ((first, larger), (larger, largest)):
+        assert all(a < b for a, b in zip(small, large, strict=True))
+    assert largest[1] / first[1] == pytest.approx(largest[0] / first[0], rel=0.04)  # text is whole pixels high
+    desk.key(imgui.Key.minus, control=True)
+    assert state.text_size == 0.9 and state.docked == {panel.title for panel in layout.PANELS}
+    desk.release()

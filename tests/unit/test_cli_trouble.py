@@ -33,7 +33,11 @@ def test_the_layout_is_kept_where_it_can_be(
 ) -> None:
     given: dict[str, Any] = {}
     monkeypatch.setattr(app.viewer.window, "no_display", lambda: None)
-    monkeypatch.setattr(app.viewer.window, "run_window", lambda make_session, **named: given.update(named) or (0, 0.0))
+    monkeypatch.setattr(
+        app.viewer.window,
+        "run_window",
+        lambda make_session, **named: given.update(named) or app.viewer.window.Shown(0, 0.0, 1.0),
+    )
     home = {"HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path / "new" / "config")}
     for name, value in (home if writable else NO_HOME).items():
         monkeypatch.setenv(name, value)

@@ -62,7 +62,7 @@ def _place(atlas: tuple[int, int], ratio: float) -> Place:
     height = max(imgui.get_content_region_avail().y, LEAST_EM * imgui.get_font_size())
     upright, turned = (min(width / across, height / tall) for across, tall in (atlas, atlas[::-1]))
     turns = turned > WORTH_TURNING * upright
-    scale = min(turned if turns else upright, MOST_PX / ratio / max(atlas))
+    scale = min(turned if turns else upright, theme.px(MOST_PX) / ratio / max(atlas))
     return Place(corner.x, corner.y, max(scale, 1e-3), atlas, turns)
 
 

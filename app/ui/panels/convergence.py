@@ -126,7 +126,7 @@ def _shares(
     for name, (over, values, colour) in curves.items():
         if len(over):
             alone = implot.Marker_.circle if len(over) == 1 else implot.Marker_.none
-            line = implot.Spec(line_color=imgui.ImVec4(*colour), line_weight=2.0, marker=alone)
+            line = implot.Spec(line_color=imgui.ImVec4(*colour), line_weight=theme.px(2.0), marker=alone)
             implot.plot_line(name, over, np.maximum(values, SMALLEST), line)
     plots.end(state.zooms, "remaining", unit, curves, widgets.percent)
 
