@@ -8,7 +8,7 @@ import http.server
 import shutil
 import subprocess
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,7 @@ FLAGS = (
 
 
 @contextlib.contextmanager
-def _served(folder: Path) -> Iterator[str]:
+def served(folder: Path) -> Iterator[str]:
     """The address of a folder on a web server of this machine."""
 
     class Quiet(http.server.SimpleHTTPRequestHandler):
@@ -43,21 +43,22 @@ def _served(folder: Path) -> Iterator[str]:
         server.server_close()
 
 
-def picture_of_page(page: Path, size: tuple[int, int] = SIZE, *, from_disk: bool = False) -> np.ndarray:
-    """(height, width, 3) of what a page shows once it is at rest, from a web server that has its folder, or opened as a file. The
-    test is skipped without Chromium."""
+def pictures_of_pages(addresses: Sequence[str], folder: Path) -> list[np.ndarray]:
+    """(height, width, 3) of what each page shows once all are at rest, side by side in one window. folder: for what Chromium
+    writes. The test is skipped without Chromium."""
     if CHROMIUM is None:
         pytest.skip("Chromium is not installed")
-    folder, (width, height) = page.parent, size
-    style = f"width:{width}px;height:{height}px;border:0;position:absolute;left:0;top:0"
-    (folder / "frame.html").write_text(f'<!doctype html><iframe src="{page.name}" style="{style}"></iframe>')
-    shot = folder / "page.png"
-    options = [f"--window-size={width + ROOM},{height + ROOM}", f"--user-data-dir={folder / 'profile'}"]
-    with contextlib.nullcontext(folder.as_uri()) if from_disk else _served(folder) as address:
-        line = [CHROMIUM, *FLAGS, *options, f"--screenshot={shot}", f"{address}/frame.html"]
-        run = subprocess.run(line, capture_output=True, text=True, timeout=200)
+    (width, height), count = SIZE, len(addresses)
+    style = f"width:{width}px;height:{height}px;border:0;position:absolute;top:0"
+    frames = [f'<iframe src="{at}" style="{style};left:{width * k}px"></iframe>' for k, at in enumerate(addresses)]
+    (folder / "frames.html").write_text("<!doctype html>" + "".join(frames))
+    shot = folder / "pages.png"
+    options = [f"--window-size={width * count + ROOM},{height + ROOM}", f"--user-data-dir={folder / 'profile'}"]
+    line = [CHROMIUM, *FLAGS, *options, f"--screenshot={shot}", (folder / "frames.html").as_uri()]
+    run = subprocess.run(line, capture_output=True, text=True, timeout=200)
     assert shot.is_file(), run.stderr[-2000:]
-    return np.asarray(Image.open(shot).convert("RGB"))[:height, :width]
+    image = np.asarray(Image.open(shot).convert("RGB"))
+    return [image[:height, width * k : width * (k + 1)] for k in range(count)]
 
 
 def apart(one: np.ndarray, other: np.ndarray) -> float:
