@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -32,6 +33,12 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ |= GL41
     config.addinivalue_line("markers", "display: needs an X server or Xvfb")
     config.addinivalue_line("markers", "long: whole solves, left out of the second run in an OpenGL 4.1 context")
+
+
+def pytest_collection_finish() -> None:
+    """Tests that look for what was let go need not look through all that has been imported by now, each time."""
+    gc.collect()
+    gc.freeze()
 
 
 SESSION_GPU = pytest.StashKey["Gpu"]()
@@ -66,6 +73,13 @@ def gpu(_gpu: Gpu) -> Iterator[Gpu]:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(2003)
+
+
+@pytest.fixture
+def few_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error estimate looks from few points: where it is not what is tested, and would take most of the time."""
+    for name in ("SURVEYED", "POINTS", "HELPERS"):
+        monkeypatch.setattr(f"app.estimate.error.{name}", 64)
 
 
 @pytest.fixture

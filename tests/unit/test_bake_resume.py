@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from processes import started
 
 from app.bake.read import read_irradiance
 from app.cli import run
@@ -26,6 +28,7 @@ BAKES = {
     "shooting on quadtrees": ["--solver", "shooting", "--texels", "300", "--adaptive", "--shots", "1000"],
 }
 GATHERING = BAKES["gathering"][:4]
+pytestmark = pytest.mark.usefixtures("few_points")
 posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL and no SIGINT for one process")
 
 
@@ -33,28 +36,21 @@ def bake(output: Path, *flags: str) -> list[str]:
     return ["bake", "cornell-box", "-o", str(output), *flags]
 
 
-def begun(line: list[str]) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-m", "app", *line],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+def begun(line: list[str]) -> contextlib.AbstractContextManager[subprocess.Popen[str]]:
+    return started([sys.executable, "-m", "app", *line], os.environ | {"PYTHONPATH": str(ROOT)})
 
 
 def killed(line: list[str], checkpoint: Path, seconds: float) -> bool:
     """Start a bake and kill it so long after its first checkpoint; False where it was done by then."""
     before = checkpoint.stat().st_mtime_ns if checkpoint.exists() else None
-    worker, end = begun(line), time.monotonic() + PATIENCE
-    while worker.poll() is None:
-        assert time.monotonic() < end
-        if checkpoint.exists() and checkpoint.stat().st_mtime_ns != before:
-            time.sleep(seconds)
-            worker.kill()
-            break
-        time.sleep(0.01)
-    worker.communicate()
+    end = time.monotonic() + PATIENCE
+    with begun(line) as worker:
+        while worker.poll() is None:
+            assert time.monotonic() < end
+            if checkpoint.exists() and checkpoint.stat().st_mtime_ns != before:
+                time.sleep(seconds)
+                break
+            time.sleep(0.01)
     assert worker.returncode in (0, -signal.SIGKILL)
     return worker.returncode != 0
 
@@ -96,12 +92,13 @@ def test_after_ctrl_c_it_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[s
     at_once, stopped, flags = tmp_path / "at once", tmp_path / "stopped", BAKES["gathering"]
     assert run(bake(at_once, *flags)) == 0
     line = bake(stopped, *flags, "--checkpoint", "0.1")
-    worker, end = begun(line), time.monotonic() + PATIENCE
-    while not (stopped / CHECKPOINT_NAME).exists():
-        assert worker.poll() is None and time.monotonic() < end
-        time.sleep(0.01)
-    worker.send_signal(signal.SIGINT)
-    out, err = worker.communicate(timeout=PATIENCE)
+    end = time.monotonic() + PATIENCE
+    with begun(line) as worker:
+        while not (stopped / CHECKPOINT_NAME).exists():
+            assert worker.poll() is None and time.monotonic() < end
+            time.sleep(0.01)
+        worker.send_signal(signal.SIGINT)
+        out, err = worker.communicate(timeout=PATIENCE)
     assert worker.returncode == 130 and "stopped early" in out
     assert err.splitlines()[-1] == "glowtree: note: stopped: the same line with --resume goes on from here"
     report = json.loads((stopped / "report.json").read_text())
@@ -118,9 +115,9 @@ def test_after_ctrl_c_it_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[s
 @pytest.fixture
 def unfinished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Path:
     """A folder with the checkpoint of a bake that did not get far."""
-    monkeypatch.setattr("app.session.checkpoint.Checkpoint.remove", lambda self: self.write())
-    assert run(bake(tmp_path / "out", *GATHERING, "--rays", "24")) == 0
-    monkeypatch.undo()
+    with monkeypatch.context() as patch:
+        patch.setattr("app.session.checkpoint.Checkpoint.remove", lambda self: self.write())
+        assert run(bake(tmp_path / "out", *GATHERING, "--rays", "24")) == 0
     capsys.readouterr()
     return tmp_path / "out"
 
@@ -187,8 +184,7 @@ def test_of_several_scenes_those_that_are_done_are_not_baked_again(
     assert [bake.get("done_before", False) for bake in bakes] == [True, False]
     second = written()
     assert second[0] == first[0] and second[1] > first[1]
-    scene.touch()
-    os.utime(scene, (time.time() + 5, time.time() + 5))
+    os.utime(scene, (time.time(), time.time()))
     assert run([*line, "--resume"]) == 0  # the scene is another by now
     third = written()
     assert third[0] == second[0] and third[1] > second[1]

@@ -7,7 +7,6 @@ import csv
 import json
 import os
 import signal
-import subprocess
 import sys
 import textwrap
 import time
@@ -18,6 +17,7 @@ from typing import Any
 
 import pytest
 from constant_solver import FAMILY, SWEEPS
+from processes import started
 from solver_scenes import grey, quads_scene, room
 
 from app.atlas.options import AtlasOptions
@@ -307,19 +307,12 @@ def test_a_real_ctrl_c_in_the_second_curve_keeps_the_first(tmp_path: Path) -> No
         raise SystemExit(run(line.split()))
     """
     home = {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path / "cache")}
-    worker = subprocess.Popen(
-        [sys.executable, "-c", textwrap.dedent(code)],
-        cwd=tmp_path,
-        env={**os.environ, **home},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert worker.stdout is not None
-    assert [worker.stdout.readline() for _ in range(2)] == ["begun\n", "begun\n"]
-    time.sleep(1)  # it warms up and shoots
-    worker.send_signal(signal.SIGINT)
-    out, err = worker.communicate(timeout=60)
+    with started([sys.executable, "-c", textwrap.dedent(code)], {**os.environ, **home}, tmp_path) as worker:
+        assert worker.stdout is not None
+        assert [worker.stdout.readline() for _ in range(2)] == ["begun\n", "begun\n"]
+        time.sleep(1)  # it warms up and shoots
+        worker.send_signal(signal.SIGINT)
+        out, err = worker.communicate(timeout=60)
     assert worker.returncode == 130, err
     assert "glowtree: note: stopped: only finished curves are written\n" in err and "Traceback" not in err
     values = json.loads((tmp_path / "out/error.json").read_text())

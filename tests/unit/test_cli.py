@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+from processes import started
 from scene_files import Gltf
 
 import app.commands.info as info_module
@@ -389,16 +391,14 @@ def test_doctor_names_packages_that_are_missing(
 # -- processes of their own --------------------------------------------------------------------------------------------
 
 
-def command(*arguments: str, **more: str) -> dict[str, Any]:
-    """Keywords for subprocess: glowtree without a screen."""
+def without_screen(**more: str) -> dict[str, str]:
+    """The environment of a process."""
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    return {
-        "args": [sys.executable, "-m", "app", *arguments],
-        "env": {**environment, "PYTHONPATH": str(ROOT), **more},
-        "stdout": subprocess.PIPE,
-        "stderr": subprocess.PIPE,
-        "text": True,
-    }
+    return {**environment, "PYTHONPATH": str(ROOT), **more}
+
+
+def glowtree(*arguments: str) -> contextlib.AbstractContextManager[subprocess.Popen[str]]:
+    return started([sys.executable, "-m", "app", *arguments], without_screen())
 
 
 NO_X11 = """
@@ -420,9 +420,8 @@ sys.exit(run(["doctor"]))
 @pytest.mark.skipif(sys.platform != "linux", reason="EGL's vendors are chosen by this variable on Linux only")
 def test_doctor_without_egl_says_what_to_install() -> None:
     """No EGL, and no X11 either: glcontext opens the screen :0 whatever DISPLAY says, and there may be one."""
-    keywords = command("doctor", __EGL_VENDOR_LIBRARY_FILENAMES=os.devnull)
-    keywords["args"] = [sys.executable, "-c", NO_X11]
-    done = subprocess.run(**keywords, timeout=60)
+    env = without_screen(__EGL_VENDOR_LIBRARY_FILENAMES=os.devnull)
+    done = subprocess.run([sys.executable, "-c", NO_X11], env=env, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert "apt-get install" in done.stdout and "libegl1" in done.stdout
     assert "Traceback" not in done.stderr
@@ -446,12 +445,12 @@ def test_ctrl_c_while_shooting_keeps_what_is_there(folder: Path, kind: str) -> N
         else ["--noise", "1e-5"]
     )
     line = [kind, "room.obj", "--light", "-o", str(output), *more]
-    worker = subprocess.Popen(**command(*line))
-    assert worker.stderr is not None
-    assert worker.stderr.readline() == "glowtree: note: 1 material is not defined: grey with albedo 0.5\n"
-    time.sleep(1)  # the note is the last thing before the shots
-    worker.send_signal(signal.SIGINT)
-    out, err = worker.communicate(timeout=60)
+    with glowtree(*line) as worker:
+        assert worker.stderr is not None
+        assert worker.stderr.readline() == "glowtree: note: 1 material is not defined: grey with albedo 0.5\n"
+        time.sleep(1)  # the note is the last thing before the shots
+        worker.send_signal(signal.SIGINT)
+        out, err = worker.communicate(timeout=60)
     assert worker.returncode == 130, err
     resumable = "glowtree: note: stopped: the same line with --resume goes on from here\n"
     assert "stopped early" in out and err == (resumable if kind == "bake" else "")
@@ -467,11 +466,11 @@ def test_ctrl_c_while_shooting_keeps_what_is_there(folder: Path, kind: str) -> N
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
 def test_ctrl_c_while_loading_writes_nothing(folder: Path) -> None:
     line = ["bake", "cornell-box", "-o", "out/deep", "--texels", "8000000"]  # takes many seconds to cut
-    worker = subprocess.Popen(**command(*line))
-    until((folder / "out").exists, worker)
-    time.sleep(1)  # for the context
-    worker.send_signal(signal.SIGINT)
-    out, err = worker.communicate(timeout=60)
+    with glowtree(*line) as worker:
+        until((folder / "out").exists, worker)
+        time.sleep(1)  # for the context
+        worker.send_signal(signal.SIGINT)
+        out, err = worker.communicate(timeout=60)
     assert worker.returncode == 130
     assert out == "" and err == "glowtree: stopped, nothing was written\n"
     assert not (folder / "out").exists()
@@ -484,6 +483,7 @@ def json_of(capsys: pytest.CaptureFixture[str], line: list[str]) -> dict[str, An
     return values
 
 
+@pytest.mark.usefixtures("few_points")
 def test_many_bakes_have_a_folder_each_and_one_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     line = ["--texels", "600", "--rays", "8"]
     assert run(["bake", "cornell-box", "nowhere", "furnace", "-o", "many", *line]) == 2

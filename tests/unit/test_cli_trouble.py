@@ -15,6 +15,7 @@ import numpy as np
 import OpenEXR
 import pytest
 from PIL import Image
+from processes import started
 
 import app.viewer.window
 from app.cli import run
@@ -131,19 +132,14 @@ def test_the_context_decides_what_doctor_misses(
 
 @posix
 def test_ctrl_c_while_python_imports_is_one_line() -> None:
-    worker = subprocess.Popen(
-        [sys.executable, "-X", "importtime", "-m", "app", "info", "cornell-box"],
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert worker.stderr is not None
-    for line in worker.stderr:  # each is a module that has been imported
-        if line.rstrip().endswith("numpy.exceptions"):
-            break
-    worker.send_signal(signal.SIGINT)
-    out, err = worker.communicate(timeout=60)
-    said = [line for line in err.splitlines() if not line.startswith("import time:")]
+    line = [sys.executable, "-X", "importtime", "-m", "app", "info", "cornell-box"]
+    with started(line, {**os.environ, "PYTHONPATH": str(ROOT)}) as worker:
+        assert worker.stderr is not None
+        for said in worker.stderr:  # each is a module that has been imported
+            if said.rstrip().endswith("numpy.exceptions"):
+                break
+        worker.send_signal(signal.SIGINT)
+        out, err = worker.communicate(timeout=60)
+    lines = [line for line in err.splitlines() if not line.startswith("import time:")]
     assert worker.returncode == 130, err
-    assert out == "" and said == ["glowtree: stopped, nothing was written"]
+    assert out == "" and lines == ["glowtree: stopped, nothing was written"]
