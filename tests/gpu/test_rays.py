@@ -44,7 +44,7 @@ def rounding(corners: F64, directions: F64, distance: F64) -> F64:
 
 
 @pytest.mark.parametrize("plain", [0.0, 1e4])
-@pytest.mark.parametrize("count", [4096, pytest.param(1 << 20, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [4096, pytest.param(1 << 17, marks=pytest.mark.long)])
 def test_rays_meet_what_they_meet_in_double_precision(
     gpu: Gpu, rng: np.random.Generator, count: int, plain: float
 ) -> None:
@@ -94,25 +94,23 @@ def ball() -> object:
     return bare_pool(mesh.positions * rng.uniform(0.9, 1.0, (len(mesh.positions), 1)), mesh.triangles)
 
 
-@pytest.mark.parametrize("count", [1 << 16, pytest.param(10**7, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [1 << 16, pytest.param(1 << 20, marks=pytest.mark.long)])
 def test_no_ray_leaves_a_closed_room(gpu: Gpu, rng: np.random.Generator, ball: object, count: int) -> None:
     """Rays at vertices, at edges, and anywhere."""
     corners = corners_of(ball)
-    for start in range(0, count, 1 << 20):
-        many = min(1 << 20, count - start)
-        triangle = corners[rng.integers(len(corners), size=many)]
-        along = np.where(np.arange(many) % 3 == 0, rng.choice([0.0, 0.5, 0.25], many), rng.random(many))[:, None]
-        inside = np.where(np.arange(many) % 3 == 2, rng.random(many), 0.0)[:, None]
-        aim = triangle[:, 0] + along * (triangle[:, 1] - triangle[:, 0])
-        aim += inside * (triangle[:, 2] - aim)
-        origins = 0.3 * unit(rng, many).astype(np.float32)
-        directions = aim - origins
-        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-        with batch(gpu, ball, origins, directions) as rays:
-            hits = rays.closest()
-            assert (hits.triangle >= 0).all(), f"{(hits.triangle < 0).sum()} of {many} escaped"
-            assert (hits.distance > 0.2).all() and not hits.front[2::3].any()
-            assert rays.any().all()
+    triangle = corners[rng.integers(len(corners), size=count)]
+    along = np.where(np.arange(count) % 3 == 0, rng.choice([0.0, 0.5, 0.25], count), rng.random(count))[:, None]
+    inside = np.where(np.arange(count) % 3 == 2, rng.random(count), 0.0)[:, None]
+    aim = triangle[:, 0] + along * (triangle[:, 1] - triangle[:, 0])
+    aim += inside * (triangle[:, 2] - aim)
+    origins = 0.3 * unit(rng, count).astype(np.float32)
+    directions = aim - origins
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    with batch(gpu, ball, origins, directions) as rays:
+        hits = rays.closest()
+        assert (hits.triangle >= 0).all(), f"{(hits.triangle < 0).sum()} of {count} escaped"
+        assert (hits.distance > 0.2).all() and not hits.front[2::3].any()
+        assert rays.any().all()
 
 
 def cube(cells: int) -> tuple[F64, NDArray[np.int64]]:

@@ -48,7 +48,7 @@ def asked(gpu: Gpu, folder: Path) -> Callable[[], Desk]:
 
 def typed(desk: Desk, text: str) -> None:
     desk.ui.io.add_input_characters_utf8(text)
-    desk.frames(len(text) + 2)
+    desk.frames(3)
 
 
 def opened(desk: Desk) -> list[str]:

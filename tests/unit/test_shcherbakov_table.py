@@ -3,6 +3,7 @@ claims."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ from app.scene.model import Scene
 from app.session.batch import opened
 from app.solvers.local.options import LocalOptions
 from app.solvers.local.solver import Local
+from app.util import cache
 from app.util.tables import Row
 
 SIZE, STEPS, EVERY = 64, 4, 2
@@ -46,8 +48,22 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return load_authored(written(tmp_path_factory.mktemp("village"), "village.toml", text))
 
 
+@pytest.fixture(scope="module", autouse=True)
+def charts_are_kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """The village is opened by nearly every test, and unfolded by the first."""
+    with pytest.MonkeyPatch.context() as patch, cache.elsewhere(tmp_path_factory.mktemp("cache")):
+        patch.setattr("app.atlas.charts_cache.FEWEST", 0)
+        yield
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is left out because it takes long, however busy the machine is."""
+    monkeypatch.setattr(shcherbakov, "LONGEST", 1e9)
+
+
 def test_light_from_outside_as_its_mean_is_a_row_of_its_own(gpu: Gpu, small: Scene) -> None:
-    row = shcherbakov.measure_row(gpu, 0.1, SIZE, "inverse", small, steps=STEPS, every=EVERY, outside="constant")
+    row = shcherbakov.measure_row(gpu, 0.02, SIZE, "inverse", small, steps=STEPS, every=EVERY, outside="constant")
     assert row["bounces"] == "inverse, constant outside" and row["picture"] >= 0
     assert "update_ms" not in row
 
@@ -55,7 +71,7 @@ def test_light_from_outside_as_its_mean_is_a_row_of_its_own(gpu: Gpu, small: Sce
 @pytest.mark.parametrize("bounces", ["inverse", "iterate"])
 def test_a_row_is_measured(gpu: Gpu, small: Scene, bounces: str) -> None:
     """Small and short: that numbers come out and are of one order, not which."""
-    row = shcherbakov.measure_row(gpu, 0.5, SIZE, bounces, scene=small, steps=STEPS, every=EVERY)
+    row = shcherbakov.measure_row(gpu, 0.02, SIZE, bounces, scene=small, steps=STEPS, every=EVERY)
     assert row["walk"] == "4 steps, 2 compared" and row["patches"] > 10_000 and row["factors"] > row["patches"]
     assert row["matrix_mb"] == SIZE**2 * (8 if bounces == "inverse" else 2) / 2**20
     assert row["frame_ms"] == pytest.approx(row["lit_ms"] + row["swap_ms"])
@@ -67,7 +83,7 @@ def test_a_row_is_measured(gpu: Gpu, small: Scene, bounces: str) -> None:
 
 
 def test_all_patches_are_lit_anew(gpu: Gpu, small: Scene) -> None:
-    row = shcherbakov.measure_whole(gpu, 0.1, scene=small, rays=16)
+    row = shcherbakov.measure_whole(gpu, 0.02, scene=small, rays=16)
     assert row["bounces"] == "all, by kept hits of 16 rays"
     assert row["patches"] > 10_000 and row["light_ms"] > 0 and row["matrix_mb"] > 0
 
