@@ -41,14 +41,22 @@ APART = ("seams", "warnings")
 
 
 def charts_of(
-    scene: Scene, atlas: AtlasOptions, *, roots: bool = False, progress: Callable[[str, float], None] | None = None
+    scene: Scene,
+    atlas: AtlasOptions,
+    *,
+    roots: bool = False,
+    progress: Callable[[str, float], None] | None = None,
+    waiting: Callable[[], None] | None = None,
 ) -> tuple[Scene, Charts]:
-    """The scene, cut where its surfaces meet, and its charts; see ``cut_at_contacts`` and ``parametrize``."""
+    """The scene, cut where its surfaces meet, and its charts; see ``cut_at_contacts`` and ``parametrize``. waiting: is called
+    first where there are many triangles, whose charts are not kept."""
     if len(scene.triangles) < FEWEST:
         return _made(scene, atlas, roots, progress)
     file = cache.entry("charts", cache.digest(program(), _given(scene, atlas, roots)))
     found = _read(scene, cache.read(file))
     if found is None:
+        if waiting is not None:
+            waiting()
         found = _made(scene, atlas, roots, progress)
         if not found[1].warnings:
             cache.store(cache.content(_content(scene, *found)), file, CACHE_FILES)
@@ -59,8 +67,7 @@ def _made(
     scene: Scene, atlas: AtlasOptions, roots: bool, progress: Callable[[str, float], None] | None
 ) -> tuple[Scene, Charts]:
     report = progress or (lambda stage, share: None)
-    report("cutting where surfaces meet", 0.0)
-    cut = cut_at_contacts(scene)
+    cut = cut_at_contacts(scene, lambda share: report("cutting where surfaces meet", 0.15 * share))
     charts = parametrize(
         cut.scene,
         ends=cut.ends,

@@ -24,6 +24,7 @@ from scipy.spatial import cKDTree
 
 from app.atlas.sides import FLAT, FLAT_ANGLE, distinct_rows, facets, least, middle, most, scene_size, weld
 from app.scene.model import F64, I32, Scene
+from app.util.background import Report
 
 GAP = 0.05  # of a texel: what is no farther from a surface lies on it
 LEAST = 1e-9  # of a face, that a piece is: less is rounding
@@ -46,16 +47,16 @@ class Hidden:
 
 
 @dataclass(frozen=True, eq=False)
-class _Members:
+class Members:
     """The rows that bear each of some labels: of label k, ``order`` from ``first[k]`` up to ``first[k + 1]``."""
 
     order: I64
     first: I64
 
     @staticmethod
-    def of(label: I64) -> _Members:
+    def of(label: I64 | I32) -> Members:
         """label (n,): from 0, none missing."""
-        return _Members(np.argsort(label, kind="stable"), np.cumsum(np.append(0, np.bincount(label))))
+        return Members(np.argsort(label, kind="stable"), np.cumsum(np.append(0, np.bincount(label))))
 
     def __getitem__(self, label: int) -> I64:
         return self.order[self.first[label] : self.first[label + 1]]
@@ -67,7 +68,7 @@ class _Facets:
     (n, 3): their planes; least, most (n, 3): boxes around them; depth (n,): see _depths; scene: how many are the scene's."""
 
     corners: F64
-    members: _Members
+    members: Members
     normal: F64
     point: F64
     least: F64
@@ -92,7 +93,7 @@ class _Facets:
         first = np.flatnonzero(np.diff(facet[order], prepend=-1))
         return _Facets(
             corners,
-            _Members(order, np.append(first, len(order))),
+            Members(order, np.append(first, len(order))),
             normals[order[first]],
             corners[order[first], 0],
             np.minimum.reduceat(least(corners)[order], first),
@@ -111,21 +112,26 @@ def hidden_pieces(
     face_back: NDArray[np.bool_],
     face_uv: F64,
     density: float,
+    report: Report | None = None,
 ) -> Hidden:
     """points (n, 3), triangles (m, 3): welded; facet (m,) of them; face_triangle (f,), face_back (f,), face_uv (f, 3, 2): sides
-    in the atlas; density [texels/m]."""
+    in the atlas; density [texels/m]. report(share) is called now and then and may raise to cancel."""
+    tell = report or (lambda share: None)
+    tell(0.0)
     flat = FLAT * scene_size(scene)
     within = max(GAP / density, flat)
     two = np.array([m.double_sided for m in scene.materials])[scene.material_ids]
     all_ = _Facets.of(points - points.min(0), triangles, facet, two, flat)
+    tell(0.3)
     sides, side = np.unique(2 * facet[face_triangle].astype(np.int64) + face_back, return_inverse=True)
-    faces_of = _Members.of(side.reshape(-1))
+    faces_of = Members.of(side.reshape(-1))
     own, up = sides // 2, all_.normal[sides // 2] * np.where(sides % 2 == 1, -1.0, 1.0)[:, None]
-    lids, left_out = _lids(all_, own, up, within, flat)
+    lids, left_out = _lids(all_, own, up, within, flat, tell)
     pieces, owners = [np.empty((0, 3, 2))], [np.empty(0, np.int64)]
     sheer = np.zeros(len(all_.normal), bool)  # nothing that is not opaque hides what it lies on
     sheer[facet] = ~np.array([m.opaque for m in scene.materials])[scene.material_ids]
-    for one, those in lids:
+    for nth, (one, those) in enumerate(lids):
+        tell(0.6 + 0.4 * nth / len(lids))
         lid = those[~sheer[those]]
         if not len(lid):
             continue
@@ -145,7 +151,7 @@ def covers(
     planes. points (n, 3) from their least, triangles (m, 3): welded; facet (m,) of them, whether they have two sides (m,)."""
     all_ = _Facets.of(points, triangles, facet, double_sided, flat)
     up = all_.normal[own]
-    lids, _ = _lids(all_, np.tile(own, 2), np.concatenate([up, -up]), flat, flat)
+    lids, _ = _lids(all_, np.tile(own, 2), np.concatenate([up, -up]), flat, flat, lambda share: None)
     found: tuple[dict[int, shapely.Geometry], dict[int, shapely.Geometry]] = {}, {}
     for one, lid in lids:
         back, nth = divmod(one, len(own))
@@ -176,7 +182,9 @@ def inside_triangles(triangles: F64, points: F64) -> NDArray[np.bool_]:
     return np.asarray((turns >= 0).all(-1) | (turns <= 0).all(-1))
 
 
-def _lids(all_: _Facets, own: I64, up: F64, within: float, flat: float) -> tuple[list[tuple[int, I64]], int]:
+def _lids(
+    all_: _Facets, own: I64, up: F64, within: float, flat: float, report: Report
+) -> tuple[list[tuple[int, I64]], int]:
     """Sides that something may lie on, and the facets that do; how many were left out. own, up: facet and normal of each side."""
     ends = np.flatnonzero(all_.depth > 2 * within)  # else of one thin body
     sheets = np.arange(all_.scene)
@@ -188,11 +196,13 @@ def _lids(all_: _Facets, own: I64, up: F64, within: float, flat: float) -> tuple
     planes = np.column_stack([up, (up * all_.point[own]).sum(1)]) / units
     tree = cKDTree(lid_planes)
     count = tree.query_ball_point(planes, 1.0, return_length=True, workers=-1)
+    report(0.4)
     few = np.flatnonzero((count > 1) & (count <= MOST_NEAR))  # one is the side's own facet
     near = tree.query_ball_point(planes[few], 1.0, workers=-1)
     side, lid = np.repeat(few, count[few]), np.fromiter(itertools.chain.from_iterable(near), np.int64, count[few].sum())
+    report(0.5)
     crowded = np.flatnonzero(count > MOST_NEAR)
-    there, those = _boxes_that_meet(all_, own[crowded], lids, np.abs(up[crowded]).argmax(1), within)
+    there, those = _boxes_that_meet(all_, own[crowded], lids, np.abs(up[crowded]).argmax(1), within, report)
     left_out = len(crowded) if len(there) > MOST_MEET else 0
     if not left_out:
         one_plane = ((planes[crowded[there]] - lid_planes[those]) ** 2).sum(1) <= 1
@@ -208,7 +218,7 @@ def _lids(all_: _Facets, own: I64, up: F64, within: float, flat: float) -> tuple
     return list(zip(side[starts].tolist(), np.split(other, starts[1:]), strict=True)) if len(side) else [], left_out
 
 
-def _boxes_that_meet(all_: _Facets, own: I64, lids: I64, axis: I64, within: float) -> tuple[I64, I64]:
+def _boxes_that_meet(all_: _Facets, own: I64, lids: I64, axis: I64, within: float, report: Report) -> tuple[I64, I64]:
     """Pairs of sides and lids, the number of each, whose boxes meet as seen along the axis of the side, in the order of sides; no
     more than MOST_MEET, and one block."""
     sides, others = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
@@ -218,6 +228,7 @@ def _boxes_that_meet(all_: _Facets, own: I64, lids: I64, axis: I64, within: floa
         tree = shapely.STRtree(shapely.box(*low[lids].T, *high[lids].T))
         mine = np.flatnonzero(axis == k)
         for first in range(0, len(mine), 64):
+            report(0.5)
             block = mine[first : first + 64]
             side, lid = tree.query(shapely.box(*low[own[block]].T, *high[own[block]].T))
             sides.append(block[side])

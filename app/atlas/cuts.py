@@ -19,11 +19,12 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from app.atlas.contacts import covers
+from app.atlas.contacts import Members, covers
 from app.atlas.intersections import NEAR, Contacts, contacts, surfaces
 from app.atlas.sides import FLAT, distinct_rows, facets, scene_size, weld
 from app.scene.model import F32, F64, I32, Scene
 from app.scene.validate import has_area
+from app.util.background import Report
 
 MOST_PIECES = 4096  # that are parted, beyond which none is: each takes a millisecond
 MOST_ENDS = 64  # of feet in one flat piece, that are drawn on: those of grass are not
@@ -88,12 +89,17 @@ class _Nodes:
         return np.asarray(self.places[number] if number < count else self.new[number - count])
 
 
-def cut_at_contacts(scene: Scene) -> Cut:
-    """The scene with its triangles cut where others meet them; as it is where none does."""
+def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
+    """The scene with its triangles cut where others meet them; as it is where none does. report(share) is called now and then and
+    may raise to cancel."""
+    tell = report or (lambda share: None)
+    tell(0.0)
     points, corners = weld(scene)
+    tell(0.1)
     size, origin = scene_size(scene), points.min(0)
     places = (points - origin) / size
-    found, crowded = contacts(places[corners], surfaces(corners))
+    found, crowded = contacts(places[corners], surfaces(corners), lambda share: tell(0.1 + 0.4 * share))
+    tell(0.5)
     facet = np.zeros(len(corners), np.int32)
     if len(found.triangle):
         facet = facets(points, corners, scene.material_ids, size)
@@ -104,7 +110,7 @@ def cut_at_contacts(scene: Scene) -> Cut:
     if crowded or len(np.unique(facet[found.triangle])) > MOST_PIECES:
         notes.append("too many surfaces meet to cut them all: charts do not end where they do")
     elif len(found.triangle):
-        pieces, loose = _parted_pieces(scene, places, corners, facet, found)
+        pieces, loose = _parted_pieces(scene, places, corners, facet, found, lambda share: tell(0.5 + 0.4 * share))
     if loose:
         notes.append(f"{loose} thin things end on surfaces that thousands share: charts do not end where they stand")
     if notes:
@@ -113,6 +119,7 @@ def cut_at_contacts(scene: Scene) -> Cut:
         return Cut(scene, None)
     nodes = _Nodes(places)
     for piece in pieces:
+        tell(0.9)
         _add_border_nodes(nodes, piece, corners)
     sheet = _Sheet.of(list(_with_neighbours(nodes, pieces, places, corners, facet)))
     return _joined(scene, nodes, corners, _cut(nodes, sheet, corners), origin, size)
@@ -121,14 +128,17 @@ def cut_at_contacts(scene: Scene) -> Cut:
 # -- what parts a flat piece -------------------------------------------------------------------------------------------
 
 
-def _parted_pieces(scene: Scene, places: F64, corners: I32, facet: I32, found: Contacts) -> tuple[list[_Piece], int]:
+def _parted_pieces(
+    scene: Scene, places: F64, corners: I32, facet: I32, found: Contacts, report: Report
+) -> tuple[list[_Piece], int]:
     """The flat pieces that contacts part; how many of these lead nowhere."""
     triangles = places[corners]
-    members = np.split(np.argsort(facet, kind="stable"), np.cumsum(np.bincount(facet))[:-1])
+    members = Members.of(facet)
     owner = facet[found.triangle]
     order = np.argsort(owner, kind="stable")
     pieces: list[tuple[_Piece, Contacts]] = []
     for mine in np.split(order, np.flatnonzero(np.diff(owner[order])) + 1):
+        report(0.5 * len(pieces) / MOST_PIECES)
         piece = _piece(triangles, members[owner[mine[0]]])
         lines = shapely.linestrings(found.ends[mine] @ piece.axes)
         inside = shapely.length(shapely.difference(lines, shapely.buffer(piece.border, NEAR))) > NEAR
@@ -142,6 +152,7 @@ def _parted_pieces(scene: Scene, places: F64, corners: I32, facet: I32, found: C
     hidden = covers(places, corners, facet, scene.sides, own, axes, FLAT)
     out, left = [], 0
     for nth, (piece, there) in enumerate(pieces):
+        report(0.5 + 0.5 * nth / len(pieces))
         flat = there.ends @ piece.axes
         lines = shapely.linestrings(flat)
         kept = np.zeros(len(flat), bool)

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from app.atlas.sides import FLAT, FLAT_ANGLE, least, most
 from app.scene.model import F64, I32
+from app.util.background import Report
 
 NEAR = 4 * FLAT  # what is no farther apart is in one place
 MOST_PAIRS = 1 << 24  # of triangles whose boxes meet, beyond which none is looked at: soups of loose triangles
@@ -54,17 +55,19 @@ def surfaces(triangles: I32) -> I64:
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def contacts(corners: F64, surface: I64) -> tuple[Contacts, bool]:
-    """Where triangles (m, 3, 3) of different surfaces meet; whether there are too many to say."""
+def contacts(corners: F64, surface: I64, report: Report) -> tuple[Contacts, bool]:
+    """Where triangles (m, 3, 3) of different surfaces meet; whether there are too many to say. report(share) is called for each
+    block, and may raise."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
     found = [Contacts(np.empty(0, np.int64), np.empty((0, 2, 3)), np.empty(0, bool), np.empty(0, bool))]
     pairs = 0
-    for one, other in _pairs_that_meet(least(corners) - FLAT, most(corners) + FLAT, surface):
+    for one, other in _pairs_that_meet(least(corners) - FLAT, most(corners) + FLAT, surface, report):
         pairs += len(one)
         if pairs > MOST_PAIRS:
             return found[0], True
         for first in range(0, len(one), BLOCK):
+            report(0.5 + 0.5 * pairs / MOST_PAIRS)
             block = slice(first, first + BLOCK)
             found += _meeting(corners, normals, one[block], other[block])
     return Contacts(
@@ -72,7 +75,7 @@ def contacts(corners: F64, surface: I64) -> tuple[Contacts, bool]:
     ), False
 
 
-def _pairs_that_meet(low: F64, high: F64, surface: I64) -> Iterator[tuple[I64, I64]]:
+def _pairs_that_meet(low: F64, high: F64, surface: I64, report: Report) -> Iterator[tuple[I64, I64]]:
     """Pairs of triangles of different surfaces whose boxes meet, in blocks."""
     order = np.argsort(surface, kind="stable")
     first = np.flatnonzero(np.diff(surface[order], prepend=-1))
@@ -84,6 +87,7 @@ def _pairs_that_meet(low: F64, high: F64, surface: I64) -> Iterator[tuple[I64, I
     whole = shapely.STRtree(shapely.box(lows[:, x], lows[:, y], highs[:, x], highs[:, y]))
     near, beside = [], []
     for start in range(0, len(low), BLOCK):
+        report(0.5 * start / len(low))
         one, other = whole.query(boxes[start : start + BLOCK])
         one = one + start
         meets = (surface[one] != other) & (low[one, z] <= highs[other, z]) & (high[one, z] >= lows[other, z])

@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from app.atlas.charts import ALIGN, GAP
 from app.errors import UserError
 from app.scene.model import F64, I32
+from app.util.background import Report
 
 MAX_SIDE = 16384  # texels: the least maximum texture size of desktop hardware with OpenGL 4.1
 FILL = 0.9  # share of the atlas that outlines usually fill; only sets the aspect
 ASPECTS = (1.0, 0.9, 1.1, 0.85, 1.15, 0.95, 1.05, 0.8, 1.2, 0.75, 1.25, 0.7, 1.3)  # widths to try, against a square
 SMALL = 6  # blocks of ALIGN texels: charts within so many a side go where larger ones leave room
 DROPS = 6000  # charts dropped in all these tries
+OFTEN = 256  # charts dropped between two reports
 
 I64 = NDArray[np.int64]
 
@@ -78,10 +80,11 @@ def outlines(uv: F64, chart: I64, count: int) -> Outlines:
     return Outlines(starts, np.maximum(solid, 1), bottom, top)
 
 
-def pack(shapes: Outlines, tile: int) -> tuple[I32, tuple[int, int]]:
+def pack(shapes: Outlines, tile: int, report: Report | None = None) -> tuple[I32, tuple[int, int]]:
     """Origins (c, 2) i32 of the charts [texels] and the atlas's size (W, H), multiples of ``tile``.
 
-    Several widths are tried, fewer the more charts there are; the smallest atlas wins.
+    Several widths are tried, fewer the more charts there are; the smallest atlas wins. report(share) is called now and then and
+    may raise to cancel.
     Raises UserError when a side would be longer than MAX_SIDE.
     """
     columns = np.diff(shapes.starts)
@@ -89,7 +92,14 @@ def pack(shapes: Outlines, tile: int) -> tuple[I32, tuple[int, int]]:
     least = int(shapes.solid.max()) * ALIGN
     tries = int(np.clip(DROPS // len(columns), 1, len(ASPECTS)))
     widths = {_round_up(max(np.sqrt(total / FILL) * aspect, least), tile) for aspect in ASPECTS[:tries]}
-    packed = [(_pack_across(shapes, width, tile), width) for width in sorted(widths)]
+    tell = report or (lambda share: None)
+    packed = []
+    for k, width in enumerate(sorted(widths)):
+
+        def telling(share: float, k: int = k) -> None:
+            tell((k + share) / len(widths))
+
+        packed.append((_pack_across(shapes, width, tile, telling), width))
     (origins, down), across = min(packed, key=lambda p: p[0][1] * p[1])
     if max(across, down) > MAX_SIDE:
         raise UserError(
@@ -98,7 +108,7 @@ def pack(shapes: Outlines, tile: int) -> tuple[I32, tuple[int, int]]:
     return origins.astype(np.int32), (across, down)
 
 
-def _pack_across(shapes: Outlines, across: int, tile: int) -> tuple[I64, int]:
+def _pack_across(shapes: Outlines, across: int, tile: int, report: Report) -> tuple[I64, int]:
     """Origins (c, 2) in an atlas of this width, and the height that takes."""
     starts, bottom, top = shapes.starts, shapes.bottom, shapes.top
     columns = np.diff(starts)
@@ -108,7 +118,10 @@ def _pack_across(shapes: Outlines, across: int, tile: int) -> tuple[I64, int]:
     origins = np.empty((len(columns), 2), np.int64)
 
     def drop(charts: I64) -> None:
-        for c in charts[np.lexsort((-columns[charts], -height[charts]))]:
+        before = len(columns) - len(charts) if charts is not large else 0
+        for nth, c in enumerate(charts[np.lexsort((-columns[charts], -height[charts]))].tolist(), before):
+            if nth % OFTEN == 0:
+                report(nth / len(columns))
             run = slice(starts[c], starts[c + 1])
             x, y = _drop(skyline, bottom[run], across // ALIGN - int(shapes.solid[c]) + 1)
             origins[c] = x * ALIGN, y

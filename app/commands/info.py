@@ -1,7 +1,7 @@
 """``glowtree info``: what a scene holds and what solving it would take, before any light is shot; quadtrees as they begin.
 
-Small scenes are unfolded to count. Of larger ones texels, memory and time are estimates, said to be such, and large glTF files
-are not even put together: the answer comes at once, whatever the scene.
+Small scenes are unfolded to count. Of larger ones texels, memory and time are estimates, said to be such, and large files are not
+even read whole: the answer comes at once, whatever the scene.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ from app.lightmap.options import STORAGE, LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import TABLE_WIDTH
 from app.options import from_flags
-from app.scene.authored import MESH_LOADERS
-from app.scene.gltf import load_gltf, outline_gltf
+from app.scene.gltf import outline_gltf
 from app.scene.load import NO_LIGHT, load_scene, scene_file
+from app.scene.mesh_outline import outline_mesh
 from app.scene.model import Scene
-from app.scene.options import FileOptions
+from app.scene.options import PHOTOMETRIC, FileOptions
+from app.scene.orientation import outline_oriented
 from app.scene.outline import Outline
 from app.session.loading import read_and_unfold
-from app.util.background import Progress
+from app.util.background import Progress, Report
 from app.util.console import Console
 
 SURFACE_BYTES = 24  # per texel: position and area, normal and ids
@@ -37,7 +38,11 @@ PAGE_BYTES = 4  # per cell of tile×tile texels of the atlas
 
 
 COUNTED = 8192  # triangles, up to which unfolding takes a moment
-READ = 500_000  # triangles of a glTF file, up to which reading does
+# By suffix, what tells of a file at once what it holds, and triangles up to which it is read and put together nevertheless
+OUTLINES = {
+    **dict.fromkeys((".glb", ".gltf"), (outline_gltf, 500_000)),
+    **dict.fromkeys((".obj", ".ply", ".stl"), (outline_mesh, 100_000)),
+}
 TILE_SHARE = 1.6  # texels of tiles for each one that covers a surface: 1.2 in a box, 1.2 to 2.5 in furnished rooms, 3.4 of voxels
 SECONDS = 4e-5, 2e-6  # for each triangle and texel, on two cores of 2020
 
@@ -48,7 +53,7 @@ def info(flags: argparse.Namespace) -> int:
     with console.progress("reading") as tell:
         atlas, light = from_flags(AtlasOptions, flags), from_flags(LightmapOptions, flags)
         check(atlas.density, atlas.texels)
-        found = _found(flags)
+        found = _found(flags, lambda share: tell("reading", share))
         outline = found if isinstance(found, Outline) else Outline.of(found)
         values: dict[str, Any] = {
             "scene": outline.name,
@@ -78,17 +83,20 @@ def info(flags: argparse.Namespace) -> int:
     return 0
 
 
-def _found(flags: argparse.Namespace) -> Scene | Outline:
-    """The scene, or of a large glTF file, in its own unit and axes, only its outline."""
+def _found(flags: argparse.Namespace, report: Report) -> Scene | Outline:
+    """The scene, or of a large file only its outline."""
     file, sky = from_flags(FileOptions, flags), sky_of(flags)
     path = scene_file(flags.scene)
-    if MESH_LOADERS.get(path.suffix.lower()) is load_gltf and file == FileOptions():
-        outline = outline_gltf(path, READ)
+    suffix = path.suffix.lower()
+    if suffix in OUTLINES and file.light_units == PHOTOMETRIC:
+        of, most = OUTLINES[suffix]
+        outline = of(path, most)
         if outline is not None:
+            outline = outline_oriented(outline, suffix, file)
             lit = outline.emitting_materials or outline.lights or sky or flags.light
             warnings = outline.warnings if lit else (*outline.warnings, NO_LIGHT)
             return dataclasses.replace(outline, sky=sky.kind if sky else None, warnings=warnings)
-    return load_scene(flags.scene, file, default_light=flags.light, sky=sky)
+    return load_scene(flags.scene, file, default_light=flags.light, sky=sky, report=report)
 
 
 def _counts(

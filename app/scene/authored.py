@@ -59,6 +59,7 @@ from app.scene.sky import LEAST_TURBIDITY, MOST_TURBIDITY, TURBIDITY, Sky, SkyKi
 from app.scene.sky_image import SUFFIXES, read_sky_image
 from app.scene.sun_position import sun_at
 from app.scene.validate import Part, validate
+from app.util.background import Report, share_of, unheard
 
 MESH_LOADERS = {
     ".glb": load_gltf,
@@ -281,8 +282,9 @@ class SceneFile(Table):
 
 
 @np.errstate(all="ignore")
-def load_authored(path: Path) -> Scene:
-    """Read a .toml scene. SceneError names the file, the key and the reason."""
+def load_authored(path: Path, report: Report = unheard) -> Scene:
+    """Read a .toml scene. report(share) is called now and then and may raise to cancel. SceneError names the file, the key and
+    the reason."""
     try:
         table = SceneFile.model_validate(tomllib.loads(path.read_text("utf-8")))
     except OSError as error:
@@ -291,7 +293,7 @@ def load_authored(path: Path) -> Scene:
         raise SceneError(path, first_problem(error)) from error
     except (ValueError, RecursionError) as error:  # not TOML, or not UTF-8
         raise SceneError(path, f"not TOML: {' '.join(str(error).split())}") from error
-    return _Builder(path, table).scene()
+    return _Builder(path, table).scene(report)
 
 
 class _Builder:
@@ -311,7 +313,7 @@ class _Builder:
         if len(self.ids) < len(table.material):
             raise SceneError(path, "material: two materials have the same name")
 
-    def scene(self) -> Scene:
+    def scene(self, report: Report) -> Scene:
         for i, quad in enumerate(self.table.quad):
             self._add(quad.name or f"quad {i + 1}", self._id(quad.material, f"quad.{i}"), quad.mesh())
         for i, box in enumerate(self.table.box):
@@ -320,15 +322,15 @@ class _Builder:
             for name, material, mesh in generator.pieces():
                 self._add(name, self._id(material, f"procedural.{i}"), mesh)
         for i, mesh_table in enumerate(self.table.mesh):
-            self._add_file(mesh_table, f"mesh.{i}")
+            files = len(self.table.mesh)
+            self._add_file(mesh_table, f"mesh.{i}", share_of(report, 0.5 * i / files, 0.5 * (i + 1) / files))
         for camera in self.table.camera:
             eye, target = (self.unit * np.array(p) for p in (camera.position, camera.target))
             self.cameras.append(Camera(camera.name, look_at(eye, target), math.radians(camera.yfov_deg)))
         self.lights += [self._light(i, light) for i, light in enumerate(self.table.light)]
         name = self.table.scene.name or self.path.stem
-        scene = validate(
-            self.path, name, self.parts, self.objects, self.materials, self.cameras, self.warnings, self.lights
-        )
+        given = self.parts, self.objects, self.materials, self.cameras, self.warnings, self.lights
+        scene = validate(self.path, name, *given, share_of(report, 0.5, 1.0))
         return scene if self.table.sky is None else scene.with_sky(self._sky(self.table.sky))
 
     def _id(self, material: str, where: str) -> int:
@@ -405,7 +407,7 @@ class _Builder:
         self.parts.append(Part(mesh.positions * self.unit, mesh.triangles, len(self.objects), material, uv0=mesh.uv))
         self.objects.append(name)
 
-    def _add_file(self, table: MeshTable, where: str) -> None:
+    def _add_file(self, table: MeshTable, where: str, report: Report) -> None:
         """A mesh file's triangles with their own materials, or all with the one that is named."""
         found = path_inside(self.path.parent, table.file)
         if found is None:
@@ -413,7 +415,7 @@ class _Builder:
         if found.suffix.lower() not in MESH_LOADERS:
             allowed = ", ".join(MESH_LOADERS)
             raise SceneError(self.path, f"{where}.file: '{table.file}' is none of {allowed}")
-        part = MESH_LOADERS[found.suffix.lower()](found)
+        part = MESH_LOADERS[found.suffix.lower()](found, report)
         matrix = shapes.transform(np.array(table.translate) * self.unit, table.rotate, table.scale)
         unit = self.unit if found.suffix.lower() in WITHOUT_UNIT else 1.0
         positions = unit * part.positions @ matrix[:3, :3].T + matrix[:3, 3]

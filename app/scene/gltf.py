@@ -27,6 +27,7 @@ from app.scene.lights import LUMENS_PER_WATT, Light
 from app.scene.model import F64, Camera, Material, Scene
 from app.scene.outline import Outline, colour_textures
 from app.scene.validate import Part, check_triangle_count, counted, validate
+from app.util.background import Report, share_of, unheard
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 VALUES = {"TEXCOORD_0": ("VEC2",), "TEXCOORD_1": ("VEC2",), "NORMAL": ("VEC3",), "COLOR_0": ("VEC3", "VEC4")}
@@ -67,14 +68,18 @@ class Placed:
 
 
 @np.errstate(all="ignore")
-def load_gltf(path: Path) -> Scene:
-    """Read a .glb or .gltf file. SceneError for anything that makes it unusable."""
+def load_gltf(path: Path, report: Report = unheard) -> Scene:
+    """Read a .glb or .gltf file. report(share) is called now and then and may raise to cancel. SceneError for anything that makes
+    it unusable."""
     reader = GltfReader(GltfFile(path))
-    reader.walk()
+    reader.walk(share_of(report, 0.0, 0.4))
     materials, notes = reader.read_materials()
-    parts = [part_of(placed) for placed in reader.placed]
-    notes = [*reader.warnings(), *notes]
-    return validate(path, path.stem, parts, reader.objects, materials, reader.cameras, notes, reader.lights)
+    parts = []
+    for nth, placed in enumerate(reader.placed):
+        report(0.5 + 0.1 * nth / len(reader.placed))
+        parts.append(part_of(placed))
+    notes, objects, rest = [*reader.warnings(), *notes], reader.objects, share_of(report, 0.6, 1.0)
+    return validate(path, path.stem, parts, objects, materials, reader.cameras, notes, reader.lights, rest)
 
 
 @np.errstate(all="ignore")
@@ -142,8 +147,8 @@ class GltfReader:
             materials.append(Material("no material", UNKNOWN_ALBEDO))
         return materials, notes
 
-    def walk(self) -> None:
-        """Visit every node of the default scene once, parents first."""
+    def walk(self, report: Report = unheard) -> None:
+        """Visit every node of the default scene once, parents first. report: as of ``load_gltf``."""
         document, nodes = self.file.document, self.file.document.nodes
         if document.scenes:
             roots = self.file.pick(document.scenes, document.scene, "scene").nodes
@@ -160,7 +165,8 @@ class GltfReader:
                 raise self.file.error(f"node {index} is reached twice: the nodes form a cycle, or it has two parents")
             self.nodes[index] = world_from_parent @ _parent_from_node(node)
             stack.extend((child, self.nodes[index]) for child in reversed(node.children))
-        for index, world_from_node in self.nodes.items():
+        for nth, (index, world_from_node) in enumerate(self.nodes.items()):
+            report(nth / len(self.nodes))
             self._visit(index, nodes[index], world_from_node)
 
     def _visit(self, index: int, node: Node, world_from_node: F64) -> None:

@@ -18,6 +18,7 @@ from app.scene.options import PHOTOMETRIC, FileOptions
 from app.scene.orientation import oriented
 from app.scene.sky import Sky
 from app.scene.validate import one_line
+from app.util.background import Report, unheard
 
 LOADERS = {**MESH_LOADERS, ".toml": load_authored}
 OWN_SKY = "the scene has a sky of its own: --sky and --sun are for scenes that have none"
@@ -25,19 +26,24 @@ NO_LIGHT = "nothing in the scene emits light: --light adds a ceiling light, --sk
 
 
 def load_scene(
-    source: str | Path, file: FileOptions | None = None, *, default_light: bool = False, sky: Sky | None = None
+    source: str | Path,
+    file: FileOptions | None = None,
+    *,
+    default_light: bool = False,
+    sky: Sky | None = None,
+    report: Report = unheard,
 ) -> Scene:
     """The Scene behind a name of ``scenes/`` or a file, with at least one camera.
 
     file: its unit and axes, guessed if None. sky: of a scene that has none. A scene without emitter gets ``with_ceiling_light``
-    if ``default_light`` is set, else a warning that says so.
+    if ``default_light`` is set, else a warning that says so. report(share) is called now and then and may raise to cancel.
     SceneError if there is no such file, its format is unknown or its content unusable.
     """
     path = scene_file(source)
     try:
         suffix = path.suffix.lower()
         file = file or FileOptions()
-        scene = _with_light_units(oriented(LOADERS[suffix](path), suffix, file), suffix, file.light_units)
+        scene = _with_light_units(oriented(LOADERS[suffix](path, report), suffix, file), suffix, file.light_units)
     except SceneError as error:  # its reason may quote the file, line breaks and all
         raise SceneError(error.source, one_line(error.reason)) from error
     if not scene.cameras:

@@ -19,21 +19,25 @@ from app.scene.images import linear_from_srgb
 from app.scene.model import F32, Material, Scene
 from app.scene.obj import load_obj
 from app.scene.validate import Part, validate
+from app.util.background import Report, share_of, unheard
 
 TEXTURE_LINE, HEADER_BYTES = b"comment TextureFile", 4096
 PICTURE = "its picture is ignored: of a PLY file, only the colours of vertices and faces are read"
 
 
 @np.errstate(all="ignore")
-def load_meshfile(path: Path) -> Scene:
-    """Read an .obj, .ply or .stl file. SceneError for anything that makes it unusable."""
+def load_meshfile(path: Path, report: Report = unheard) -> Scene:
+    """Read an .obj, .ply or .stl file. report(share) is called now and then and may raise to cancel. SceneError for anything that
+    makes it unusable."""
     if path.suffix.lower() == ".obj":
-        return load_obj(path)
+        return load_obj(path, report)
+    report(0.0)
     try:
         data = path.read_bytes()
     except OSError as error:
         raise SceneError(path, f"cannot be read: {error.strerror}") from error
     meshes = _read(path, data)
+    report(0.4)
     parts = [
         Part(np.asarray(m.vertices, np.float64), np.asarray(m.faces, np.int64), colours=_colours(m)) for m in meshes
     ]
@@ -42,7 +46,8 @@ def load_meshfile(path: Path) -> Scene:
     else:
         material = Material("grey", double_sided=True)
     notes = [PICTURE] if TEXTURE_LINE in data[:HEADER_BYTES] else []
-    return validate(path, path.stem, parts, [path.stem], [material], warnings=notes)
+    rest = share_of(report, 0.5, 1.0)
+    return validate(path, path.stem, parts, [path.stem], [material], warnings=notes, report=rest)
 
 
 def _read(path: Path, data: bytes) -> list[trimesh.Trimesh]:

@@ -19,9 +19,11 @@ from app.scene.images import linear_from_srgb
 from app.scene.model import F64, Scene
 from app.scene.mtl import read_materials, unquoted
 from app.scene.validate import Part, check_triangle_count, validate
+from app.util.background import Report, share_of, unheard
 
 KINDS = {"v": 3, "vt": 2, "vn": 3}  # numbers per line that are used
 NAMED = ("o", "g", "usemtl", "mtllib")
+OFTEN = 1 << 14  # lines between two reports
 
 
 @dataclass
@@ -39,14 +41,16 @@ class _Mesh:
     libraries: list[str] = field(default_factory=list)
 
 
-def load_obj(path: Path) -> Scene:
-    """Read an .obj file with its .mtl files. SceneError for anything that makes it unusable."""
+def load_obj(path: Path, report: Report = unheard) -> Scene:
+    """Read an .obj file with its .mtl files. report: as of ``load_meshfile``. SceneError for anything that makes it unusable."""
     try:
         text = path.read_text("utf-8-sig", errors="replace")
     except OSError as error:
         raise SceneError(path, f"cannot be read: {error.strerror}") from error
-    mesh = _read_lines(path, text)
+    mesh = _read_lines(path, text, share_of(report, 0.0, 0.5))
+    report(0.5)
     corners = _corner_indices(path, mesh)
+    report(0.6)
     fans = np.array(mesh.fans, np.int64)
     object_ids, material_ids = (
         np.repeat(np.array(ids, np.int64), fans) for ids in (mesh.object_ids, mesh.material_ids)
@@ -81,13 +85,17 @@ def load_obj(path: Path) -> Scene:
         normals=values["vn"],
         colours=_colours(mesh),
     )
-    return validate(path, path.stem, [part], list(mesh.objects), materials, (), notes)
+    rest = share_of(report, 0.7, 1.0)
+    return validate(path, path.stem, [part], list(mesh.objects), materials, (), notes, report=rest)
 
 
-def _read_lines(path: Path, text: str) -> _Mesh:
+def _read_lines(path: Path, text: str, report: Report) -> _Mesh:
     mesh = _Mesh()
     object_name, material_name = path.stem, ""
-    for number, line in enumerate(text.replace("\\\n", " ").splitlines(), 1):
+    lines = text.replace("\\\n", " ").splitlines()
+    for number, line in enumerate(lines, 1):
+        if number % OFTEN == 1:
+            report(number / len(lines))
         words = line.split("#", 1)[0].split()
         if not words:
             continue

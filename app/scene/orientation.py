@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import SceneError
-from app.scene.model import Scene
+from app.scene.model import F64, Scene
 from app.scene.options import GUESSED, UNITS, FileOptions
+from app.scene.outline import Outline
 
 WITHOUT_UNIT = {".obj", ".ply", ".stl"}  # formats that leave unit and axes open
 Z_UP = {".stl"}
@@ -35,8 +36,28 @@ def oriented(scene: Scene, suffix: str, options: FileOptions) -> Scene:
             if (asked := getattr(options, name)) != GUESSED:
                 raise SceneError(scene.source or scene.name, f"--{name} {asked}: a .toml scene says it itself")
         return scene
-    unit, up, notes = options.unit, options.up, []
-    low, high = scene.bounds
+    unit, up, notes = _found_axes(*scene.bounds, suffix, options)
+    placed = _placed(scene, UNITS[unit], FORMS[up]) if (unit, up) != ("m", "y") else scene
+    return dataclasses.replace(placed, warnings=(*notes, *placed.warnings)) if notes else placed
+
+
+def outline_oriented(outline: Outline, suffix: str, options: FileOptions) -> Outline:
+    """The outline of a file's content, as ``oriented`` would place that."""
+    unit, up, notes = _found_axes(outline.lower, outline.upper, suffix, options)
+    corners = UNITS[unit] * (np.stack([outline.lower, outline.upper]) @ FORMS[up].T)
+    return dataclasses.replace(
+        outline,
+        lower=corners.min(axis=0),
+        upper=corners.max(axis=0),
+        area=outline.area * UNITS[unit] ** 2,
+        texel_area=outline.texel_area * UNITS[unit] ** 2,
+        warnings=(*notes, *outline.warnings),
+    )
+
+
+def _found_axes(low: F64, high: F64, suffix: str, options: FileOptions) -> tuple[str, str, list[str]]:
+    """The unit and the axis that is up of what lies between two corners: those of ``options``, or guessed, which is said."""
+    unit, up, notes = options.unit, options.up, list[str]()
     size = high - low
     huge = THOUSANDS[0] <= size.min() and size.max() <= THOUSANDS[1] and size.min() >= CHUNKY * size.max()
     standing = (
@@ -51,8 +72,7 @@ def oriented(scene: Scene, suffix: str, options: FileOptions) -> Scene:
         if up != "y":
             why = "as programs write .stl files" if suffix in Z_UP else "since the scene stands on z = 0"
             notes.append(f"z is taken as up, {why}: --up says otherwise")
-    placed = _placed(scene, UNITS[unit], FORMS[up]) if (unit, up) != ("m", "y") else scene
-    return dataclasses.replace(placed, warnings=(*notes, *placed.warnings)) if notes else placed
+    return unit, up, notes
 
 
 def _placed(scene: Scene, scale: float, turn: NDArray[Any]) -> Scene:

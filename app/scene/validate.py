@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from app.errors import SceneError
 from app.scene.lights import Light
 from app.scene.model import F32, F64, MOST_ALBEDO, RGB, Camera, Material, Scene, Texture
+from app.util.background import Report, unheard
 
 MAX_TRIANGLES = 20_000_000
 EXTENT_RANGE = (1e-12, 1e12)  # m; outside of it areas leave the range of 32-bit floats by far
@@ -84,8 +85,10 @@ def validate(
     cameras: Sequence[Camera] = (),
     warnings: Iterable[str] = (),
     lights: Sequence[Light] = (),
+    report: Report = unheard,
 ) -> Scene:
     """Check, repair and join ``parts`` into a Scene. ``source`` names the file in errors; SceneError if unusable."""
+    report(0.0)
     notes = [one_line(w) for w in warnings]
     total = sum(len(p.triangles) for p in parts)
     check_triangle_count(source, total)
@@ -95,6 +98,7 @@ def validate(
         _check_part(source, part, len(objects), len(materials))
 
     positions, triangles = _join_geometry(source, parts)
+    report(0.2)
     keep = has_area(positions, triangles)
     kept = int(keep.sum())
     if kept == 0:
@@ -102,6 +106,7 @@ def validate(
     if kept < total:
         verb = "has no area and was" if total - kept == 1 else "have no area and were"
         notes.append(f"{total - kept} of {counted(total, 'triangle', 'triangles')} {verb} dropped")
+    report(0.4)
     double_sided = np.array([m.double_sided for m in materials], bool)
     again = repeated(positions, triangles, _join_ids([p.material_ids for p in parts], parts), double_sided) & keep
     if again.any():
@@ -109,6 +114,7 @@ def validate(
         notes.append(f"{counted(int(again.sum()), 'triangle', 'triangles')} {verb} dropped")
         keep &= ~again
 
+    report(0.6)
     triangles = triangles[keep]
     used = np.zeros(len(positions), bool)
     used[triangles] = True
@@ -119,6 +125,7 @@ def validate(
     checked_materials = _check_materials(source, materials, notes)
     material_ids = _join_ids([p.material_ids for p in parts], parts)[keep]
     material_ids, checked_materials = _drop_unmapped_textures(uvs, material_ids, checked_materials, notes)
+    report(0.8)
     checked_materials, colours = _hold_albedo(checked_materials, material_ids, colours, notes)
 
     scene = Scene(

@@ -9,7 +9,17 @@ from typing import Generic, TypeVar
 from app.errors import UserError
 
 Progress = Callable[[str, float], None]  # stage, share done
+Report = Callable[[float], None]  # share done; like a Progress, it may raise to cancel
 ResultT = TypeVar("ResultT")
+
+
+def unheard(share: float) -> None:
+    """A Report that nobody hears."""
+
+
+def share_of(report: Report, first: float, last: float) -> Report:
+    """That of a part of the work, from one share to another."""
+    return lambda share: report(first + (last - first) * share)
 
 
 class CancelledError(Exception):

@@ -101,3 +101,25 @@ def test_progress_goes_on_and_each_stage_can_be_the_last(scene: Scene) -> None:
     for k, last in enumerate(stages):
         with pytest.raises(CancelledError):
             charts_of(scene, ATLAS.replace(texels=3100 + k), progress=cancel_at(last))
+    for long in ("cutting where surfaces meet", "finding what lies on surfaces"):  # also within them
+        assert len([stage for stage, _ in told if stage == long]) >= 4
+
+
+def test_it_can_be_stopped_at_any_moment(scene: Scene) -> None:
+    """Whichever report is the first that raises, it is the last."""
+    told = 0
+
+    def stop_at(last: int) -> Callable[[str, float], None]:
+        def progress(stage: str, share: float) -> None:
+            nonlocal told
+            told += 1
+            if told == last:
+                raise CancelledError
+
+        return progress
+
+    for last in (1, 3, 5, 8, 12, 15):
+        told = 0
+        with pytest.raises(CancelledError):
+            charts_of(scene, ATLAS.replace(texels=3200 + last), progress=stop_at(last))
+        assert told == last

@@ -23,6 +23,7 @@ from scene_files import Gltf
 import app.commands.info as info_module
 from app.cli import run
 from app.scene import shapes
+from app.scene.gltf import outline_gltf
 from app.scene.load import load_scene
 
 ROOT = Path(__file__).parent.parent.parent
@@ -321,7 +322,7 @@ def test_info_of_a_large_scene_neither_unfolds_nor_places(
     area = 2 * whole.normals_areas[1].sum()
     assert told["texels"] == pytest.approx((3 * told["texels_per_metre"]) ** 2 * area)
     assert told["texels"] == pytest.approx(exact["texels"], rel=0.1)  # texels on the outlines of small rectangles
-    monkeypatch.setattr(info_module, "READ", 100)
+    monkeypatch.setitem(info_module.OUTLINES, ".glb", (outline_gltf, 100))
     monkeypatch.setattr(info_module, "load_scene", refuse)
     estimated = ["lit_sides", "texels_per_metre", "texels", "tiles", "memory_mib", "seconds_to_open"]
     assert told.pop("estimated") == estimated
@@ -412,6 +413,7 @@ glcontext.default_backend = no_screen
 import app.commands.info as info_module
 from app.cli import run
 from app.scene import shapes
+from app.scene.gltf import outline_gltf
 from app.scene.load import load_scene
 sys.exit(run(["doctor"]))
 """

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from scene_files import quad_gltf, written
 
 from app.errors import SceneError, UserError
@@ -19,6 +20,7 @@ from app.scene.load import NO_LIGHT, load_scene
 from app.scene.model import Camera, Material, Scene
 from app.scene.shapes import Mesh, box, icosphere, merged, quad
 from app.scene.validate import Part, validate
+from app.util.background import CancelledError, Report
 
 GREY = Material("grey")
 
@@ -223,3 +225,28 @@ def test_real_scene_loads(path: Path) -> None:
     scene = load_scene(path)
     normals, areas = scene.normals_areas
     assert len(scene.triangles) > 0 and np.isfinite(normals).all() and (areas > 0).all() and scene.cameras
+
+
+@pytest.mark.parametrize("name", ["a.obj", "a.glb", "a.ply", "a.stl", "a.toml"])
+def test_reading_says_how_far_it_is_and_ends_where_it_is_stopped(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.scene.obj.OFTEN", 16)
+    ball = icosphere(1.0, 2)
+    for kind in ("obj", "glb", "ply", "stl"):
+        trimesh.Trimesh(ball.positions, ball.triangles).export(tmp_path / f"a.{kind}")
+    (tmp_path / "a.toml").write_text('[[mesh]]\nfile = "a.obj"\n')
+    told: list[float] = []
+    load_scene(tmp_path / name, report=told.append)
+    assert told == sorted(told) and 0.0 <= told[0] < 0.1 and 0.8 < told[-1] <= 1.0 and len(told) > 4
+
+    def stop_at(last: float) -> Report:
+        def stop(share: float) -> None:
+            if share >= last:
+                raise CancelledError
+
+        return stop
+
+    for last in told[::3]:
+        with pytest.raises(CancelledError):
+            load_scene(tmp_path / name, report=stop_at(last))

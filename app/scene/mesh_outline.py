@@ -1,0 +1,274 @@
+"""What a large OBJ, PLY or STL file holds, about: its faces are counted by their lines or by its header, and area and extents
+are those of some of them. A file that is not as expected has no outline: whoever reads it whole says why."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.scene.meshfile import PICTURE, TEXTURE_LINE
+from app.scene.model import F64, Material
+from app.scene.mtl import read_materials, unquoted
+from app.scene.outline import Outline, colour_textures
+
+SOME = 4096  # faces and vertices that are looked at, of each
+BLOCK = 1 << 26  # bytes in work at a time
+LONGEST = 1 << 12  # bytes of a line, or of two facets in text
+HEADER_BYTES = 1 << 16  # of a PLY file
+STL_HEADER, STL_BYTES = 84, 50  # of a binary file, and of each of its triangles
+TYPES = {
+    **{name: "i1" for name in ("char", "int8")},
+    **{name: "u1" for name in ("uchar", "uint8")},
+    **{name: "i2" for name in ("short", "int16")},
+    **{name: "u2" for name in ("ushort", "uint16")},
+    **{name: "i4" for name in ("int", "int32")},
+    **{name: "u4" for name in ("uint", "uint32")},
+    **{name: "f4" for name in ("float", "float32")},
+    **{name: "f8" for name in ("double", "float64")},
+}
+GOLDEN = (5**0.5 - 1) / 2
+VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
+
+Bytes = NDArray[np.uint8]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """How many faces a file has, the corners (k, 3) of some of them, and some of its vertices (n, 3)."""
+
+    faces: int
+    rings: Sequence[F64]
+    points: F64
+
+    @property
+    def triangles(self) -> int:
+        corners = sum(max(len(ring) - 2, 0) for ring in self.rings)
+        return round(self.faces * corners / max(len(self.rings), 1))
+
+    def outline(
+        self, path: Path, materials: Sequence[Material], *, objects: int = 1, coloured: bool, warnings: Sequence[str]
+    ) -> Outline:
+        sums = [np.cross(ring[1:-1] - ring[0], ring[2:] - ring[0]).sum(axis=0) for ring in self.rings]
+        area = float(np.mean([np.linalg.norm(s) / 2 for s in sums])) * self.faces
+        points = np.concatenate([self.points, *self.rings])
+        return Outline(
+            name=path.stem,
+            triangles=self.triangles,
+            sides=2 * self.triangles,  # all materials of these formats have two
+            area=2 * area,
+            texel_area=2 * area,
+            lower=points.min(axis=0),
+            upper=points.max(axis=0),
+            objects=objects,
+            materials=len(materials),
+            emitting_materials=sum(m.emits for m in materials),
+            textures=colour_textures(materials, coloured=coloured),
+            lights=(),
+            cameras=(),
+            sky=None,
+            warnings=tuple(warnings),
+            exact=False,
+        )
+
+
+def outline_mesh(path: Path, most: int) -> Outline | None:
+    """Of an .obj, .ply or .stl file with more than about so many triangles; None where it has no more, or cannot be read so."""
+    try:
+        if path.stat().st_size == 0:
+            return None
+        return OUTLINES[path.suffix.lower()](path, np.memmap(path, np.uint8, "r"), most)
+    except (OSError, ValueError, IndexError, KeyError):  # what a broken file leads to
+        return None
+
+
+# -- OBJ ---------------------------------------------------------------------------------------------------------------
+
+
+def _obj(path: Path, data: Bytes, most: int) -> Outline | None:
+    starts = _lines(data)
+    first, second = data[starts], data[np.minimum(starts + 1, len(data) - 1)]
+    blank = (second == ord(" ")) | (second == ord("\t"))
+    faces, vertices = starts[(first == ord("f")) & blank], starts[(first == ord("v")) & blank]
+    rings, line = [], _words
+    for at in _spread(faces):
+        before = int(np.searchsorted(vertices, at))
+        index = [int(word.split(b"/")[0]) for word in line(data, at)[1:]]
+        places = [vertices[i - 1 if i > 0 else before + i] for i in index]
+        rings.append(np.array([line(data, place)[1:4] for place in places], np.float64))
+    some = [line(data, at) for at in _spread(vertices)]
+    found = _Found(len(faces), rings, np.array([words[1:4] for words in some], np.float64))
+    if found.triangles <= most:
+        return None
+    named = {
+        key: list(dict.fromkeys(_names(data, starts[first == ord(key[0])], key)))
+        for key in ("o", "g", "usemtl", "mtllib")
+    }
+    coloured = all(len(words) > 6 for words in some)
+    materials, notes = read_materials(path, named["mtllib"], named["usemtl"] or [""], coloured=coloured)
+    objects = max(len(named["o"] + named["g"]), 1)
+    return found.outline(path, materials, objects=objects, coloured=coloured, warnings=notes)
+
+
+def _names(data: Bytes, starts: Ints, key: str) -> Iterator[str]:
+    """What stands behind a key in the lines that begin with it."""
+    for at in starts.tolist():
+        word, _, name = _line(data, at).decode("utf-8", "replace").partition(" ")
+        if word == key:
+            yield unquoted(name)
+
+
+# -- PLY ---------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Element:
+    """Of a PLY file: its name, how many there are, and its properties: name, type, and of a list the type of its length."""
+
+    name: str
+    count: int
+    properties: tuple[tuple[str, str, str | None], ...]
+
+    def dtype(self, order: str, length: int = 0) -> np.dtype[np.void]:
+        """As it lies in the file, with lists of that length."""
+        fields: list[tuple[str, str] | tuple[str, str, int]] = []
+        for name, kind, counted in self.properties:
+            if counted is None:
+                fields.append((name, order + kind))
+            else:
+                fields += [(f"{name} length", order + counted), (name, order + kind, length)]
+        return np.dtype(fields)
+
+
+def _ply(path: Path, data: Bytes, most: int) -> Outline | None:
+    header = data[:HEADER_BYTES].tobytes()
+    head, end, _ = header.partition(b"end_header")
+    body = header.index(b"\n", len(head)) + 1
+    kind, elements = _elements(head.decode("ascii", "replace"))
+    vertex, face = elements[:2]
+    if not end or (vertex.name, face.name) != ("vertex", "face") or face.count <= most / 2:
+        return None
+    found = _ply_text(data, body, vertex, face) if kind == "ascii" else _ply_binary(data, body, kind, vertex, face)
+    if found.triangles <= most:
+        return None
+    coloured = any(name == "red" for element in (vertex, face) for name, _, _ in element.properties)
+    notes = [PICTURE] if TEXTURE_LINE in head else []
+    return found.outline(path, [Material(path.stem)], coloured=coloured, warnings=notes)
+
+
+def _elements(head: str) -> tuple[str, list[_Element]]:
+    """The format, and the elements in their order."""
+    kind, elements = "", list[_Element]()
+    for words in map(str.split, head.splitlines()):
+        if words[:1] == ["format"]:
+            kind = words[1]
+        elif words[:1] == ["element"]:
+            elements.append(_Element(words[1], int(words[2]), ()))
+        elif words[:1] == ["property"]:
+            last = elements[-1]
+            types = [TYPES[word] for word in words[1:-1] if word != "list"]
+            one = (words[-1], types[-1], types[0] if len(types) > 1 else None)
+            elements[-1] = _Element(last.name, last.count, (*last.properties, one))
+    return kind, elements
+
+
+def _ply_binary(data: Bytes, body: int, kind: str, vertex: _Element, face: _Element) -> _Found:
+    order = {"binary_little_endian": "<", "binary_big_endian": ">"}[kind]
+    corners = next(name for name, _, counted in face.properties if counted is not None)
+    layout = vertex.dtype(order)
+    begin = body + vertex.count * layout.itemsize
+    vertices = data[body:begin].view(layout)
+    faces = None
+    for length in (3, 4):  # of all alike
+        shape = face.dtype(order, length)
+        end = begin + face.count * shape.itemsize
+        if end <= len(data):
+            some = data[begin:end].view(shape)[_spread(np.arange(face.count))]
+            if (some[f"{corners} length"] == length).all():
+                faces = list(some[corners].astype(np.int64))
+    if faces is None:
+        raise ValueError("faces of many kinds")
+    xyz = [vertices[name] for name in "xyz"]
+    points = np.stack([axis[_spread(np.arange(len(vertices)))] for axis in xyz], axis=1).astype(np.float64)
+    rings = [np.stack([axis[ring] for axis in xyz], axis=1).astype(np.float64) for ring in faces]
+    return _Found(face.count, rings, points)
+
+
+def _ply_text(data: Bytes, body: int, vertex: _Element, face: _Element) -> _Found:
+    starts = _lines(data[body:]) + body
+    vertices, faces = starts[: vertex.count], starts[vertex.count : vertex.count + face.count]
+    columns = [[name for name, _, _ in vertex.properties].index(axis) for axis in "xyz"]
+
+    def place(at: int) -> list[float]:
+        words = _words(data, at)
+        return [float(words[column]) for column in columns]
+
+    rings = []
+    for at in _spread(faces):
+        words = _words(data, at)
+        rings.append(np.array([place(int(vertices[int(word)])) for word in words[1 : 1 + int(words[0])]]))
+    return _Found(len(faces), rings, np.array([place(at) for at in _spread(vertices)]))
+
+
+# -- STL ---------------------------------------------------------------------------------------------------------------
+
+
+def _stl(path: Path, data: Bytes, most: int) -> Outline | None:
+    count = int(data[STL_HEADER - 4 : STL_HEADER].view("<u4")[0]) if len(data) > STL_HEADER else 0
+    if len(data) == STL_HEADER + count * STL_BYTES:
+        layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
+        corners = data[STL_HEADER:].view(layout)["corners"][_spread(np.arange(count))].astype(np.float64)
+        found = _Found(count, list(corners), np.empty((0, 3)))
+    else:
+        found = _stl_text(data)
+    if found.triangles <= most:
+        return None
+    return found.outline(path, [Material("grey")], coloured=False, warnings=())
+
+
+def _stl_text(data: Bytes) -> _Found:
+    """By what a facet takes in the file."""
+    rings, taken = [], []
+    for at in np.linspace(0, max(len(data) - LONGEST, 0), SOME).astype(np.int64).tolist():
+        text = data[at : at + LONGEST].tobytes()
+        first = text.find(b"endfacet")
+        second = text.find(b"endfacet", first + 1)
+        corners = VERTEX.findall(text[first:second])
+        if 0 <= first < second and len(corners) == 3:
+            rings.append(np.array(corners, np.float64))
+            taken.append(second - first)
+    return _Found(round(len(data) / float(np.mean(taken))) if taken else 0, rings, np.empty((0, 3)))
+
+
+# -- lines -------------------------------------------------------------------------------------------------------------
+
+
+def _lines(data: Bytes) -> Ints:
+    """Where each line begins."""
+    ends = [np.flatnonzero(data[at : at + BLOCK] == ord("\n")) + at for at in range(0, len(data), BLOCK)]
+    starts = np.concatenate([[0], *ends]) + np.r_[0, np.ones(sum(map(len, ends)), np.int64)]
+    return np.asarray(starts[starts < len(data)], np.int64)
+
+
+def _line(data: Bytes, at: int) -> bytes:
+    return data[at : at + LONGEST].tobytes().partition(b"\n")[0]
+
+
+def _words(data: Bytes, at: int) -> list[bytes]:
+    return _line(data, at).partition(b"#")[0].split()
+
+
+def _spread(places: Ints) -> list[Any]:
+    """Some of these, evenly among all, in no period that the order of a mesh may have: places of the golden ratio."""
+    if len(places) > SOME:
+        places = places[np.sort(np.arange(SOME) * GOLDEN % 1.0 * len(places)).astype(np.int64)]
+    return list(places.tolist())
+
+
+OUTLINES: dict[str, Callable[[Path, Bytes, int], Outline | None]] = {".obj": _obj, ".ply": _ply, ".stl": _stl}
