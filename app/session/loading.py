@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from app.atlas.charts import Charts
 from app.atlas.charts_cache import charts_of
-from app.atlas.options import AtlasOptions
+from app.atlas.coarse import coarse_charts
+from app.atlas.options import MAX_TEXELS, AtlasOptions
+from app.atlas.parametrize import check, default_texels
+from app.atlas.visible_mesh import visible_mesh
 from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
-from app.lightmap.tile_pool import Array, TilePool
+from app.lightmap.tile_pool import Array, SolverSpace, TilePool
 from app.render.exposure import first_exposure
 from app.render.flat import FlatScene
 from app.render.seen import seen_texels
@@ -25,8 +28,10 @@ from app.scene.sky import Sky
 from app.session.ray_tree import SORTING
 from app.session.versions import Version
 from app.solvers import SOLVERS
-from app.util.background import BackgroundTask, Progress
+from app.util.background import BackgroundTask, Progress, Report
 from app.visibility.rays import tree_of
+
+COARSE_FROM = 32_768  # triangles: charts of fewer are there within about two seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +59,23 @@ def read_and_unfold(
     roots: bool = False,
     make: Callable[[Scene], Scene] | None = None,
     show: Callable[[FlatScene], None] | None = None,
+    waiting: Callable[[Scene, Scene], None] | None = None,
 ) -> tuple[Scene, Scene, Charts, dict[str, float]]:
     """The scene as it was read, what ``make`` makes of it, cut where its surfaces meet, its charts, and the seconds of both
     stages. file: its unit and axes, guessed if None. roots: whether texels are the coarsest of quadtrees. show: is given what can
-    be drawn as soon as the scene is read. Raises UserError (SceneError)."""
+    be drawn as soon as the scene is read; waiting: the scene as read and as made, where its charts will take a while. Raises
+    UserError (SceneError)."""
     start = time.perf_counter()
-    tell("reading the file", 0.0)
-    read = source if isinstance(source, Scene) else load_scene(source, file, default_light=default_light, sky=sky)
+
+    def reading(share: float) -> None:
+        tell("reading the file", 0.1 * share)
+
+    reading(0.0)
+    if isinstance(source, Scene):
+        read = source
+    else:
+        read = load_scene(source, file, default_light=default_light, sky=sky, report=reading)
+    reading(1.0)
     scene = read if make is None else make(read)
     seconds = {"read": time.perf_counter() - start}
     if show is not None:
@@ -69,7 +84,14 @@ def read_and_unfold(
         seconds["flat"] = time.perf_counter() - start
     start = time.perf_counter()
     tell("unfolding surfaces", 0.1)
-    scene, charts = charts_of(scene, atlas, roots=roots, progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share))
+    uncut = scene
+    scene, charts = charts_of(
+        scene,
+        atlas,
+        roots=roots,
+        progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share),
+        waiting=None if waiting is None else lambda: waiting(read, uncut),
+    )
     return read, scene, charts, seconds | {"unfold": time.perf_counter() - start}
 
 
@@ -86,31 +108,42 @@ def load(
     make: Callable[[Scene], Scene] | None = None,
     progress: Progress | None = None,
     show: Callable[[FlatScene], None] | None = None,
+    coarse: Callable[[Loaded], None] | None = None,
 ) -> Loaded:
     """Read a scene, or take one as it is; unfold it, cut it into texels, with ``expose`` find its exposure, and with ``rays``
-    build the tree that they walk. file, make, show: as of ``read_and_unfold``. Raises UserError (SceneError)."""
-    tell: Progress = progress or (lambda stage, share: None)
+    build the tree that they walk. file, make, show: as of ``read_and_unfold``. coarse: is given the scene in coarse texels, from
+    another thread, where better ones will take a while. Raises UserError (SceneError)."""
+    tell = _Telling(progress or (lambda stage, share: None))
     options = options or LightmapOptions()
-    read, scene, charts, seconds = read_and_unfold(
-        source, atlas, default_light, tell, file=file, sky=sky, roots=options.adaptive, make=make, show=show
-    )
+    check(atlas.density, atlas.texels)
+    with ThreadPoolExecutor(1) as beside:
+        early: list[Future[Loaded | None]] = []
+
+        def waiting(read: Scene, scene: Scene) -> None:
+            if coarse is not None and len(scene.triangles) >= COARSE_FROM:
+                early.append(beside.submit(_show_coarse, read, scene, atlas, options, expose, rays, tell.again, coarse))
+
+        read, scene, charts, seconds = read_and_unfold(
+            source,
+            atlas,
+            default_light,
+            tell,
+            file=file,
+            sky=sky,
+            roots=options.adaptive,
+            make=make,
+            show=show,
+            waiting=waiting,
+        )
+        shown = early[0].result() if early else None
     start = time.perf_counter()
 
     def cutting(share: float) -> None:
         tell("cutting into texels", 0.6 + 0.2 * share)
 
     cutting(0.0)
-    pool = quadtree_pool(scene, charts, cutting) if options.adaptive else TilePool(scene, charts, report=cutting)
-    tell("finding the exposure", 0.8)
-    exposure = None
-    with ThreadPoolExecutor(1) as beside:
-        # cached in the pool: the window, which reads them next, does not wait
-        mesh = beside.submit(lambda: (pool.visible_mesh, pool.emission_weights))
-        arrays = pool.arrays
-        if expose:
-            camera = scene.cameras[0]
-            exposure = first_exposure(pool, seen_texels(pool, camera.world_from_camera, camera.yfov))
-        mesh.result()
+    pool, arrays, exposure = _in_texels(scene, charts, options, cutting, expose=expose and shown is None)
+    exposure = exposure if shown is None else shown.exposure
     seconds["texels"] = time.perf_counter() - start
     if rays:
         start = time.perf_counter()
@@ -120,9 +153,68 @@ def load(
     return Loaded(read, pool, arrays, atlas, options, exposure, seconds)
 
 
+class _Telling:
+    """A progress that is told in one thread, and ``again`` in others, so that they end, too, where it raises."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress, self._last = progress, ("starting", 0.0)
+
+    def __call__(self, stage: str, share: float) -> None:
+        self._last = stage, share
+        self._progress(stage, share)
+
+    def again(self, _share: float = 0.0) -> None:
+        self._progress(*self._last)
+
+
+def _show_coarse(
+    read: Scene,
+    scene: Scene,
+    atlas: AtlasOptions,
+    options: LightmapOptions,
+    expose: bool,
+    rays: bool,
+    alive: Report,
+    show: Callable[[Loaded], None],
+) -> Loaded | None:
+    """Show a scene in coarse texels, unless it has too many small pieces for that. alive: raises to end the work."""
+    start = time.perf_counter()
+    texels = min(atlas.texels or MAX_TEXELS, default_texels(len(scene.triangles), True))
+    charts = coarse_charts(scene, atlas.tile, texels, alive)
+    if charts is None:
+        return None
+    alive(0.0)
+    pool, arrays, exposure = _in_texels(scene, charts, options, alive, expose=expose)
+    if rays:
+        tree_of(pool, alive)
+    loaded = Loaded(read, pool, arrays, atlas, options, exposure, {"coarse": time.perf_counter() - start})
+    show(loaded)
+    return loaded
+
+
+def _in_texels(
+    scene: Scene, charts: Charts, options: LightmapOptions, report: Report, *, expose: bool
+) -> tuple[TilePool, dict[str, Array], float | None]:
+    """A scene cut into texels, as it is uploaded, and with ``expose`` the exposure that its light will need [EV]."""
+    local = SolverSpace.of(scene).local_from_world(scene.positions)
+    exposure = None
+    with ThreadPoolExecutor(1) as beside:
+        mesh = beside.submit(visible_mesh, scene, charts, local)
+        pool = quadtree_pool(scene, charts, report) if options.adaptive else TilePool(scene, charts, report=report)
+        report(1.0)
+        # cached in the pool: the window, which reads them next, does not wait
+        pool.visible_mesh = mesh.result()
+        arrays = beside.submit(lambda: (pool.arrays, pool.emission_weights)[0])
+        if expose:
+            camera = scene.cameras[0]
+            exposure = first_exposure(pool, seen_texels(pool, camera.world_from_camera, camera.yfov))
+        return pool, arrays.result(), exposure
+
+
 class Loading(BackgroundTask[Loaded]):
     """A scene on its way, see ``load``. solver: by name, what it is made ready for. atlas, light: how it is cut and held.
-    version: what is made of it, if anything. flat: what can be drawn of a scene as soon as it is read."""
+    version: what is made of it, if anything. flat: what can be drawn of a scene as soon as it is read. coarse: the scene in
+    coarse texels, once it is there and until it is taken."""
 
     def __init__(
         self,
@@ -136,20 +228,25 @@ class Loading(BackgroundTask[Loaded]):
         sky: Sky | None = None,
         expose: bool = False,
         version: Version | None = None,
+        coarse: bool = False,
     ) -> None:
+        """coarse: whether coarse texels are asked for where better ones will take a while."""
         self.source, self.solver, self.atlas, self.light = source, solver, atlas, options
         self.flat: FlatScene | None = None
+        self.coarse: Loaded | None = None
         self.version, make = version, None if version is None else version.make
         more: dict[str, Any] = {"default_light": default_light, "expose": expose, "rays": SOLVERS[solver].rays}
+        more |= {"show": self._show, "coarse": self._show_coarse if coarse else None}
         super().__init__(
             "this scene",
-            lambda tell: load(
-                source, atlas, options, file=file, sky=sky, make=make, **more, progress=tell, show=self._show
-            ),
+            lambda tell: load(source, atlas, options, file=file, sky=sky, make=make, **more, progress=tell),
         )
 
     def _show(self, flat: FlatScene) -> None:
         self.flat = flat
+
+    def _show_coarse(self, loaded: Loaded) -> None:
+        self.coarse = loaded
 
     @property
     def name(self) -> str:

@@ -61,6 +61,7 @@ class Opening:
         self.prepare: Prepare | None = None
         self.loading: Loading | None = None
         self._parts: Generator[None, None, Ready] | None = None
+        self._coarse = False  # whether these parts are of coarse texels
 
     def begin(self, loading: Loading) -> None:
         """This one instead of any other."""
@@ -75,16 +76,32 @@ class Opening:
             self._parts.close()
         self.loading = self._parts = None
 
+    @property
+    def has_part(self) -> bool:
+        """Whether there is something to upload: of what was loaded, or of coarse texels that come before it."""
+        return self.loading is not None and (
+            self.loading.ended or self._parts is not None or self.loading.coarse is not None
+        )
+
     def part(self, options: Mapping[str, Options]) -> Ready | None:
-        """The next part of what was loaded, with the options of its solver; all of it after the last. Raises UserError, and ends
-        then."""
-        assert self.loading is not None
+        """The next part of what was loaded, with the options of its solver; all of it after the last. Of coarse texels, which may
+        come first, ``loading`` goes on. Raises UserError, and ends then."""
+        loading = self.loading
+        assert loading is not None
         try:
+            if loading.ended and self._coarse and self._parts is not None:  # better ones are there
+                self._parts.close()
+                self._parts = None
             if self._parts is None:
-                self._parts = self._upload(self.loading.result, self.loading.solver, options)
+                coarse, loading.coarse = loading.coarse, None
+                self._coarse = coarse is not None and not loading.ended
+                of = coarse if coarse is not None and self._coarse else loading.result
+                self._parts = self._upload(of, loading.solver, options)
             next(self._parts)
         except StopIteration as last:
-            self.loading = self._parts = None
+            self._parts = None
+            if not self._coarse:
+                self.loading = None
             ready: Ready = last.value
             return ready
         except UserError:

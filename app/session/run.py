@@ -69,7 +69,8 @@ NEVER = Stop()
 class Run:
     """The solve of the open scene. ``begin`` gives it a solver; it releases nothing.
 
-    running: whether ``advance`` works. seconds: of solving; earlier: of these, before the light was kept that it goes on from.
+    running: whether ``advance`` works; resting: whether it does not for now, since something better to work on is on its way.
+    seconds: of solving; earlier: of these, before the light was kept that it goes on from.
     interrupted: whether Ctrl-C ended the last ``solve``.
     furthest: share of the way down to what may remain, that the solve has come since it began or was edited. What remains grows
     for a while where light overshoots or leaves of quadtrees come; this does not. settled: whether progress, energy and history
@@ -79,6 +80,7 @@ class Run:
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
         self.running, self.interrupted, self.settled = True, False, True
+        self.resting = False
         self.seconds = self.earlier = 0.0
         self.history, self.effort = History(), Effort()
         self.solver: Solver[Any]
@@ -184,7 +186,7 @@ class Run:
     @property
     def goes_on(self) -> bool:
         """Whether ``advance`` has something to do."""
-        return self.running and not self.converged
+        return self.running and not self.resting and not self.converged
 
     @property
     def escaped_share(self) -> float:

@@ -31,6 +31,8 @@ from app.session.versions import Version, with_edits
 from app.solvers import DEFAULT_SOLVER, SOLVERS
 from app.util.background import BackgroundTask
 
+COARSE_SECONDS = 2.0  # of solving in coarse texels: from then on the processor makes better ones
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -88,6 +90,7 @@ class Session(EditableScene):
         self._on_open: Opened | None = None
         self.edited: object = None
         self._then_reference: Path | None = None
+        self._coarse: Loading | None = None  # of what is open in coarse texels, until it is there in better ones
         self.reading = self._reading = Reading()
 
     def follow(self, prepare: Prepare, opened: Opened) -> None:
@@ -107,12 +110,13 @@ class Session(EditableScene):
         version: Version | None = None,
     ) -> None:
         """Start to load in the background; ``poll`` swaps the scene when it is there. file: its unit and axes,
-        guessed if None. reference: a bake to open then. reading, cut: instead of the session's own. version: of what is read."""
+        guessed if None. reference: a bake to open then. reading, cut: instead of the session's own. version: of what is read.
+        Where charts take a while, the scene is open in coarse texels until they are there, unless ``cut`` is given."""
         self._then_reference = reference
         self._reading = reading or Reading(file, self.default_light, self.sky)
-        cut = cut or Cut(self.atlas, self.light, self.chosen_solver)
+        own, cut = cut is None, cut or Cut(self.atlas, self.light, self.chosen_solver)
         more: dict[str, Any] = {"default_light": self._reading.default_light, "expose": self.expose_on_open}
-        more |= {"file": self._reading.file, "sky": self._reading.sky, "version": version}
+        more |= {"file": self._reading.file, "sky": self._reading.sky, "version": version, "coarse": own}
         self._opening.begin(Loading(source, cut.atlas, cut.light, cut.solver, **more))
 
     def open_now(
@@ -133,18 +137,22 @@ class Session(EditableScene):
         if loading.cancelled:
             self._opening.stop()
             self._then_reference = None
-            self.message = f"{loading.name}: stopped" + (f"; {self.name} stays as it is" if self._opened else "")
+            stays = "it stays in coarse texels" if loading is self._coarse else f"{self.name} stays as it is"
+            self.message = f"{loading.name}: stopped" + (f"; {stays}" if self._opened else "")
             return
         try:
             ready = self._opening.part(self._choice.options)
             if ready is not None:
-                self._take_over(ready, loading.version)
+                self._take_over(ready, loading.version, refined=loading is self._coarse)
+                self._coarse = self.loading
+                if self._coarse is not None:  # what comes is of the same scene
+                    self._coarse.version = Version(self.surfaces, lambda scene: scene, self.read)
         except UserError as error:
             self.message = str(error)
 
-    def _take_over(self, ready: Ready, version: Version | None = None) -> None:
-        """Put what was opened, or a version of what is open, in its place. Raises UserError, also where it is open but the solver
-        that has been chosen since cannot be had."""
+    def _take_over(self, ready: Ready, version: Version | None = None, *, refined: bool = False) -> None:
+        """Put what was opened, or a version of what is open, in its place. refined: whether that is the same, in coarse texels.
+        Raises UserError, also where it is open but the solver that has been chosen since cannot be had."""
         loaded, lightmap, solver = ready.loaded, ready.lightmap, ready.solver
         scene, chosen = loaded.pool.scene, self.chosen_solver
         try:
@@ -178,8 +186,9 @@ class Session(EditableScene):
         reference_gone = self.compared.begin(lightmap, scene)
         self._begin()
         if self._on_open is not None:
-            self._on_open(loaded.exposure, same_scene=same_scene, reference_gone=reference_gone)
-        if self._then_reference is not None:
+            exposure = None if refined else loaded.exposure
+            self._on_open(exposure, same_scene=same_scene, reference_gone=reference_gone)
+        if self._then_reference is not None and self.loading is None:
             self.compared.open(self._then_reference)
             self._then_reference = None
         self.set_flicker(flickers)
@@ -208,6 +217,11 @@ class Session(EditableScene):
     def on_its_way(self) -> BackgroundTask[Any] | None:
         """What is waited for: the scene that is loading, or the rays of the solver that was chosen."""
         return self.loading or self._choice.switching
+
+    @property
+    def coarse(self) -> bool:
+        """Whether what is open is in coarse texels, and better ones are on their way."""
+        return self._coarse is not None and self._coarse is self.loading
 
     # -- the same scene, cut anew --------------------------------------------------------------------------------------
 
@@ -305,7 +319,8 @@ class Session(EditableScene):
         """Once per frame: take in what the GPU reports, and swap in a scene that has finished loading, a part of it per frame.
         interactive: a hand is at the controls, what can wait does."""
         self._busy = False
-        if self.loading is not None and (self.loading.ended or self.loading.cancelled):
+        self.run.resting = self.coarse and self.run.seconds >= COARSE_SECONDS
+        if self.loading is not None and (self._opening.has_part or self.loading.cancelled):
             self._busy = True
             self._open_part(self.loading)
         elif self._opened:

@@ -197,7 +197,7 @@ class Ui:
         self._files.frame(view, state)
         self._picture.draw(view, state)
         overlays.legend_overlay(state.legend, state)
-        overlays.loading_overlay(view.session.on_its_way, state)
+        overlays.loading_overlay(view.session.on_its_way, state, coarse=view.session.coarse)
         overlays.toasts(view, state, seconds)
         overlays.help_overlay(state)
         leave_dialog(view, state)

@@ -221,8 +221,9 @@ def no_lamps(view: View, state: State) -> None:
     imgui.end()
 
 
-def loading_overlay(loading: BackgroundTask[Any] | None, state: State) -> None:
-    """Stage, progress and a way out while a scene or a solver is on its way, at the top of the view: the middle shows it flat."""
+def loading_overlay(loading: BackgroundTask[Any] | None, state: State, *, coarse: bool) -> None:
+    """Stage, progress and a way out while a scene or a solver is on its way, at the top of the view: the middle shows it flat, or
+    with coarse light."""
     if loading is None:
         return
     left, top, width, _ = state.view_px
@@ -230,6 +231,8 @@ def loading_overlay(loading: BackgroundTask[Any] | None, state: State) -> None:
     imgui.set_next_window_pos(middle, imgui.Cond_.always, imgui.ImVec2(0.5, 0.0))
     imgui.begin("##loading", None, FLOATING)
     imgui.text_unformatted(loading.stage)
+    if coarse:
+        imgui.text_disabled("The light is coarse until then.")
     width = imgui.get_font_size() * LOADING_EM
     imgui.progress_bar(min(max(loading.fraction, 0.0), 1.0), imgui.ImVec2(width, 0), f"{loading.fraction:.0%}")
     if imgui.button("Cancel", imgui.ImVec2(width, 0)):

@@ -109,7 +109,7 @@ class UiFrame:
         if now is None or now != self._still or fresh:
             if look or fresh:
                 view.draw(target, size, scale=scale, whole=fresh)
-        elif view.samples < SAMPLES:
+        elif view.samples < SAMPLES and not view.session.coarse:
             view.draw(target, size, scale=scale, add=True)
         self._still, self.unfinished = now, now is not None and view.samples < SAMPLES
 

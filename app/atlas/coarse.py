@@ -1,0 +1,72 @@
+"""Charts that are there at once, for the light that is shown while better ones are made: each smooth piece of a surface as it is
+seen along one of the axes.
+
+Pieces end where normals turn to another axis, so that lengths are shortened by no more than √3. Where a piece folds over itself,
+two places share a texel. Nothing is cut where surfaces meet, and flat pieces are not looked for: every triangle is a facet.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atlas.charts import Charts
+from app.atlas.layout import density_for, measured, place
+from app.atlas.sides import distinct_rows, groups_of, lit_sides
+from app.scene.model import F64, I32, Scene
+from app.util.background import Report
+
+MOST_PIECES = 1 << 14  # beyond which placing them takes as long as better charts do
+
+
+def coarse_charts(scene: Scene, tile: int, texels: int, report: Report) -> Charts | None:
+    """Those of a scene's lit sides, of about so many texels; None where it falls apart into too many pieces. tile: texels along
+    the edge of a leaf. report(share) is called now and then and may raise to cancel."""
+    lit = lit_sides(scene)
+    normals = scene.normals_areas[0]
+    axis = np.abs(normals).argmax(axis=1)
+    way = 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0)
+    report(0.3)
+    count, piece = _pieces(scene, way)
+    report(0.5)
+    if count > MOST_PIECES:
+        return None
+    layout = measured(piece, _seen_along(scene.corners, way), np.empty((0, 2)), lit)
+    density = density_for(layout, texels)
+    facet = np.arange(len(piece), dtype=np.int32)
+    report(0.8)
+    face_uv, face_chart, face_facet, rects, size = place(layout, lit, facet, density, tile, report)
+    return Charts(
+        size=size,
+        tile=tile,
+        density=density,
+        face_triangle=lit.triangle,
+        face_back=lit.back,
+        face_uv=face_uv,
+        face_chart=face_chart,
+        face_facet=face_facet,
+        chart_rects=rects,
+        dark_faces=lit.dark,
+        method=f"{count} pieces seen along an axis",
+    )
+
+
+def _pieces(scene: Scene, way: NDArray[np.int64]) -> tuple[int, I32]:
+    """How many pieces there are, and the number of that of each triangle (m,): of one material and way (m,), joined at edges."""
+    point = distinct_rows(*scene.positions.T)[1]
+    start = point[scene.triangles].reshape(-1)
+    end = point[np.roll(scene.triangles, -1, axis=1)].reshape(-1)
+    kind = np.repeat(way * len(scene.materials) + scene.material_ids, 3)
+    edge = distinct_rows(kind, np.minimum(start, end), np.maximum(start, end))[1]
+    order = np.argsort(edge, kind="stable")
+    joined = edge[order[1:]] == edge[order[:-1]]
+    pairs = np.stack([order[:-1][joined] // 3, order[1:][joined] // 3], axis=1)
+    count, label = groups_of(len(way), pairs)
+    return count, label.astype(np.int32)
+
+
+def _seen_along(corners: F64, way: NDArray[np.int64]) -> F64:
+    """Corners (m, 3, 3) as seen from where each triangle's way (m,) points to, (m, 3, 2) [m], counter-clockwise."""
+    across, up = (way // 2 + 1) % 3, (way // 2 + 2) % 3
+    u, v = (np.take_along_axis(corners, axis[:, None, None], 2)[..., 0] for axis in (across, up))
+    return np.stack([np.where(way[:, None] % 2, -u, u), v], axis=2)

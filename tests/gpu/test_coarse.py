@@ -1,0 +1,171 @@
+"""Coarse light: where charts take a while, a scene is lit in coarse texels until they are there, and then in those."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from gl_objects import forgotten, held
+
+from app.atlas import charts_cache
+from app.atlas.options import AtlasOptions
+from app.gpu import Gpu
+from app.lightmap.options import LightmapOptions
+from app.session import loading
+from app.session import session as session_module
+from app.session.session import Session
+from app.session.view import View
+from app.solvers import ShootingOptions
+from app.util import cache
+from app.viewer.picture import picture
+
+__all__ = ["forgotten"]
+
+SIZE = (96, 96)
+TEXELS = 3000
+PATIENCE = 60.0  # s
+
+
+@pytest.fixture
+def better(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[threading.Event]:
+    """Better charts wait for this, but for a second at most once the test is over; coarse ones are made for any scene."""
+    go_on, made = threading.Event(), charts_cache._made
+
+    def waiting(scene: Any, atlas: Any, roots: Any, progress: Any) -> Any:
+        while not go_on.wait(0.01):
+            progress("waiting", 0.1)
+        return made(scene, atlas, roots, progress)
+
+    monkeypatch.setattr(charts_cache, "_made", waiting)
+    monkeypatch.setattr(charts_cache, "FEWEST", 0)
+    monkeypatch.setattr(loading, "COARSE_FROM", 0)
+    monkeypatch.setattr(session_module, "COARSE_SECONDS", PATIENCE)
+    monkeypatch.setattr(loading, "default_texels", lambda sides, roots: TEXELS // 16)
+    with cache.elsewhere(tmp_path):
+        yield go_on
+        go_on.set()
+
+
+@pytest.fixture
+def view(gpu: Gpu, better: threading.Event) -> Iterator[View]:
+    options = ShootingOptions(resolution=64, residual=0.1)
+    session = Session(gpu, options=options, atlas=AtlasOptions(texels=TEXELS), expose_on_open=True)
+    view = View(session)
+    yield view
+    view.release()
+    session.release()
+
+
+def frames(session: Session, until: Callable[[], bool]) -> None:
+    """Poll and advance as the window does."""
+    end = time.monotonic() + PATIENCE
+    while not until():
+        assert time.monotonic() < end
+        session.poll()
+        session.advance()
+
+
+def mean_irradiance(session: Session) -> float:
+    area = session.lightmap.pool.surfaces.area
+    return float((session.lightmap.irradiance().mean(-1) * area).sum() / area.sum())
+
+
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_coarse_light_appears_and_gives_way_to_better(view: View, better: threading.Event, adaptive: bool) -> None:
+    """Camera, exposure and edits of that time stay; both give about the same light."""
+    session = view.session
+    session.light = LightmapOptions(adaptive=adaptive, depth=1)
+    session.open("cornell-box")
+    frames(session, lambda: session.opened)
+    assert session.coarse and session.loading is not None
+    frames(session, lambda: session.run.converged or (adaptive and session.solver.issued > 20))
+    few, coarse = session.lightmap.texel_count, mean_irradiance(session)
+    assert picture(view, SIZE).mean() > 20  # of 255: it is lit
+    material = dataclasses.replace(session.materials[1], albedo=(0.1, 0.2, 0.7))
+    session.set_material(1, material)
+    view.camera = dataclasses.replace(view.camera, yfov=0.5)
+    view.display = view.display.replace(exposure=view.display.exposure + 0.25)
+    seen, display = view.camera, view.display
+    better.set()
+    frames(session, lambda: session.loading is None)
+    assert not session.coarse and session.message is None
+    assert session.lightmap.texel_count > 2 * few
+    assert view.camera is seen and view.display == display
+    assert session.materials[1] == material and session.light.adaptive == adaptive
+    session.set_material_edits({})
+    if not adaptive:
+        frames(session, lambda: session.run.converged)
+        # 10 % of light is not yet shot in either, and 200 texels follow the shadows roughly
+        assert mean_irradiance(session) == pytest.approx(coarse, rel=0.1)
+
+
+def test_charts_that_are_kept_need_no_coarse_light(view: View, better: threading.Event) -> None:
+    session, coarse = view.session, []
+    better.set()
+    for _ in range(2):
+        session.open("cornell-box")
+        frames(session, lambda: session.loading is None or coarse.append(session.coarse) is not None)
+    again = len(coarse)
+    session.open("cornell-box")
+    frames(session, lambda: session.loading is None or coarse.append(session.coarse) is not None)
+    assert not any(coarse[again:])
+
+
+def test_the_processor_is_left_to_better_charts_after_a_while(
+    view: View, better: threading.Event, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session_module, "COARSE_SECONDS", 0.0)
+    session = view.session
+    session.open("cornell-box")
+    frames(session, lambda: session.coarse)
+    for _ in range(5):
+        session.poll()
+        session.advance()
+    assert session.solver.issued <= 1 and not session.solving and session.run.running
+    better.set()
+    frames(session, lambda: session.loading is None and session.solver.issued > 3)
+
+
+def test_stopped_it_stays_in_coarse_texels_and_goes_on(view: View) -> None:
+    session = view.session
+    session.open("cornell-box")
+    frames(session, lambda: session.coarse)
+    assert session.loading is not None
+    session.loading.cancel()
+    session.poll()
+    assert session.loading is None and not session.coarse and "coarse texels" in str(session.message)
+    frames(session, lambda: session.run.converged)
+
+
+def test_another_scene_may_be_opened_meanwhile(view: View, better: threading.Event) -> None:
+    session = view.session
+    session.open("cornell-box")
+    frames(session, lambda: session.coarse)
+    session.open("furnace")
+    assert not session.coarse
+    better.set()
+    frames(session, lambda: session.loading is None)
+    assert session.name == "Furnace"
+
+
+def test_nothing_stays_on_the_gpu(
+    gpu: Gpu, view: View, better: threading.Event, forgotten: Callable[[], list[object]]
+) -> None:
+    session = view.session
+    session.open("furnace")
+    better.set()
+    frames(session, lambda: session.loading is None)
+    before = held(gpu)
+    for texels in (TEXELS + 1, TEXELS + 2):
+        better.clear()
+        session.atlas = AtlasOptions(texels=texels)
+        session.open("furnace")
+        frames(session, lambda: session.coarse)
+        better.set()
+        frames(session, lambda: session.loading is None)
+    assert held(gpu) == before and not forgotten()
