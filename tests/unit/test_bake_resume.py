@@ -22,12 +22,16 @@ from app.session.checkpoint import CHECKPOINT_NAME
 ROOT = Path(__file__).parents[2]
 PATIENCE = 120.0  # s
 OTHER_DRIVERS = 1e-3  # of the mean light; the software rasteriser repeats itself bit for bit
-BAKES = {
-    "gathering": ["--texels", "1500", "--noise", "1e-4", "--rays", "600"],
-    "shooting": ["--solver", "shooting", "--texels", "1500", "--shots", "1000"],
-    "shooting on quadtrees": ["--solver", "shooting", "--texels", "300", "--adaptive", "--shots", "1000"],
+BAKES = {  # flags, and of which work how much for each kill
+    "gathering": (["--texels", "1500", "--noise", "1e-4"], "--rays", 300),
+    "shooting": (["--solver", "shooting", "--texels", "1500", "--residual", "1e-6"], "--shots", 500),
+    "shooting on quadtrees": (
+        ["--solver", "shooting", "--texels", "300", "--adaptive", "--residual", "1e-6"],
+        "--shots",
+        500,
+    ),
 }
-GATHERING = BAKES["gathering"][:4]
+GATHERING = BAKES["gathering"][0]
 pytestmark = pytest.mark.usefixtures("few_points")
 posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL and no SIGINT for one process")
 
@@ -70,7 +74,9 @@ def same_light(one: Path, other: Path) -> bool:
 def test_killed_at_any_moment_it_goes_on_to_the_same_light(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
 ) -> None:
-    at_once, stopped, flags = tmp_path / "at once", tmp_path / "stopped", BAKES[name]
+    at_once, stopped, most = tmp_path / "at once", tmp_path / "stopped", request.config.getoption("--kills")
+    settings, unit, each = BAKES[name]
+    flags = [*settings, unit, str(most * each)]
     assert run(bake(at_once, *flags, "--checkpoint", "0")) == 0
     seed = int(time.time())
     rng = np.random.default_rng(seed)
@@ -89,7 +95,7 @@ def test_killed_at_any_moment_it_goes_on_to_the_same_light(
 
 @posix
 def test_after_ctrl_c_it_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    at_once, stopped, flags = tmp_path / "at once", tmp_path / "stopped", BAKES["gathering"]
+    at_once, stopped, flags = tmp_path / "at once", tmp_path / "stopped", [*GATHERING, "--rays", "600"]
     assert run(bake(at_once, *flags)) == 0
     line = bake(stopped, *flags, "--checkpoint", "0.1")
     end = time.monotonic() + PATIENCE
