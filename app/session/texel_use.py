@@ -24,7 +24,10 @@ LINES = 1080  # of the picture in which texels are seen
 WIDE_PX = 10.0  # in it, from which on a texel can be told from the next one
 OFF = 0.02  # of the mean light between texels, from which on it shows
 SPARED = 0.005  # of the mean light, that half as many may be off: less than a bake's noise
-MOSTLY = 0.99  # of the places where light is looked at
+MANY, NEARLY_ALL = (
+    0.9,
+    0.99,
+)  # of the places where light is looked at: what a tenth exceeds shows, as edges of shadows do not
 WORTH = 0.05  # of all texels, that must be spared for a word
 SMALL = 0.5  # of a material's area, that must lie in surfaces smaller than a texel for a word
 LEAST_AREA = 1e-3  # of all area: smaller materials are not worth one
@@ -34,9 +37,9 @@ NAMED = 3  # materials in a line
 @dataclass(frozen=True)
 class TexelUse:
     """Of one material. texels: how many; width: of one [m]. seen_px: how wide one is in a picture of 1,080 lines, the median of
-    those that are seen; None where none is. between: how far light is off between texels, over the scene's mean, nearly
-    everywhere; halved: the same with half as many along a metre; None where its charts are too small to tell. small: share of
-    its area in charts smaller than a texel."""
+    those that are seen; None where none is. between: how far light is off between texels, over the scene's mean, at no more than
+    a tenth of the places farther; halved: the same with half as many along a metre, at no more than a hundredth; None where its
+    charts are too small to tell. small: share of its area in charts smaller than a texel."""
 
     material: str
     texels: int
@@ -63,7 +66,8 @@ def texel_use(session: Session, irradiance: F32 | None = None) -> tuple[TexelUse
     mean = max(float(light[covered].mean()) if covered.any() else 0.0, 1e-300)
     count, (small, area) = len(scene.materials), _small(pool)
     texels = np.bincount(owner[covered], minlength=count)
-    between, halved = (_quantiles(light / mean, covered, owner, step, count) for step in (1, 2))
+    between = _quantiles(light / mean, covered, owner, 1, MANY, count)
+    halved = _quantiles(light / mean, covered, owner, 2, NEARLY_ALL, count)
     seen = seen_texels(pool, world_from_camera, yfov)
     width = np.array([1 / (charts.density * material.lightmap_scale) for material in scene.materials])
     px = _seen_px(pool, seen, owner, width, world_from_camera, yfov)
@@ -94,10 +98,10 @@ def _small(pool: TilePool) -> tuple[F64, F64]:
 
 
 def _quantiles(
-    light: F64, covered: NDArray[np.bool_], owner: NDArray[np.int32], step: int, count: int
+    light: F64, covered: NDArray[np.bool_], owner: NDArray[np.int32], step: int, share: float, count: int
 ) -> dict[int, float]:
-    """By material, how far light (slots, t, t) is off by linear interpolation between every ``step``-th texel, at MOSTLY of the
-    places. Charts lie two texels apart: what is covered without a gap is one."""
+    """By material, how far light (slots, t, t) is off by linear interpolation between every ``step``-th texel, at that share of
+    the places at most. Charts lie two texels apart: what is covered without a gap is one."""
     values, owners = [], []
     for axis in (1, 2):
         rows, there, of = np.moveaxis(light, axis, 2), np.moveaxis(covered, axis, 2), np.moveaxis(owner, axis, 2)
@@ -110,7 +114,7 @@ def _quantiles(
     order = np.argsort(label, kind="stable")
     edges = np.searchsorted(label[order], np.arange(count + 1))
     parts = ((index, value[order[edges[index] : edges[index + 1]]]) for index in range(count))
-    return {index: float(np.quantile(part, MOSTLY)) for index, part in parts if len(part)}
+    return {index: float(np.quantile(part, share)) for index, part in parts if len(part)}
 
 
 def _seen_px(
