@@ -17,6 +17,7 @@ from app.gpu import Gpu
 from app.lightmap.options import LightmapOptions
 from app.scene.area_lamps import Surfaces
 from app.scene.model import Camera
+from app.session.bake import take_light
 from app.session.baking import Baking, Order
 from app.session.session import Session
 from app.session.view import TRAPPED, View
@@ -181,6 +182,8 @@ def test_a_texel_density_is_an_edit(dark: Dark) -> None:
     assert texels() > 2 * before and session.materials[1].lightmap_scale == 2.0
     assert session.materials[1].albedo == (0.6, 0.1, 0.1) and (dark.view.camera.world_from_camera == eye).all()
     assert session.charts.density < density, "a number of texels was asked for"
+    taken = take_light(session)
+    assert [m.lightmap_scale for m in (taken.unedited.materials[1], taken.scene.materials[1])] == [1.0, 2.0], "so written"
     assert state.edits.undoable == f"texel density of {came.name}"
     edits.undo(dark.view, state)
     state.run_actions()
