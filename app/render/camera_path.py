@@ -25,7 +25,7 @@ from scipy.interpolate import PchipInterpolator
 
 from app.errors import UserError
 from app.render.camera import UP, CameraView
-from app.scene.authored import Table
+from app.scene.authored_tables import Table
 from app.scene.gltf_file import first_problem
 from app.scene.library import path_file, path_names
 from app.scene.model import F64

@@ -183,7 +183,9 @@ def test_a_texel_density_is_an_edit(dark: Dark) -> None:
     assert session.materials[1].albedo == (0.6, 0.1, 0.1) and (dark.view.camera.world_from_camera == eye).all()
     assert session.charts.density < density, "a number of texels was asked for"
     taken = take_light(session)
-    assert [m.lightmap_scale for m in (taken.unedited.materials[1], taken.scene.materials[1])] == [1.0, 2.0], "so written"
+    assert [m.lightmap_scale for m in (taken.unedited.materials[1], taken.scene.materials[1])] == [1.0, 2.0], (
+        "so written"
+    )
     assert state.edits.undoable == f"texel density of {came.name}"
     edits.undo(dark.view, state)
     state.run_actions()
