@@ -31,7 +31,9 @@ from app.session.versions import Version, with_edits
 from app.solvers import DEFAULT_SOLVER, SOLVERS
 from app.util.background import BackgroundTask
 
-COARSE_SECONDS = 2.0  # of solving in coarse texels: from then on the processor makes better ones
+# Of solving in coarse texels, as fast as it goes, and the share of what is emitted that remains then: once either is reached, the
+# processor makes better ones
+COARSE_SECONDS, COARSE_LEFT = 4.0, 0.2
 
 
 @dataclass(frozen=True)
@@ -219,6 +221,15 @@ class Session(EditableScene):
         return self.loading or self._choice.switching
 
     @property
+    def uploading(self) -> bool:
+        """Whether the next ``poll`` uploads a part of what is on its way."""
+        return self._opening.has_part
+
+    def advance(self, *, fast: bool = False, interactive: bool = False) -> int:
+        """As of any solved scene; in coarse texels always fast, for they are not there for long."""
+        return super().advance(fast=fast or self.coarse, interactive=interactive)
+
+    @property
     def coarse(self) -> bool:
         """Whether what is open is in coarse texels, and better ones are on their way."""
         return self._coarse is not None and self._coarse is self.loading
@@ -319,7 +330,8 @@ class Session(EditableScene):
         """Once per frame: take in what the GPU reports, and swap in a scene that has finished loading, a part of it per frame.
         interactive: a hand is at the controls, what can wait does."""
         self._busy = False
-        self.run.resting = self.coarse and self.run.seconds >= COARSE_SECONDS
+        lit = self.run.seconds >= COARSE_SECONDS or self.run.progress.remaining <= COARSE_LEFT
+        self.run.resting = self.coarse and lit
         if self.loading is not None and (self._opening.has_part or self.loading.cancelled):
             self._busy = True
             self._open_part(self.loading)

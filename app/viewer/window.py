@@ -32,7 +32,8 @@ from app.viewer.ui_frame import UiFrame, save_screenshot
 GL_VERSION = (4, 1)
 TITLE = "Glowtree"
 AWAKE_SECONDS = 1.0  # that frames go on after the last event: tooltips appear, scroll bars settle
-LOADING_PAUSE = 0.03  # s between frames while there is only a scene to wait for: loading gets the processor
+# s between frames while there is only a scene to wait for: loading gets the processor; and of these while a hand is at a control
+LOADING_PAUSE, HELD_PAUSE = 0.1, 0.03
 REST_SECONDS = 0.5  # between two looks around at rest; an event ends the rest at once
 NOWHERE = -3.4e38  # where Dear ImGui has the mouse when it is outside the window
 BUTTONS = {1: 0, 2: 1, 3: 2}  # left, right, middle: moderngl-window to Dear ImGui
@@ -238,8 +239,8 @@ class ViewerWindow(WindowConfig):
             if not self.wnd.is_closing:
                 self.wnd.swap_buffers()
             waiting = self._session.on_its_way is not None or self._session.compared.fetching is not None
-            if waiting and not self._session.solving:
-                time.sleep(LOADING_PAUSE)
+            if waiting and not self._session.solving and not self._session.uploading:
+                time.sleep(HELD_PAUSE if self._ui.held else LOADING_PAUSE)
 
     def _wake(self, *_: object) -> None:
         self._awake_until = time.perf_counter() + AWAKE_SECONDS

@@ -45,6 +45,7 @@ def better(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[threadin
     monkeypatch.setattr(charts_cache, "FEWEST", 0)
     monkeypatch.setattr(loading, "COARSE_FROM", 0)
     monkeypatch.setattr(session_module, "COARSE_SECONDS", PATIENCE)
+    monkeypatch.setattr(session_module, "COARSE_LEFT", 0.0)
     monkeypatch.setattr(loading, "default_texels", lambda sides, roots: TEXELS // 16)
     with cache.elsewhere(tmp_path):
         yield go_on
@@ -126,9 +127,13 @@ def test_the_processor_is_left_to_better_charts_after_a_while(
     for _ in range(5):
         session.poll()
         session.advance()
-    assert session.solver.issued <= 1 and not session.solving and session.run.running
+    assert session.solver.issued == 0 and not session.solving and session.run.running
+    monkeypatch.setattr(session_module, "COARSE_SECONDS", PATIENCE)
+    monkeypatch.setattr(session_module, "COARSE_LEFT", 0.9)
+    frames(session, lambda: session.run.resting and session.solver.issued > 0)
+    assert session.run.progress.remaining <= 0.9 and not session.solving
     better.set()
-    frames(session, lambda: session.loading is None and session.solver.issued > 3)
+    frames(session, lambda: session.loading is None and session.run.progress.remaining < 0.3)
 
 
 def test_stopped_it_stays_in_coarse_texels_and_goes_on(view: View) -> None:

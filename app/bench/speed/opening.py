@@ -114,7 +114,7 @@ def _step(session: Session, report: Progress) -> str | None:
     loading = session.loading
     if loading is not None:
         report(loading.stage, loading.fraction)
-        if not session.solving:
+        if not session.solving and not session.uploading:
             time.sleep(LOADING_PAUSE)
     elif session.message is not None:
         raise UserError(session.message)
