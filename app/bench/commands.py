@@ -194,6 +194,7 @@ def _hard_flags(hard: Parser, family: Family) -> None:
     help = "by this one only (default all but pairs, whose time grows with the square of the texels)"
     hard.add_argument("--solver", choices=tuple(SOLVERS), help=help)
     hard.add_argument("--size", choices=HARD_SIZES, default=HARD_SIZES[0], help="of scenes and texels (default small)")
+    settings_flag(hard)
     json_flag(hard)
 
 

@@ -100,7 +100,7 @@ def fill(flags: argparse.Namespace, solver: str, settings: Settings) -> None:
     """Give the flags that were not given the values of settings, as far as the command has such flags: no two options share one.
     solver: that is asked for by a flag or settings."""
     flags.given = settings
-    if getattr(flags, "solver", None) is not None:
+    if hasattr(flags, "solver") and (flags.solver is not None or settings.solver is not None):
         flags.solver = solver
     for values in settings.tables.values():
         for name, value in values.items():

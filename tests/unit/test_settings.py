@@ -127,7 +127,7 @@ def parsed(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> argparse.Namespa
     seen: list[argparse.Namespace] = []
     for command in ("_bake", "_shot", "_info", "_view"):
         monkeypatch.setattr(cli, command, lambda flags: seen.append(flags) or 0)
-    for command in ("_bench_error", "_bench_shots", "_bench_presets"):
+    for command in ("_bench_error", "_bench_shots", "_bench_presets", "_bench_hard"):
         monkeypatch.setattr(commands, command, lambda flags: seen.append(flags) or 0)
     assert cli.run(list(arguments)) == 0
     return seen[-1]
@@ -153,6 +153,9 @@ def test_benches_take_what_they_have_of_settings(monkeypatch: pytest.MonkeyPatch
     unset = parsed(monkeypatch, "bench", "error", "x", "-o", "y")
     assert METHODS["gathering"].setup(None, unset).options.noise == CURVES_END["noise"]
     assert parsed(monkeypatch, "bench", "shots", settings).level == 1
+    assert parsed(monkeypatch, "bench", "hard", settings).solver == "gathering"
+    assert parsed(monkeypatch, "bench", "hard", settings, "--solver", "local").solver == "local"
+    assert parsed(monkeypatch, "bench", "hard").solver is None, "all of them"
     assert parsed(monkeypatch, "bench", "presets", settings).given.solver == "gathering"
 
 
