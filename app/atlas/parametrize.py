@@ -15,11 +15,11 @@ from scipy.sparse.csgraph import connected_components
 
 from app.atlas.charts import DEFAULT_TILE, Charts
 from app.atlas.contacts import hidden_pieces
-from app.atlas.cuts import GOES_ON
 from app.atlas.layout import Layout, density_for, measured, place, scaled, texel_count
 from app.atlas.rectangles import Rectangles, find_rectangles
 from app.atlas.seams import find_seams
 from app.atlas.sides import Sides, distinct_rows, facets, least, lit_sides, most, scene_size, weld
+from app.atlas.triangle_cuts import GOES_ON
 from app.atlas.unwrap import unwrap
 from app.errors import UserError
 from app.scene.model import F64, I32, Scene

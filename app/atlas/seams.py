@@ -16,9 +16,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.cuts import JUMPS
 from app.atlas.rectangles import CREASE
 from app.atlas.sides import distinct_rows
+from app.atlas.triangle_cuts import JUMPS
 from app.scene.model import F64, I32, Scene
 
 REACH = 1.5  # texels: bilinear look-ups inside of a chart reach √2 beyond its edge
@@ -71,7 +71,7 @@ def find_seams(
     chart: I32,
     ends: NDArray[np.uint8] | None,
 ) -> Seams:
-    """corners (m, 3): welded, of all triangles; triangle, back, uv, chart of the faces; ends: see cuts.py."""
+    """corners (m, 3): welded, of all triangles; triangle, back, uv, chart of the faces; ends: as in a Cut."""
     face = np.repeat(np.arange(len(triangle)), 3)
     k = np.tile(np.arange(3), len(triangle))
     # a back is seen the other way round

@@ -24,7 +24,7 @@ from app.lightmap.at_points import light_at
 from app.lightmap.seams import finished
 from app.lightmap.surfaces import on_their_faces
 from app.scene.model import F32, F64, Scene
-from app.scene.validate import counted
+from app.util.words import counted
 
 OUTSIDE = 1e-4  # of the layout, that coordinates may leave [0, 1] by rounding
 DARK = 1e-2  # of the mean irradiance: less is what a solution still owes, or leaks

@@ -21,10 +21,10 @@ from app.scene.images import ImageError, linear_from_srgb
 from app.scene.options import FileOptions
 from app.scene.sky import DEFAULT_SUN, Sky, Sun
 from app.scene.sky_image import SUFFIXES, read_sky_image
-from app.scene.validate import one_line
 from app.session.settings import PRESETS, Settings, settings_of
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
 from app.ui.state import Pace
+from app.util.words import one_line
 
 DEFAULT_SCENE = "cornell-box"
 ALIKE = 0.75  # share of letters in common that makes a flag a likely slip for another; all begin with the same dashes

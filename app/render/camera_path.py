@@ -29,7 +29,7 @@ from app.scene.authored_tables import Table
 from app.scene.gltf_file import first_problem
 from app.scene.library import path_file, path_names
 from app.scene.model import F64
-from app.scene.validate import one_line
+from app.util.words import one_line
 
 MOST_FRAMES = 10_000
 FAR = 1e6  # m from the origin: more is a slip

@@ -26,8 +26,9 @@ from app.scene.gltf_schema import Mesh, Node, Primitive
 from app.scene.lights import LUMENS_PER_WATT, Light
 from app.scene.model import F64, Camera, Material, Scene
 from app.scene.outline import Outline, colour_textures
-from app.scene.validate import Part, check_triangle_count, counted, validate
+from app.scene.validate import Part, check_triangle_count, validate
 from app.util.background import Report, share_of, unheard
+from app.util.words import counted
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 VALUES = {"TEXCOORD_0": ("VEC2",), "TEXCOORD_1": ("VEC2",), "NORMAL": ("VEC3",), "COLOR_0": ("VEC3", "VEC4")}

@@ -21,7 +21,7 @@ from app.scene.gltf_schema import Material as GltfMaterial
 from app.scene.gltf_schema import Texture as GltfTexture
 from app.scene.images import ImageError, read_channel, read_image
 from app.scene.model import F32, F64, RGB, Material, Texture
-from app.scene.validate import counted
+from app.util.words import counted
 
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 NEAREST = 9728

@@ -17,8 +17,8 @@ from app.scene.model import Scene
 from app.scene.options import PHOTOMETRIC, FileOptions
 from app.scene.orientation import oriented
 from app.scene.sky import Sky
-from app.scene.validate import one_line
 from app.util.background import Report, unheard
+from app.util.words import one_line
 
 LOADERS = {**MESH_LOADERS, ".toml": load_authored}
 OWN_SKY = "the scene has a sky of its own: --sky and --sun are for scenes that have none"

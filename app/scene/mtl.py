@@ -16,7 +16,7 @@ from pathlib import Path
 from app.errors import SceneError
 from app.scene.images import ImageError, read_channel, read_image
 from app.scene.model import F32, RGB, Material, Texture
-from app.scene.validate import counted
+from app.util.words import counted
 
 WHITE: RGB = (1.0, 1.0, 1.0)
 NAMES_SHOWN = 3  # of pictures that are missing

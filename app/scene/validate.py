@@ -20,9 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import SceneError
+from app.scene.checked_lights import check_lights
+from app.scene.checked_materials import check_colours, check_materials, drop_unmapped_textures, hold_albedo
 from app.scene.lights import Light
-from app.scene.model import F32, F64, MOST_ALBEDO, RGB, Camera, Material, Scene, Texture
+from app.scene.model import F64, Camera, Material, Scene
 from app.util.background import Report, unheard
+from app.util.words import counted, one_line
 
 MAX_TRIANGLES = 20_000_000
 EXTENT_RANGE = (1e-12, 1e12)  # m; outside of it areas leave the range of 32-bit floats by far
@@ -38,7 +41,6 @@ ODD_ORDERS = (
 
 Array = NDArray[Any]
 Bools = NDArray[np.bool_]
-BRIGHTEST = 1e30  # W/(sr m²): leaves room for areas and sums in single precision
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,16 +59,6 @@ class Part:
     uv1: Array | None = None
     normals: Array | None = None
     colours: Array | None = None
-
-
-def counted(count: int, one: str, many: str) -> str:
-    """``1 triangle`` or ``3 triangles``."""
-    return f"{count} {one if count == 1 else many}"
-
-
-def one_line(text: str) -> str:
-    """``text`` as a single line without control characters: names in files can hold anything."""
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def check_triangle_count(source: str | Path, count: int) -> None:
@@ -121,12 +113,12 @@ def validate(
     triangles = (np.cumsum(used) - 1)[triangles]
     uvs = [_join_corners([p.uv0 for p in parts], parts, keep, 2), _join_corners([p.uv1 for p in parts], parts, keep, 2)]
     normals = _join_corners([p.normals for p in parts], parts, keep, 3)
-    colours = _check_colours(_join_corners([p.colours for p in parts], parts, keep, 3), notes)
-    checked_materials = _check_materials(source, materials, notes)
+    colours = check_colours(_join_corners([p.colours for p in parts], parts, keep, 3), notes)
+    checked_materials = check_materials(source, materials, notes)
     material_ids = _join_ids([p.material_ids for p in parts], parts)[keep]
-    material_ids, checked_materials = _drop_unmapped_textures(uvs, material_ids, checked_materials, notes)
+    material_ids, checked_materials = drop_unmapped_textures(uvs, material_ids, checked_materials, notes)
     report(0.8)
-    checked_materials, colours = _hold_albedo(checked_materials, material_ids, colours, notes)
+    checked_materials, colours = hold_albedo(checked_materials, material_ids, colours, notes)
 
     scene = Scene(
         name=name,
@@ -142,7 +134,7 @@ def validate(
         colours=colours,
         listed=np.flatnonzero(keep).astype(np.int32),
         source=Path(source),
-        lights=_check_lights(source, lights, notes),
+        lights=check_lights(source, lights, notes),
     )
     return dataclasses.replace(scene, normals=_unit_normals(scene, normals), warnings=tuple(notes))
 
@@ -246,131 +238,6 @@ def _join_corners(
     return np.concatenate(joined)[keep]
 
 
-def _check_materials(source: str | Path, materials: Sequence[Material], notes: list[str]) -> list[Material]:
-    checked, clamped, darkened = [], 0, 0
-    for material in materials:
-        if not all(math.isfinite(x) for x in (*material.albedo, *material.emission, material.opacity)):
-            raise SceneError(source, f"material '{material.name}': albedo, emission and opacity must be finite numbers")
-        if max(material.emission) > BRIGHTEST:
-            raise SceneError(
-                source, f"material '{material.name}': emission above {BRIGHTEST:g} W/(sr m²) is out of range"
-            )
-        albedo = _rgb(max(x, 0.0) for x in material.albedo)
-        emission = _rgb(max(x, 0.0) for x in material.emission)
-        clamped += albedo != material.albedo
-        darkened += emission != material.emission
-        name = one_line(material.name)
-        checked.append(_even_opacity(dataclasses.replace(material, name=name, albedo=albedo, emission=emission)))
-    if clamped:
-        notes.append(f"{counted(clamped, 'material', 'materials')} with an albedo below 0: set to 0")
-    if darkened:
-        notes.append(f"{counted(darkened, 'material', 'materials')} with an emission below 0: set to 0")
-    return checked
-
-
-def _even_opacity(material: Material) -> Material:
-    """Without the texture and the cutoff of an opacity that is 1, or 0, all over; held between 0 and 1."""
-    texture, cutoff = material.opacity_texture, material.opacity_cutoff
-    opacity = min(max(material.opacity, 0.0), 1.0)
-    least, most = (
-        opacity * float(f) for f in ((1, 1) if texture is None else (texture.pixels.min(), texture.pixels.max()))
-    )
-    all_over = float(least >= cutoff) if cutoff is not None else least
-    if texture is None or all_over == 1.0 or most < (cutoff or 1e-300):
-        return dataclasses.replace(material, opacity=all_over, opacity_texture=None, opacity_cutoff=None)
-    return dataclasses.replace(material, opacity=opacity)
-
-
-def _check_colours(colours: F32 | None, notes: list[str]) -> F32 | None:
-    """Vertex colours in [0, 1], 1 where a corner has none or one that is not finite."""
-    if colours is None:
-        return None
-    colours = np.nan_to_num(colours, nan=1.0, posinf=1.0, neginf=1.0)
-    outside = int(((colours < 0.0) | (colours > 1.0)).any(axis=(1, 2)).sum())
-    if outside:
-        notes.append(f"{counted(outside, 'triangle', 'triangles')} with vertex colours outside 0 to 1: clamped")
-    return np.clip(colours, 0.0, 1.0)
-
-
-def _hold_albedo(
-    materials: list[Material], ids: NDArray[np.int64], colours: F32 | None, notes: list[str]
-) -> tuple[list[Material], F32 | None]:
-    """Nothing reflects more than MOST_ALBEDO. What varies most is held: a material's picture, else its vertex colours, else its
-    factor."""
-    held, holding = list(materials), 0
-    pictures: dict[tuple[int, RGB], F32] = {}
-    for i in np.unique(ids).tolist():
-        material, mine = materials[i], ids == i
-        factor = _rgb(min(a, 1.0) for a in material.albedo)
-        most = _rgb(MOST_ALBEDO / max(a, MOST_ALBEDO) for a in factor)
-        above, texture = factor != material.albedo, material.albedo_texture
-        if texture is not None:
-            above |= bool((texture.pixels > np.array(most, np.float32)).any())
-            if above:
-                key = id(texture.pixels), most
-                pictures.setdefault(key, np.minimum(texture.pixels, np.array(most, np.float32)))
-                texture = dataclasses.replace(texture, pixels=pictures[key])
-        elif colours is not None:
-            above |= bool((colours[mine] > np.array(most, np.float32)).any())
-            colours[mine] = np.minimum(colours[mine], np.array(most, np.float32))
-        else:
-            factor = _rgb(min(a, MOST_ALBEDO) for a in factor)
-            above |= factor != material.albedo
-        if above:
-            holding += 1
-            held[i] = dataclasses.replace(material, albedo=factor, albedo_texture=texture)
-    if holding:
-        notes.append(f"{counted(holding, 'material', 'materials')} with an albedo above {MOST_ALBEDO:g}: held there")
-    return held, colours
-
-
-def _rgb(values: Iterable[float]) -> RGB:
-    r, g, b = (float(v) for v in values)
-    return (r, g, b)
-
-
-def _drop_unmapped_textures(
-    uvs: Sequence[Array | None], ids: NDArray[np.int64], materials: list[Material], notes: list[str]
-) -> tuple[NDArray[np.int64], list[Material]]:
-    """Give textured triangles without texture coordinates a copy of their material in its pictures' mean colours."""
-    ids, materials, unmapped = ids.copy(), list(materials), 0
-    for i, material in enumerate(tuple(materials)):
-        textures = material.textures
-        if not textures:
-            continue
-        mine = ids == i
-        bad = np.zeros(len(ids), bool)
-        for texcoord in {t.texcoord for t in textures}:
-            uv = uvs[texcoord]
-            bad |= mine if uv is None else mine & ~np.isfinite(uv).all(axis=(1, 2))
-        if bad.any():
-            unmapped += int(bad.sum())
-            ids[bad] = len(materials)
-            albedo = _mean_colour(material.albedo, material.albedo_texture)
-            emission = _mean_colour(material.emission, material.emission_texture)
-            opacity = _mean_colour((material.opacity,) * 3, material.opacity_texture)[0]
-            plain = Material(
-                material.name,
-                albedo,
-                emission,
-                double_sided=material.double_sided,
-                opacity=opacity,
-                lightmap_scale=material.lightmap_scale,
-            )
-            materials.append(plain)
-    if unmapped:
-        what = counted(unmapped, "textured triangle", "textured triangles")
-        notes.append(f"{what} without texture coordinates: the picture's mean colour is used")
-    return ids, materials
-
-
-def _mean_colour(factor: RGB, texture: Texture | None) -> RGB:
-    if texture is None:
-        return factor
-    mean = np.broadcast_to(texture.pixels.mean(axis=(0, 1), dtype=np.float64), 3)
-    return _rgb(f * float(m) for f, m in zip(factor, mean, strict=True))
-
-
 def _check_cameras(cameras: Sequence[Camera], notes: list[str]) -> tuple[Camera, ...]:
     """Make every camera rigid and its name unique; drop what is singular, not finite or has no field of view."""
     good: list[Camera] = []
@@ -391,38 +258,6 @@ def _check_cameras(cameras: Sequence[Camera], notes: list[str]) -> tuple[Camera,
         dropped = len(cameras) - len(good)
         notes.append(f"{counted(dropped, 'camera was', 'cameras were')} dropped: singular or without a field of view")
     return tuple(good)
-
-
-def _check_lights(source: str | Path, lights: Sequence[Light], notes: list[str]) -> tuple[Light, ...]:
-    """Lights that a solver can use: finite, not negative, with the inner cone within the outer one, and that within half of all
-    directions."""
-    checked, dark, cones, aimless = [], 0, 0, 0
-    for light in lights:
-        name = one_line(light.name)
-        if not all(map(math.isfinite, (*light.intensity, *light.position, light.inner, light.outer, light.radius))):
-            raise SceneError(source, f"light '{name}': intensity, position, cones and radius must be finite numbers")
-        if max(light.intensity) > BRIGHTEST:
-            raise SceneError(source, f"light '{name}': an intensity above {BRIGHTEST:g} is out of range")
-        direction = light.direction
-        if not all(map(math.isfinite, direction)):
-            if light.kind != "point":
-                aimless += 1
-                continue
-            direction = (0.0, -1.0, 0.0)
-        intensity = _rgb(max(x, 0.0) for x in light.intensity)
-        outer = min(light.outer, math.pi / 2)
-        inner = min(light.inner, outer)
-        dark += intensity != light.intensity
-        cones += (inner, outer) != (light.inner, light.outer)
-        held = dataclasses.replace(light, name=name, intensity=intensity, direction=direction)
-        checked.append(dataclasses.replace(held, inner=inner, outer=outer))
-    if aimless:
-        notes.append(f"{counted(aimless, 'light was', 'lights were')} dropped: without a direction")
-    if dark:
-        notes.append(f"{counted(dark, 'light', 'lights')} with an intensity below 0: set to 0")
-    if cones:
-        notes.append(f"{counted(cones, 'spot light', 'spot lights')} with cones out of order or above 90 degrees: held")
-    return tuple(checked)
 
 
 def _unit_normals(scene: Scene, normals: Array | None) -> NDArray[np.float32] | None:

@@ -30,7 +30,6 @@ from app.scene.model import Material, Scene
 from app.scene.options import FileOptions
 from app.scene.sky import Sky, Sun
 from app.scene.sky_image import read_sky_image
-from app.scene.validate import one_line
 from app.session.document_tables import (
     AreaLampTable,
     CameraTable,
@@ -47,6 +46,7 @@ from app.session.document_tables import (
 from app.session.session import Reading
 from app.session.versions import Version
 from app.session.view import View
+from app.util.words import one_line
 
 NO_PICTURE = "the picture of its sky is not there, --sky gives it"
 NUMBERS = ("albedo", "emission", "opacity")  # fields of a material that can be edited

@@ -10,10 +10,11 @@ import trimesh
 from numpy.typing import NDArray
 from solver_scenes import grey, quads_scene, room
 
-from app.atlas import cuts, intersections
+from app.atlas import flat_pieces, intersections
 from app.atlas.charts import Charts
-from app.atlas.cuts import ENDS, JUMPS, cut_at_contacts
+from app.atlas.cuts import cut_at_contacts
 from app.atlas.parametrize import parametrize
+from app.atlas.triangle_cuts import ENDS, JUMPS
 from app.scene.model import F64, Scene
 from app.scene.validate import Part, validate
 
@@ -120,7 +121,7 @@ def test_a_foot_that_ends_in_the_middle_is_drawn_on() -> None:
 
 
 def test_grass_does_not_shred_a_floor(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cuts, "MOST_ENDS", 5)
+    monkeypatch.setattr(flat_pieces, "MOST_ENDS", 5)
     blades = [[(x, 0, 0.3), (x, 0.2, 0.3), (x, 0.2, 0.4), (x, 0, 0.4)] for x in (0.5, 1.0, 1.5)]
     cut = cut_at_contacts(scene_of(*blades))
     assert cut.ends is None and "6 thin things" in cut.scene.warnings[0]

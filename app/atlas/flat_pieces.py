@@ -1,0 +1,167 @@
+"""Flat pieces of a scene, and what parts them: where something stands on one that it does not cover.
+
+A foot that ends inside of a piece is drawn on to whatever is next, since a chart would reach around its end. What a body hides by
+standing on a piece (see contacts.py) needs no cut, nor what only touches its rim. Lengths are over the scene's size.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from app.atlas.contacts import Members, covers
+from app.atlas.intersections import NEAR, Contacts
+from app.atlas.sides import FLAT, distinct_rows
+from app.scene.model import F64, I32, Scene
+from app.util.background import Report
+
+MOST_PIECES = 4096  # that are parted, beyond which none is: each takes a millisecond
+MOST_ENDS = 64  # of feet in one flat piece, that are drawn on: those of grass are not
+
+I64 = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A flat piece of the scene in its plane: its triangles (t,), their corners (t, 3, 2), the axes (3, 2) of the plane, its
+    border, and what parts it, segments (n, 2, 2): where something stands, and that with what was drawn on."""
+
+    members: I64
+    flat: F64
+    axes: F64
+    border: shapely.Geometry
+    stands: F64
+    parts: F64
+
+
+def parted_pieces(
+    scene: Scene, places: F64, corners: I32, facet: I32, found: Contacts, report: Report
+) -> tuple[list[Piece], int]:
+    """The flat pieces that contacts part; how many of these lead nowhere."""
+    triangles = places[corners]
+    members = Members.of(facet)
+    owner = facet[found.triangle]
+    order = np.argsort(owner, kind="stable")
+    pieces: list[tuple[Piece, Contacts]] = []
+    for mine in np.split(order, np.flatnonzero(np.diff(owner[order])) + 1):
+        report(0.5 * len(pieces) / MOST_PIECES)
+        piece = _piece(triangles, members[owner[mine[0]]])
+        lines = shapely.linestrings(found.ends[mine] @ piece.axes)
+        inside = shapely.length(shapely.difference(lines, shapely.buffer(piece.border, NEAR))) > NEAR
+        if inside.any():
+            pieces.append((piece, found.only(mine[inside])))
+    if not pieces:
+        return [], 0
+    first = np.array([piece.members[0] for piece, _ in pieces], np.int64)
+    own, two_sided = facet[first].astype(np.int64), scene.sides[first]
+    axes = np.stack([piece.axes for piece, _ in pieces])
+    hidden = covers(places, corners, facet, scene.sides, own, axes, FLAT)
+    out, left = [], 0
+    for nth, (piece, there) in enumerate(pieces):
+        report(0.5 + 0.5 * nth / len(pieces))
+        flat = there.ends @ piece.axes
+        lines = shapely.linestrings(flat)
+        kept = np.zeros(len(flat), bool)
+        for back, outside in enumerate((there.front.copy(), there.back & two_sided[nth])):
+            if nth in hidden[back]:
+                cover = shapely.STRtree(shapely.get_parts(shapely.buffer(hidden[back][nth], NEAR)))
+                outside[cover.query(lines, predicate="covered_by")[0]] = False
+            kept |= outside
+        parts, loose = _drawn_on(flat[kept], piece.border)
+        left += loose
+        if len(parts):
+            out.append(dataclasses.replace(piece, stands=flat[kept], parts=parts))
+    return out, left
+
+
+def on_rims(corners: F64, triangles: I32, facet: I32, found: Contacts) -> Mask:
+    """Which contacts run along an edge of their triangle (m, 3, 3), and that at the rim of its flat piece."""
+    start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
+    _, edge, uses = distinct_rows(np.minimum(start, end), np.maximum(start, end), np.repeat(facet, 3))
+    rim = (uses[edge] == 1).reshape(-1, 3)[found.triangle]
+    mine = corners[found.triangle]
+    way = np.roll(mine, -1, axis=1) - mine
+    way /= np.linalg.norm(way, axis=2, keepdims=True)
+    off = found.ends[:, None] - mine[:, :, None]  # (k, 3, 2, 3): from the start of each edge to each end
+    off -= np.einsum("kecx,kex->kec", off, way)[..., None] * way[:, :, None]
+    return np.asarray((rim & (np.linalg.norm(off, axis=3).max(2) <= NEAR)).any(1))
+
+
+def _piece(corners: F64, members: I64) -> Piece:
+    """A flat piece of triangles (m, 3, 3), not parted."""
+    axes = axes_of(corners[members])
+    flat = corners[members] @ axes
+    polygons = shapely.polygons(_on_grid(flat))
+    whole = polygons[0] if len(polygons) == 1 else shapely.union_all(polygons, grid_size=FLAT)
+    return Piece(members, flat, axes, shapely.boundary(whole), *np.empty((2, 0, 2, 2)))
+
+
+def axes_of(corners: F64) -> F64:
+    """(3, 2) of the plane of triangles (t, 3, 3), which are counter-clockwise there."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = normals[np.linalg.norm(normals, axis=1).argmax()]
+    normal = normal / np.linalg.norm(normal)
+    across = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    across /= np.linalg.norm(across)
+    return np.stack([across, np.cross(normal, across)], axis=1)
+
+
+def _drawn_on(segments: F64, border: shapely.Geometry) -> tuple[F64, int]:
+    """Segments (k, 2, 2) cut at each other, with those that end in nothing drawn on to what is next; how many are left out, since
+    too many do."""
+    parts = noded(segments)
+    loose, away = _loose_ends(parts, border)
+    if len(loose) > MOST_ENDS:
+        left = len(loose)
+        while len(loose):  # those that lead nowhere
+            at = np.isin(keys_of(parts), keys_of(loose)).any(1)
+            parts = parts[~at]
+            loose, _ = _loose_ends(parts, border)
+        return parts, left
+    for place, way in zip(loose, away, strict=True):
+        ahead = shapely.linestrings([place + NEAR * way, place + 2 * way])  # the scene is 1 wide
+        met = shapely.intersection(ahead, np.append(shapely.linestrings(parts), border))
+        far = shapely.distance(shapely.points(place), met[~shapely.is_empty(met)])
+        if len(far):
+            parts = np.concatenate([parts, [[place, place + far.min() * way]]])
+    parts = noded(parts) if len(loose) else parts
+    exact = dict(zip(keys_of(segments).reshape(-1).tolist(), segments.reshape(-1, 2), strict=True))
+    ends = [
+        exact.get(key, at) for key, at in zip(keys_of(parts).reshape(-1).tolist(), parts.reshape(-1, 2), strict=True)
+    ]
+    return np.reshape(ends, (-1, 2, 2)), 0
+
+
+def _loose_ends(parts: F64, border: shapely.Geometry) -> tuple[F64, F64]:
+    """Where only one of the segments ends, and not at the border (n, 2); the way out there (n, 2)."""
+    ends = parts.reshape(-1, 2)
+    first, _, uses = distinct_rows(*_on_grid(ends).T)
+    once = first[uses == 1]
+    once = once[shapely.distance(shapely.points(ends[once]), border) > NEAR] if len(once) else once
+    way = ends[once] - ends[once ^ 1]
+    return ends[once], way / np.linalg.norm(way, axis=1, keepdims=True)
+
+
+def _on_grid(places: F64) -> F64:
+    return np.asarray(np.round(places / FLAT) * FLAT)
+
+
+def keys_of(places: F64) -> I64:
+    """One number for each point (…, 2) of the grid."""
+    cells = np.round(places / FLAT).astype(np.int64)
+    return np.asarray((cells[..., 0] << 32) + cells[..., 1])
+
+
+def noded(segments: F64) -> F64:
+    """Segments (k, 2, 2) cut where they cross or touch (n, 2, 2), on the grid, each once."""
+    if not len(segments):
+        return segments
+    whole = shapely.union_all(shapely.linestrings(_on_grid(segments)), grid_size=FLAT)
+    places, line = shapely.get_coordinates(shapely.get_parts(whole), return_index=True)
+    follows = np.flatnonzero(line[1:] == line[:-1])
+    return np.stack([places[follows], places[follows + 1]], axis=1)
