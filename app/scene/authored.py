@@ -234,4 +234,6 @@ class _Builder:
             u, v, w = (turned / np.linalg.norm(turned)).tolist()
             name = prefix + light.name
             self.lights.append(dataclasses.replace(light, name=name, position=(x, y, z), direction=(u, v, w)))
+        if part.sky is not None:
+            self.warnings.append(f"{table.file}: its sky is left out: [sky] gives one")
         self.warnings += [f"{table.file}: {note}" for note in part.warnings]

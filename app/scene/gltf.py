@@ -1,10 +1,10 @@
 """glTF 2.0 and GLB (Khronos glTF 2.0 specification) as a Scene.
 
 Every node with a mesh becomes an object. Read: triangles, strips and fans, all component types, sparse accessors, node
-hierarchies, instances (also EXT_mesh_gpu_instancing), materials and their pictures (``gltf_materials``), TEXCOORD_0
-and 1, normals, COLOR_0 as a factor of the albedo, morph targets and skins as they
-stand (``gltf_pose``), perspective cameras, lights of
-KHR_lights_punctual. Counted and left out: points and lines, skins whose joints are in no scene.
+hierarchies, instances (also EXT_mesh_gpu_instancing), materials and their pictures (``gltf_materials``), TEXCOORD_0 and 1,
+normals, COLOR_0 as a factor of the albedo, morph targets and skins as they stand (``gltf_pose``), perspective cameras, lights of
+KHR_lights_punctual, a sky of EXT_lights_image_based (``gltf_sky``). Counted and left out: points and lines, skins whose joints
+are in no scene.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from app.scene.gltf_materials import UNKNOWN_ALBEDO, read_materials
 from app.scene.gltf_pose import joint_matrices, morphed, skinning, turned_normals
 from app.scene.gltf_schema import Light as GltfLight
 from app.scene.gltf_schema import Mesh, Node, Primitive
+from app.scene.gltf_sky import read_sky
 from app.scene.lights import LUMENS_PER_WATT, Light
 from app.scene.model import F64, Camera, Material, Scene
 from app.scene.outline import Outline, colour_textures
@@ -80,7 +81,9 @@ def load_gltf(path: Path, report: Report = unheard) -> Scene:
         report(0.5 + 0.1 * nth / len(reader.placed))
         parts.append(part_of(placed))
     notes, objects, rest = [*reader.warnings(), *notes], reader.objects, share_of(report, 0.6, 1.0)
-    return validate(path, path.stem, parts, objects, materials, reader.cameras, notes, reader.lights, rest)
+    sky = read_sky(reader.file)
+    scene = validate(path, path.stem, parts, objects, materials, reader.cameras, notes, reader.lights, rest)
+    return scene if sky is None else scene.with_sky(sky)
 
 
 @np.errstate(all="ignore")
@@ -92,6 +95,7 @@ def outline_gltf(path: Path, most: int) -> Outline | None:
     if sum(placed.triangles for placed in reader.placed) <= most:
         return None
     materials, notes = reader.read_materials()
+    sky = read_sky(reader.file)
     sides = [1 + materials[placed.material].double_sided for placed in reader.placed]
     areas = [n * _area(placed) for n, placed in zip(sides, reader.placed, strict=True)]
     scales = [materials[placed.material].lightmap_scale for placed in reader.placed]
@@ -110,7 +114,7 @@ def outline_gltf(path: Path, most: int) -> Outline | None:
         textures=colour_textures(materials, coloured=any(p.shape.colours is not None for p in reader.placed)),
         lights=tuple(reader.lights),
         cameras=tuple(camera.name for camera in reader.cameras),
-        sky=None,
+        sky=None if sky is None else sky.kind,
         warnings=(*reader.warnings(), *notes),
         exact=False,
     )

@@ -28,6 +28,7 @@ JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 UNCOMPRESSED = "write it uncompressed first, e.g. gltf-transform copy in.glb out.glb"
 # Extensions that a file may require: read here, or without effect on diffuse light.
 KNOWN_EXTENSIONS = {
+    "EXT_lights_image_based",
     "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "KHR_draco_mesh_compression",

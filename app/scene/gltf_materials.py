@@ -115,7 +115,7 @@ class _Reader:
         index = self._source(self.file.pick(self.file.document.textures, info.index, "texture"))
         assert index is not None
         if (index, channel) not in self._channels:
-            data = self._data(self.file.pick(self.file.document.images, index, "image"))
+            data = image_data(self.file, self.file.pick(self.file.document.images, index, "image"))
             assert data is not None
             self._channels[index, channel] = read_channel(data, channel)
         pixels = self._channels[index, channel]
@@ -147,7 +147,7 @@ class _Reader:
 
     def _image(self, index: int, image: Image) -> F32 | None:
         if index not in self._pixels:
-            data = self._data(image)
+            data = image_data(self.file, image)
             try:
                 self._pixels[index] = None if data is None else read_image(data)
             except ImageError:
@@ -157,11 +157,6 @@ class _Reader:
     def _source(self, texture: GltfTexture) -> int | None:
         webp = texture.extensions.webp
         return texture.source if webp is None or webp.source is None else webp.source
-
-    def _data(self, image: Image) -> bytes | None:
-        if image.buffer_view is not None:
-            return bytes(self.file.view(image.buffer_view))
-        return None if image.uri is None else self.file.resource(image.uri)
 
 
 def uv_transform(transform: TextureTransform) -> F64:
@@ -173,3 +168,10 @@ def uv_transform(transform: TextureTransform) -> F64:
     c, s = math.cos(transform.rotation), math.sin(transform.rotation)
     (sx, sy), (tx, ty) = transform.scale, transform.offset
     return np.array([[c * sx, s * sy, tx], [-s * sx, c * sy, ty]])
+
+
+def image_data(file: GltfFile, image: Image) -> bytes | None:
+    """A picture as it is in the file, or in one that the file names; None where there is none."""
+    if image.buffer_view is not None:
+        return bytes(file.view(image.buffer_view))
+    return None if image.uri is None else file.resource(image.uri)

@@ -264,12 +264,29 @@ class Camera(Model):
     perspective: Perspective | None = None
 
 
+class ImageBasedLight(Model):
+    name: str = ""
+    rotation: Vec4 = (0.0, 0.0, 0.0, 1.0)
+    intensity: NotNegative = 1.0
+    specular_images: Annotated[list[tuple[Index, Index, Index, Index, Index, Index]], Field(min_length=1)]
+
+
+class ImageBasedLights(Model):
+    lights: list[ImageBasedLight] = []
+
+
+class SceneExtensions(Model):
+    image_based: LightIndex | None = Field(default=None, alias="EXT_lights_image_based")
+
+
 class SceneNodes(Model):
     name: str = ""
     nodes: list[Index] = []
+    extensions: SceneExtensions = SceneExtensions()
 
 
 class DocumentExtensions(Model):
+    image_based: ImageBasedLights = Field(default=ImageBasedLights(), alias="EXT_lights_image_based")
     punctual: Lights = Field(default=Lights(), alias="KHR_lights_punctual")
 
 
