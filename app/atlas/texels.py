@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from app.atlas.charts import Charts
 from app.atlas.contacts import inside_triangles
 from app.atlas.sides import least, most
+from app.atlas.texel_middles import FLAT, MISSING, along, beside_the_surface
 from app.atlas.unit_square import SLIVER, area_and_centroid, edge_distances
 from app.scene.model import F32, F64, I32, Scene
 from app.util.ahead import ahead
@@ -56,7 +57,8 @@ class TexelSurfaces:
     area (n, t, t) f64 [m²], 0 where nothing is covered; normal (n, t, t, 3) f32: unit area-weighted mean,
     towards the lit side; face (n, t, t) i32: the face with the largest share, -1 where nothing is covered;
     leading (n, t, t, 3) f64: centroid of that share alone [m]; cut (n, t, t): whether something lies on a part of it, or all.
-    Where something lies on the centroid, position and leading are the nearest place beside it.
+    Where something lies on the centroid, position and leading are the nearest place beside it; where that lies beside the flat
+    surface that is covered, position is leading.
     """
 
     position: F64
@@ -148,6 +150,15 @@ def texel_surfaces(
         f, (du, dv) = face[slot].astype(np.int64), (at - uv[face[slot], 0]).T * size
         for k in range(3):
             lead[k, slot] = origin[f, k] + du * tangents[0, f, k] + dv * tangents[1, f, k]
+        moment[:, slot] = area[slot] * lead[:, slot]
+        mine = np.flatnonzero((best < (1 - SLIVER) * area) & np.repeat(leaves.level == level, charts.tile**2))
+        f = face[mine].astype(np.int64)
+        partly = area[mine] < (1 - MISSING) * per_texel[f] * size**2
+        partly &= np.linalg.norm(normal[:, mine], axis=0) > (1 - FLAT) * area[mine]
+        mine, f = mine[partly], f[partly]
+        off = (moment[:, mine] / area[mine]).T - origin[f]
+        at = uv[f, 0] + np.stack(along(tangents[:, f], off), axis=1) / size
+        slot = mine[beside_the_surface(at, f, uv, mine // charts.tile**2, windows.face, windows.leaf)]
         moment[:, slot] = area[slot] * lead[:, slot]
     with np.errstate(invalid="ignore", divide="ignore"):
         position = np.where(area > 0, moment / area, 0.0)

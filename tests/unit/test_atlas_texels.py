@@ -187,6 +187,18 @@ def test_a_texel_sums_all_its_triangles() -> None:
     assert np.isclose(surfaces.area[on_sheet].item(), 4.0)
 
 
+def test_texels_in_the_shape_of_an_L_look_from_where_they_are() -> None:
+    """Around the corner of a hole the centroid of a texel lies in the hole."""
+    corners = np.array([(0, 0, 0), (2, 0, 0), (2, 0.2, 0), (0.2, 0.2, 0), (0.2, 2, 0), (0, 2, 0)])
+    around = shapes.Mesh(corners, np.array([(0, k, k + 1) for k in range(1, 5)]), corners[:, :2])
+    scene = scene_of([box_room().moved(0, 0, 1.5), around])
+    for texels in (1, 12):
+        charts = parametrize(scene, texels=texels)
+        surfaces = texel_surfaces(scene, charts, uniform_leaves(charts))
+        mine = (surfaces.face >= 0) & (scene.object_ids[charts.face_triangle[surfaces.face]] > 0)
+        assert mine.any() and (surfaces.position[mine][:, :2].min(1) < 0.2 + 1e-9).all()
+
+
 @pytest.mark.parametrize("larger_first", [True, False])
 def test_the_largest_share_decides_in_any_order(larger_first: bool) -> None:
     large, small = shapes.quad((0, 0, 0), (1.9, 0, 0), (0, 2, 0)), shapes.quad((1.9, 0, 0), (0.1, 0, 0), (0, 2, 0))
