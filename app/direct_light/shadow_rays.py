@@ -40,8 +40,12 @@ class DirectLight:
     sets: what is known, see lit.py. traced: shadow rays so far, of all texels. count: of a texel to a set, on average.
     """
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, rays: RayScene, origins: Origins) -> None:
+    def __init__(
+        self, gpu: Gpu, lightmap: Lightmap, rays: RayScene, origins: Origins, *, of_surfaces: bool = True
+    ) -> None:
+        """of_surfaces: whether surfaces that emit count, too."""
         self._gpu, self._lightmap, self._rays, self._origins = gpu, lightmap, rays, origins
+        self._of_surfaces = of_surfaces
         self.sets: list[AnyLit] = []
         self._kinds: dict[str, Kind[Any]] = {}
         self.traced = self._streams = 0
@@ -63,7 +67,7 @@ class DirectLight:
     def follow(self, scene: Scene) -> None:
         """Materials, the sky, or lamps without area are others: keep the sets of which all is known, drop what is no more, and
         add what is new."""
-        names = [LampLight.name]
+        names = [LampLight.name] * self._of_surfaces
         names += [SkyLight.name] * (scene.sky is not None) + [PunctualLight.name] * bool(scene.lights_and_sun)
         for kind in (self._kind(name) for name in dict.fromkeys([*self._kinds, *names])):
             lit_of_kind = [lit for lit in self.sets if lit.kind is kind]

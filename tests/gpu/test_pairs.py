@@ -18,7 +18,9 @@ from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import TilePool
+from app.scene.lights import Light
 from app.scene.model import F64, Scene
+from app.scene.sky import Sky
 from app.session.run import Stop
 from app.session.session import Session
 from app.solvers import ShootingOptions
@@ -255,6 +257,30 @@ def test_it_says_beforehand_what_a_bounce_takes(gpu: Gpu, monkeypatch: pytest.Mo
     assert solved.solver.issued == 0
     assert "a bounce takes about" in note and f"{len(solved.area) ** 2:,} pairs" in note
     solved.release()
+
+
+def test_light_from_outside_is_a_part_of_each_bounce(gpu: Gpu) -> None:
+    """An open floor receives I cos θ / d², E cos θ and π L, also after edits. In a closed room of albedo 1/2 all that a lamp
+    sends out is absorbed, and walls receive twice that, as near as form factors of a furnace sum up to 1."""
+    lamp = Light("lamp", intensity=(1.0, 2.0, 3.0), position=(0.5, 0.7, 0.6))
+    sun = Light("sun", "directional", (1.0, 1.0, 2.0), direction=(0.6, 0.0, -0.8))
+    open_floor = quads_scene([UNIT_SQUARE], [grey(0.0)]).with_lights((lamp, sun)).with_sky(Sky(colour=(0.1, 0.2, 0.3)))
+    floor = Solved(gpu, open_floor, 8.0, senders="all")
+    surfaces = floor.lightmap.pool.surfaces
+    at, up = (of[surfaces.area > 0] for of in (surfaces.position, surfaces.normal))
+    for strength in (1.0, 2.0):
+        lights = tuple(replace(one, intensity=tuple(strength * i for i in one.intensity)) for one in (lamp, sun))
+        floor.solver.set_lights(lights)
+        floor.solver.set_sky(Sky(colour=(0.1, 0.2, 0.3), strength=strength))
+        expected = sum(one.irradiance(at, up) for one in lights) + np.pi * strength * np.array([0.1, 0.2, 0.3])
+        np.testing.assert_allclose(floor.bounce(2), expected, rtol=0.02)  # rays start anywhere on texels of 1/8 m
+        assert abs(floor.solver.energy().imbalance_share) < 1e-4
+    floor.release()
+    closed = Solved(gpu, quads_scene(room(), [grey(0.5)]).with_lights((lamp,)), 6.0, senders="all", change=1e-3)
+    received = (closed.bounce(12) * closed.area).sum(0)
+    np.testing.assert_allclose(received, 2 * lamp.flux, rtol=0.01)
+    assert abs(closed.solver.energy().imbalance_share) < 5e-3  # close by, A_i F_ij differs from A_j F_ji
+    closed.release()
 
 
 def test_an_edit_goes_on_from_the_light_that_is_there(gpu: Gpu) -> None:

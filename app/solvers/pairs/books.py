@@ -6,7 +6,7 @@ Jacobi's H_n = F B_{n-1} balances by itself where F is symmetric, A_i F_ij = A_j
               absorbed            escaped                       unshot
 
 What no texel is seen to get counts as escaped: what leaves the scene, what ends on black sides, and in a closed room the error of
-the form factors, either way.
+the form factors, either way. Light from outside is emitted, too, and escapes where no texel receives it.
 """
 
 from __future__ import annotations
@@ -64,18 +64,18 @@ class Books:
         lightmap = self._lightmap
         return lightmap.emission() + lightmap.albedo() * light[..., :3].astype(np.float64) * lightmap.unit
 
-    def balance(self, *, begun: bool) -> EnergyBalance:
-        """Where all light is, RGB [W]. begun: whether there was a bounce."""
+    def balance(self, sent: F64, arrived: F64, *, begun: bool) -> EnergyBalance:
+        """Where all light is, RGB [W]. sent, arrived: from outside, and of that on texels; begun: whether there was a bounce."""
         lightmap, area = self._lightmap, self._area
         rho = lightmap.albedo().astype(np.float64)
         H, change = (
             x[..., :3].astype(np.float64) * lightmap.unit for x in (self.received, self.received - self.before)
         )
-        emitted, nothing = lightmap.emitted, np.zeros(3)
+        emitted, nothing = lightmap.emitted + sent, np.zeros(3)
         return EnergyBalance(
             emitted=emitted,
             absorbed=((1 - rho) * H * area).sum((0, 1, 2)),
-            escaped=self.escaped if begun else nothing,
+            escaped=self.escaped + sent - arrived if begun else nothing,
             unshot=(rho * change * area).sum((0, 1, 2)) if begun else emitted,
             reflectance=(rho * area).sum((0, 1, 2)) / max(float(area.sum()), 1e-300),
             area=float(area.sum()),

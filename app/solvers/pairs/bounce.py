@@ -39,10 +39,18 @@ class Bounce:
         self.at: tuple[int, int, int] | None = None
 
     def run(
-        self, target: Framebuffer, received: Texture, mean: float, bounce: int, show: Callable[[Area], None]
+        self,
+        target: Framebuffer,
+        received: Texture,
+        mean: float,
+        bounce: int,
+        *,
+        begin: Callable[[], None],
+        show: Callable[[Area], None],
     ) -> Iterator[None]:
         """The bounce of this number into a target, from what texels have received, in parts. mean: B̄ over all surfaces [stored
-        units]. show: called with each band of the target that is whole. One that is under way goes on where it is."""
+        units]. begin: writes what the target holds before. show: called with each band of the target that is whole. One that is
+        under way goes on where it is."""
         if self.kept is not None:
             filled = self.kept.full
             yield from self.kept.fill(self._pace)
@@ -52,7 +60,7 @@ class Bounce:
         width, height = self._lightmap.size
         choices = self._gather.choices
         if self.at is None:
-            target.clear()
+            begin()
             self.at = 0, self._rows_from(0), 0
         row, rows, first = self.at
         while row < height:

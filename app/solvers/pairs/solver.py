@@ -4,8 +4,8 @@
 
 These are the modes of RTRad, for comparison and teaching; gathering is what came of them. Where RTRad has constants there is the
 thing itself: a sender has the area of what it stands for, F close by is a closed form and not cut off, emitters receive as all
-texels do, and chance differs from texel to texel and from bounce to bounce. Quadratic modes say what they will cost, and stop
-wherever they are.
+texels do, and chance differs from texel to texel and from bounce to bounce. Light from outside is a part of each bounce.
+Quadratic modes say what they will cost, and stop wherever they are.
 """
 
 from __future__ import annotations
@@ -28,13 +28,12 @@ from app.solvers.pairs.bounce import Bounce
 from app.solvers.pairs.gather import Area
 from app.solvers.pairs.occlusion import Scenes
 from app.solvers.pairs.options import PairsOptions, check
+from app.solvers.pairs.outside import Outside
 from app.solvers.pairs.pace import PART, Pace
 from app.util.parts import is_running, run_to_end
 from app.util.state import State
 
 PIECE = 0.1  # seconds of a bounce that are one piece of work: a solve looks at its clock in between
-NO_SKY = "--solver pairs: texels gather from texels, and not from the sky; the other solvers do"
-NO_LIGHTS = "--solver pairs: texels gather from texels, and not from lamps without area; the other solvers do"
 LONG = 2.0  # seconds of a bounce, from which on it is said beforehand
 
 
@@ -47,13 +46,10 @@ class Pairs:
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: PairsOptions) -> None:
         if lightmap.pool.adaptive:
             raise UserError("--solver pairs: texels gather from texels of one size; not with --adaptive")
-        if lightmap.scene.lit_by_sky:
-            raise UserError(NO_SKY)
-        if lightmap.scene.lit_by_lights:
-            raise UserError(NO_LIGHTS)
         check(options, lightmap.texel_count)
         self._gpu, self._lightmap, self.options = gpu, lightmap, options
         self._scenes, self._pace, self._books = Scenes(gpu, lightmap), Pace(gpu), Books(lightmap)
+        self._outside = Outside(gpu, lightmap, self._scenes)
         self._show = Pass(gpu, "common/copy")
         self._light = [
             gpu.texture(lightmap.size, 4, "f4") for _ in range(2)
@@ -87,8 +83,15 @@ class Pairs:
         return 1
 
     def _one_bounce(self) -> Iterator[None]:
+        yield from self._outside.find()
+        target = self._targets[1]
         yield from self._begin_bounce().run(
-            self._targets[1], self._light[0], self._books.mean_sent, self.issued, self._show_area
+            target,
+            self._light[0],
+            self._books.mean_sent,
+            self.issued,
+            begin=lambda: self._outside.write(target),
+            show=self._show_area,
         )
         self._light.reverse()
         self._targets.reverse()
@@ -165,7 +168,7 @@ class Pairs:
     def energy(self) -> EnergyBalance:
         """Where all light is after the last whole bounce, RGB [W]; see books.py."""
         self._finish()
-        return self._books.balance(begun=self.issued > 0)
+        return self._books.balance(*self._outside.sent, begun=self.issued > 0)
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
 
@@ -173,6 +176,7 @@ class Pairs:
         """Forget all light."""
         self._drop_bounce()
         self._lightmap.clear()
+        self._outside.change()
         for target in self._targets:
             target.clear()
         self._books.begin()
@@ -209,16 +213,22 @@ class Pairs:
         self._progress = self._judged(self._left)
 
     def set_sky(self, sky: Sky | None) -> None:
-        """Only one that sends no light. Raises UserError."""
-        if sky is not None and sky.emits:
-            raise UserError(NO_SKY)
+        """Another sky: bounces go on from the light that is there."""
         self._lightmap.set_sky(sky)
+        self._follow_outside()
 
     def set_lights(self, lights: tuple[Light, ...]) -> None:
-        """Only such that send no light. Raises UserError."""
-        if any(light.emits for light in lights):
-            raise UserError(NO_LIGHTS)
+        """Other lamps without area, as ``set_sky``."""
         self._lightmap.set_lights(lights)
+        self._follow_outside()
+
+    def _follow_outside(self) -> None:
+        self._outside.change()
+        if not self.issued:
+            self.reset()
+            return
+        self._drop_bounce()
+        self._progress = self._judged(self._left)
 
     @property
     def _left(self) -> float:
@@ -239,6 +249,7 @@ class Pairs:
         self._finish()
         state = State({"progress": self._progress.measured, "issued": self.issued})
         keep(state, received=self._light[0], under_way=self._light[1])
+        state.put("outside", self._outside.state())
         state.arrays |= {"before": self._books.before, "books": self._books.received}
         if self._bounce is not None:
             state.put("bounce", self._bounce.state())
@@ -252,6 +263,7 @@ class Pairs:
         self.issued = int(state.values["issued"])
         self._progress = Progress.of(state.values["progress"])
         self._progress = self._judged(self._progress.remaining)
+        self._outside.restore(state.part("outside"))
         bounce = state.part("bounce")
         if bounce.values:
             self._begin_bounce().restore(bounce)
@@ -310,6 +322,7 @@ class Pairs:
         self._drop_bounce()
         self._forget_bounce()
         self._forget_shown()
+        self._outside.release()
         self._scenes.release()
         self._gpu.release_all(*self._targets, *self._light)
 
