@@ -47,7 +47,9 @@ def test_the_dark_half_is_dark(gpu: Gpu, solver: str, name: str) -> None:
     dark |= on_wall & (solution.normal[:, 0] > 0)
     H = solution.H.mean(1)
     assert 0.3 < dark.mean() < 0.7 and H[~dark].mean() > 0.1
-    # a tip of a texel that lies a millimetre behind the wall is seen past its edge by rays of a map, which are as wide
-    lit = dark & (H > 0.01 * H[~dark].mean())
-    assert solution.area[lit].sum() < (1e-4 if solver == "shooting" else 0.0 + 1e-12)
+    dark_light, lit_light = ((H * solution.area)[mine].sum() / solution.area[mine].sum() for mine in (dark, ~dark))
+    # Where an edge of the beam runs askew through a sample of a map, the sample may see past it: the rasteriser rounds to 1/256
+    # of one. Straight feet of walls pass nothing at all.
+    least = 1e-6 if solver == "shooting" and name == "a beam through it" else 0.0
+    assert dark_light <= least * lit_light
     solution.release()

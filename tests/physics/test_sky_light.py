@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 from solver_scenes import NOISE, Solution, begin, grey, quads_scene, room
 
-from app.atlas.parametrize import parametrize
-from app.errors import UserError
 from app.gpu import Gpu
-from app.lightmap.lightmap import Lightmap
-from app.lightmap.tile_pool import TilePool
 from app.scene.model import F64, Scene
 from app.scene.sky import Sky, Sun
 from app.scene.sky_directions import directions_of
 from app.session.balance import FINE
-from app.solvers.pairs.options import PairsOptions
-from app.solvers.pairs.solver import Pairs
 
 SKIES = ("shooting", "quadtrees", "gathering", "local")  # quadtrees: shooting on them
 EVERY_SKY_SOLVER = pytest.mark.parametrize("solver", SKIES)
@@ -237,12 +231,6 @@ def test_no_more_than_all_is_unshot_after_an_edit_of_the_sky(gpu: Gpu) -> None:
         lit.step(8)
         assert 0 < lit.solver.poll(wait=True).remaining <= 1.0
     lit.release()
-
-
-def test_what_cannot_follow_a_sky_says_so(gpu: Gpu) -> None:
-    scene = quads_scene([FLOOR], [grey(0.5)]).with_sky(Sky())
-    with pytest.raises(UserError, match="pairs"):
-        Pairs(gpu, Lightmap(gpu, TilePool(scene, parametrize(scene, density=2))), PairsOptions())
 
 
 def test_light_of_the_sky_is_smoothed_by_as_much_as_it_is_noisy(gpu: Gpu) -> None:

@@ -3,7 +3,8 @@
 //
 //   VISIBILITY 0, item id   a sample sees the receiver if it shows the receiver's facet [Coombe03, 3.2]
 //   VISIBILITY 1, depth     or if what it shows is no nearer than the receiver's own plane along that sample's sight
-//   VISIBILITY 2, combined  either: ids save receivers from depth error, depth saves small triangles from id error
+//   VISIBILITY 2, combined  either: ids save receivers from depth error, depth saves small triangles from id error; but not what
+//                           shows another facet where that plane is, and does not see the receiver, see visibility/behind.glsl
 //
 // With POINT, where what looks is one point, whose errors no others even out: where some of the four see the receiver, the others
 // hide it only if it is behind what they show.
@@ -18,6 +19,11 @@ const float DEPTH_SLACK = 1.0 / 16384.0;
 // the maps of several shots above each other
 uniform sampler2D t_items;
 uniform sampler2D t_depth;  // in units of FAR
+
+// The sight of the i-th of the four samples around a corner of the map, in the order of textureGather.
+vec3 ith_sight(int view, vec2 middle, int i) {
+    return local_from_view(view, sight_from_px(view, middle + vec2(i == 1 || i == 2 ? 0.5 : -0.5, i < 2 ? 0.5 : -0.5)));
+}
 
 // position: of the receiver, axes: of local vectors, both in the solver space
 float visible(float facet, vec3 position, vec3 local, vec3 normal_local, mat3 axes, int shot) {
@@ -42,16 +48,26 @@ float visible(float facet, vec3 position, vec3 local, vec3 normal_local, mat3 ax
     bvec4 open = greaterThanEqual(shown, depth * (1.0 - DEPTH_SLACK));
     seen = bvec4(seen.x || open.x, seen.y || open.y, seen.z || open.z, seen.w || open.w);
 #endif
-#if POINT && VISIBILITY == 2
-    if (any(seen) && !all(seen)) {
+    vec4 weight = vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)) * on_hemisphere(middle);
+#if VISIBILITY == 2
+    vec4 beyond = shown - depth, other = vec4(notEqual(items, vec4(facet))) * vec4(notEqual(items, vec4(UNCHARTED)));
+    bvec4 beside = bvec4(other * vec4(lessThanEqual(abs(beyond), DEPTH_SLACK * depth)));
+    if (any(beside)) {
         for (int i = 0; i < 4; ++i) {
-            vec2 px = middle + vec2(i == 1 || i == 2 ? 0.5 : -0.5, i < 2 ? 0.5 : -0.5);
-            if (!seen[i]) seen[i] = !behind(items[i], position, axes * local_from_view(view, sight_from_px(view, px)));
+            if (!beside[i]) continue;
+            bool tells;
+            seen[i] = sees_beside(items[i], facet, beyond[i], position, axes * ith_sight(view, middle, i), tells);
+            weight[i] *= float(tells);
         }
     }
 #endif
-    vec4 weight = vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)) * on_hemisphere(middle);
-    float share = dot(vec4(seen), weight) / dot(weight, vec4(1.0));
+#if POINT && VISIBILITY == 2
+    if (any(seen) && !all(seen)) {
+        for (int i = 0; i < 4; ++i)
+            if (!seen[i]) seen[i] = !behind(items[i], position, axes * ith_sight(view, middle, i));
+    }
+#endif
+    float told = dot(weight, vec4(1.0)), share = told > 0.0 ? dot(vec4(seen), weight) / told : 1.0;
     // the other side of what is seen: a shell without thickness has texels on both, in the same place
     return plane < 0.0 ? share : 0.0;
 }

@@ -46,7 +46,7 @@ class DirectionShots:
             sheer: Pass(gpu, "solvers/shooting/direction_map", defines=defines | more, slots=RECORDS)
             for sheer, more in kinds.items()
         }
-        reads = lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE")
+        reads = lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "TILE")
         self._receive, self._receive_rects = (
             Pass(gpu, "solvers/shooting/direction_receive", defines=defines | reads, slots=RECORDS, vertex=vertex)
             for vertex in ("common/fullscreen", "common/rects")
@@ -96,7 +96,7 @@ class DirectionShots:
 
     @property
     def _reads(self) -> dict[str, Texture]:
-        reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_facets"
+        reads = "t_position_area", "t_normal_ids", "t_materials", "t_albedo", "t_facets", "t_leaves"
         return self._lightmap.textures(*reads) | {"t_items": self._items, "t_depth": self._depth}
 
     def _groups(self, shots: int) -> list[tuple[int, int]]:
@@ -131,7 +131,7 @@ class DirectionShots:
             record["edge_u"], record["edge_v"] = axes_of(shot.axis)
             record["normal"] = shot.axis
             record["exitance"] = shot.light / self._lightmap.unit
-            record["signed_size"] = 1
+            record["patch_y"], record["signed_size"] = shot.place, 1
         self._shooters.texture.write(SHOOTER.write(records, BLOCK_ROWS))
         self._shooters.share()
 

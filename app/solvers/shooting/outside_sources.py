@@ -48,6 +48,11 @@ class OutsideShot:
         """One of KINDS: a point, a direction of the sun or of a directional light, or one of the sky."""
         return POINTS if not self.source.from_afar else SKY if self.source.name == SKY else SUNS
 
+    @property
+    def place(self) -> int:
+        """Which of the places or directions of its light it is, from 1; 0: the only one; -1: of the sky."""
+        return -1 if self.source.name == SKY else int(self.source.name or 0)
+
     def is_like(self, other: OutsideShot) -> bool:
         """Whether both may be of one batch: of a kind, and both give light, or take it back."""
         return self.kind == other.kind and (self.light.sum() > 0) == (other.light.sum() > 0)
@@ -94,14 +99,18 @@ def _add(found: Sources, more: Iterable[tuple[Light, F64]]) -> None:
 
 def _points(light: Light) -> Iterable[tuple[Light, F64]]:
     places = np.array(light.position) + light.radius * (_in_a_ball(PLACES) if light.radius > 0 else np.zeros((1, 3)))
-    for x, y, z in places.tolist():
-        source = replace(light, name="", intensity=(1.0, 1.0, 1.0), position=(x, y, z), radius=0.0)
+    for nth, (x, y, z) in enumerate(places.tolist(), 1):
+        name = str(nth) if len(places) > 1 else ""
+        source = replace(light, name=name, intensity=(1.0, 1.0, 1.0), position=(x, y, z), radius=0.0)
         yield source, np.array(light.intensity) / len(places)
 
 
 def _directions(directions: Directions, name: str = "") -> Iterable[tuple[Light, F64]]:
-    for (x, y, z), light in zip((-directions.towards).tolist(), directions.irradiance, strict=True):
-        yield Light(name, "directional", direction=(x, y, z)), light
+    for nth, ((x, y, z), light) in enumerate(
+        zip((-directions.towards).tolist(), directions.irradiance, strict=True), 1
+    ):
+        which = name or (str(nth) if len(directions.towards) > 1 else "")
+        yield Light(which, "directional", direction=(x, y, z)), light
 
 
 def _in_a_ball(count: int) -> F64:

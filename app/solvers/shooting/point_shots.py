@@ -81,7 +81,7 @@ class PointShots:
             record["normal"], record["edge_u"], record["edge_v"] = scale * shot.axis, x, y
             record["area"] = shot.source.solid_angle * share_of_shot(shot.source)
             record["exitance"] = shot.light / (unit * space.scale**2)
-            record["patch_x"], record["signed_size"] = nth, 1
+            record["patch_x"], record["patch_y"], record["signed_size"] = nth, shot.place, 1
         self._shooters.texture.write(SHOOTER.write(records, BLOCK_ROWS))
         self._shooters.share()
         rows = np.zeros((BATCH, 4, 4), np.float32)

@@ -33,7 +33,7 @@ class Receive:
         options: ShootingOptions,
     ) -> None:
         self._lightmap, self._receivers, self._shooters, self._see = lightmap, receivers, shooters, see
-        self._facets = ("t_facets",) if see.lights is not None and options.visibility == "combined" else ()
+        self._facets = ("t_facets",) if options.visibility == "combined" else ()
         kinds = (True, False) if lightmap.pool.adaptive else tuple(receivers.meshes)
         fields = (False, True) if see.lights is None else (False,)
         self.passes = {(planar, near): self._make(gpu, options, planar, near) for planar in kinds for near in fields}
@@ -51,7 +51,7 @@ class Receive:
         return Pass(
             gpu,
             "solvers/shooting/receive",
-            defines=defines | IN_BLOCKS | self._lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"),
+            defines=defines | IN_BLOCKS | self._lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "TILE"),
             slots=RECORDS | self._see.slots,
             label=f"shooting/receive {'planar' if planar else 'general'} {'near' if near else 'far'}",
         )
@@ -75,7 +75,8 @@ class Receive:
 
         in_place: whether patches still are where they shot from, and do not light themselves."""
         lightmap = self._lightmap
-        general = lightmap.textures("t_position_area", "t_normal_ids", "t_facets")
+        lit = self._see.lights is not None
+        general = lightmap.textures("t_position_area", "t_normal_ids", "t_facets", *(("t_leaves",) if lit else ()))
         meshes = self._receivers.meshes if meshes is None else meshes
         for (planar, _), receive in self.passes.items():
             if planar not in meshes:
@@ -85,7 +86,7 @@ class Receive:
                 target,
                 textures=textures if planar else textures | general,
                 uniforms={"u_size": lightmap.size, "u_first": first, "u_shots": shots}
-                | ({} if planar else {"u_own": int(in_place)}),
+                | ({} if planar or lit else {"u_own": int(in_place)}),
                 blocks=self._shooters.blocks,
                 mesh=meshes[planar],
                 blend="add",

@@ -25,6 +25,10 @@ out vec3 v_position;
 flat out vec3 v_normal;
 flat out float v_facet;
 flat out vec3 v_albedo;
+#if LIGHT
+flat out vec3 v_u;  // edges of a texel
+flat out vec3 v_v;
+#endif
 #endif
 
 #if !LIGHT
@@ -65,6 +69,10 @@ void main() {
     v_normal = normalize(cross(in_b.xyz, in_c.xyz));
     v_position = in_a.xyz + at.x * in_b.xyz + at.y * in_c.xyz;
     v_facet = in_a.w;
+#if LIGHT
+    v_u = in_b.xyz;
+    v_v = in_c.xyz;
+#endif
     v_albedo = texelFetch(t_materials, ivec2(0, int(in_b.w)), 0).rgb;
 #endif
     v_shots = 0u;
