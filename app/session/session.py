@@ -7,6 +7,7 @@ is in solved_scene.py, edits of it in editable_scene.py.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -93,6 +94,7 @@ class Session(EditableScene):
         self.edited: object = None
         self._then_reference: Path | None = None
         self._coarse: Loading | None = None  # of what is open in coarse texels, until it is there in better ones
+        self._remained = math.inf  # of the light to be distributed, when better texels took the place of coarse ones
         self.reading = self._reading = Reading()
 
     def follow(self, prepare: Prepare, opened: Opened) -> None:
@@ -175,6 +177,7 @@ class Session(EditableScene):
             lightmap.set_sky(self.scene.sky)
             lightmap.set_lights(self.scene.lights)
             solver.reset()
+        self._remained = self.run.progress.remaining if refined else math.inf
         self.close()
         self.reading = self.reading if same_scene else self._reading
         self.lightmap, self.solver, self.unedited, self.surfaces = lightmap, solver, scene, surfaces
@@ -226,8 +229,10 @@ class Session(EditableScene):
         return self._opening.has_part
 
     def advance(self, *, fast: bool = False, interactive: bool = False) -> int:
-        """As of any solved scene; in coarse texels always fast, for they are not there for long."""
-        return super().advance(fast=fast or self.coarse, interactive=interactive)
+        """As of any solved scene; always fast in coarse texels, for they are not there for long, and in those that take their
+        place until as little remains as before."""
+        fast |= self.coarse or self.run.progress.remaining > self._remained
+        return super().advance(fast=fast, interactive=interactive)
 
     @property
     def coarse(self) -> bool:

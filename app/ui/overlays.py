@@ -231,10 +231,9 @@ def loading_overlay(loading: BackgroundTask[Any] | None, state: State, *, coarse
     imgui.set_next_window_pos(middle, imgui.Cond_.always, imgui.ImVec2(0.5, 0.0))
     imgui.begin("##loading", None, FLOATING)
     imgui.text_unformatted(loading.stage)
-    if coarse:
-        imgui.text_disabled("The light is coarse until then.")
     width = imgui.get_font_size() * LOADING_EM
-    imgui.progress_bar(min(max(loading.fraction, 0.0), 1.0), imgui.ImVec2(width, 0), f"{loading.fraction:.0%}")
+    share = f"{loading.fraction:.0%}" + (", coarse light until then" if coarse else "")
+    imgui.progress_bar(min(max(loading.fraction, 0.0), 1.0), imgui.ImVec2(width, 0), share)
     if imgui.button("Cancel", imgui.ImVec2(width, 0)):
         loading.cancel()
     imgui.end()

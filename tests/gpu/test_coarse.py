@@ -98,6 +98,11 @@ def test_coarse_light_appears_and_gives_way_to_better(view: View, better: thread
     assert session.lightmap.texel_count > 2 * few
     assert view.camera is seen and view.display == display
     assert session.materials[1] == material and session.light.adaptive == adaptive
+    made = []
+    for _ in range(3):
+        session.poll()
+        made.append(session.advance())
+    assert sum(made) > 3  # fast, until it has caught up
     session.set_material_edits({})
     if not adaptive:
         frames(session, lambda: session.run.converged)
