@@ -49,7 +49,7 @@ def begin(
     if logarithmic:
         implot.setup_axis_scale(implot.ImAxis_.y1, implot.Scale_.log10)
     if name not in zooms.zoomed:
-        implot.setup_axis_limits(implot.ImAxis_.x1, x[0], x[1] if x[1] > x[0] else x[0] + 1, implot.Cond_.always)
+        implot.setup_axis_limits(implot.ImAxis_.x1, *x, implot.Cond_.always)
         implot.setup_axis_limits(implot.ImAxis_.y1, *y, implot.Cond_.always)
         room = size.y / em - (2.0 if low else 4.0)
         if not logarithmic:

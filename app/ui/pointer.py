@@ -30,10 +30,11 @@ def follow(view: View, state: State, seconds: float) -> None:
     if not inside or state.drag_button >= 0 or state.flying or state.flight is not None:
         state.pointed, state.pointed_at = None, None
         return
-    place = int(x * state.ratio), int(y * state.ratio)
-    if state.pointed_age < SECONDS or (place == state.pointed_at and not view.session.run.running):
+    place, still = (int(x * state.ratio), int(y * state.ratio)), view.still
+    known = None if still is None else (place, still)
+    if state.pointed_age < SECONDS or (known is not None and known == state.pointed_at):
         return
-    state.pointed_age, state.pointed_at = 0.0, place
+    state.pointed_age, state.pointed_at = 0.0, known
 
     def look() -> None:
         state.pointed = view.under(*place)

@@ -46,6 +46,11 @@ class Range:
         span = self._usual[1] - self._usual[0]
         self._per_px = span / SPAN_PX if not multiple else max(span / SPAN_PX, multiple / STEP_PX)
 
+    @property
+    def decimals(self) -> int:
+        """Of a number that does not move by factors: as many as a pixel of the mouse changes."""
+        return max(math.ceil(-math.log10(self._per_px)), 0)
+
     def position(self, value: float) -> float:
         """Where a value lies [px]."""
         if not self.logarithmic:

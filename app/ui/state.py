@@ -107,7 +107,7 @@ class State:
     frames follow each other, so that there is a rate of them. texture_id: makes a texture of the host drawable; legend: the
     scale of what is shown now; stats: of the session, asked once per frame (None without a scene). atlas, adaptive: edited,
     not yet applied. view_px: the 3-D view (left, top, width, height) [display units]. inspected: what the solver showed last,
-    and of which light. draw_rays: those of the picked texel, in the room. pointed: under the pointer, at which pixel.
+    and of which light. draw_rays: those of the picked texel, in the room. pointed: under the pointer, and where.
     reveal_material: the list scrolls to the selected one. draw_lights: lamps without area, in the view. reference: of a solve
     in the background; layer: to go back to from the error. edits: of the open scene; held: whether a hand was at a control in
     the last frame. used: of which scene, the materials that are somewhere. version: of the open scene, that
@@ -151,7 +151,7 @@ class State:
     picked: Picked | None = None
     picked_age: float = 0.0
     pointed: Picked | None = None
-    pointed_at: tuple[int, int] | None = None
+    pointed_at: tuple[object, ...] | None = None
     pointed_age: float = 0.0
     reveal_material: bool = False
     draw_rays: bool = True
@@ -226,7 +226,7 @@ class State:
         """What is open now, told every frame: nothing of another scene stays picked or selected, nor of another cut of it.
         Two scenes may have the same name, so that only which objects they are tells them apart."""
         if lightmap is not self._known[1]:
-            self.picked = self.atlas = self.adaptive = None
+            self.picked = self.pointed = self.atlas = self.adaptive = None
         if scene is not self._known[0]:
             self.flight, self.material, self.light, self.area_lamp = None, 0, 0, 0
             self.scale = None

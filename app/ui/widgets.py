@@ -134,15 +134,14 @@ def _editor(spec: Spec, value: Any, start: Any, names: Mapping[str, str]) -> Any
 def _number(spec: Spec, value: float, start: float | None) -> float:
     """A slider, or where no end is known a drag. start: what 0 means, where that is a number."""
     unit = " " + spec.unit.replace("%", "%%") if spec.unit else ""
-    # Dear ImGui shows a format without a number as it stands
-    text = (f"{value:,}" if spec.type is int else "%.4g") + unit
-    if value == 0 and spec.zero:
-        text = spec.zero
     assert spec.minimum is not None and spec.maximum is not None, "a number that a widget edits has ends"
     multiple = spec.multiple if spec.type is int else 0
     ends = slider.Range(
         spec.minimum, spec.maximum, usual=spec.usual, logarithmic=spec.logarithmic, multiple=multiple, start=start
     )
+    # Dear ImGui shows a format without a number as it stands
+    digits = f"{value:,}" if spec.type is int else "%.4g" if spec.logarithmic else f"%.{ends.decimals}f"
+    text = spec.zero if value == 0 and spec.zero else digits + unit
     edited = slider.slide("##value", value, ends, text)
     return spec.type(edited) if edited != value else value
 

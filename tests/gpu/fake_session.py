@@ -151,6 +151,10 @@ class FakeSession:
         return false_colour_scale(self.display, self.lightmap)
 
     @property
+    def still(self) -> tuple[object, ...] | None:
+        return None if self.running else (self.display, self.reading)
+
+    @property
     def shown(self) -> DisplayOptions:
         return self.display
 

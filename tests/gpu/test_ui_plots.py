@@ -155,4 +155,4 @@ def test_a_curve_of_one_point_has_an_axis_of_whole_numbers(desk: Desk, ends: dic
     column = desk.session.history.column
     desk.session.history.column = lambda name: column(name)[:1]  # type: ignore[method-assign]
     desk.frames(2)
-    assert ends["energy"][1][:2] == (0.0, 1.0)
+    assert ends["energy"][1][:2] == (0.0, 10.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -139,3 +140,20 @@ def test_energy_is_in_the_same_units(desk: Desk, monkeypatch: pytest.MonkeyPatch
     assert energy._flux(power, desk.session) == pytest.approx(179 * power @ [0.2126, 0.7152, 0.0722])
     desk.session.display = desk.session.display.replace(quantities="radiometric")
     assert energy._flux(power, desk.session) == 6.0
+
+
+def test_what_was_under_the_pointer_in_another_picture_is_not_said(desk: Desk) -> None:
+    """Paused, with the pointer at rest: another scene or layer is looked at anew."""
+    looks: list[object] = []
+    desk.session.running = False
+    desk.session.under = lambda x, y: looks.append((x, y))  # type: ignore[method-assign]
+    desk.point(*VIEW)
+    desk.frames(20)
+    assert len(looks) == 1
+    desk.session.reading = object()
+    desk.frames(20)
+    assert len(looks) == 2
+    desk.ui.state.pointed = PICKED  # type: ignore[assignment]
+    desk.session.lightmap = SimpleNamespace(space=desk.session.lightmap.space)
+    desk.frames(1)
+    assert desk.ui.state.pointed is None

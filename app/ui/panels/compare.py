@@ -89,7 +89,7 @@ def _expected(view: View) -> None:
     if error is not None:
         widgets.facts("expected", [("RMS", widgets.percent(error.rms)), ("Median", widgets.percent(error.median))])
     elif view.session.at_rest:
-        widgets.dim("nothing is lit")
+        widgets.dim("nothing is lit" if view.session.run.converged else "no light yet")
     elif view.session.estimate.share > 0:
         imgui.progress_bar(view.session.estimate.share, imgui.ImVec2(-1, 0), "")
     else:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from app.session.view import View
 
 MOST_POINTS = 400  # per curve: more cannot be told apart in a panel
+LEAST_WORK, LEAST_SECONDS = 10.0, 1.0  # ends of an axis, while there is hardly anything yet
 SMALLEST = 1e-6  # of the power emitted, for the logarithmic axis
 PLOT_EM = 20.0  # width of a plot with its legend
 LEAST_EM = 18.0, 22.0  # width of one beside another: its legend just fits above it, or inside where it is low
@@ -93,8 +94,10 @@ def _thinned(rows: np.ndarray) -> np.ndarray:
     return np.asarray(rows[np.unique(np.linspace(0, max(len(rows) - 1, 0), min(len(rows), MOST_POINTS)).astype(int))])
 
 
-def _ends(x: np.ndarray) -> tuple[float, float]:
-    return (float(x.min()), float(x.max())) if len(x) else (0.0, 1.0)
+def _ends(x: np.ndarray, unit: str) -> tuple[float, float]:
+    """Of an axis: work is counted in whole numbers."""
+    low, high = (float(x.min()), float(x.max())) if len(x) else (0.0, 0.0)
+    return low, max(high, low + (LEAST_WORK if unit != "seconds" else LEAST_SECONDS))
 
 
 def _shares(
@@ -121,7 +124,7 @@ def _shares(
     highest = max(float(values.max(initial=1.0)) for _, values, _ in curves.values())
     decade = 10.0 ** min(np.floor(np.log10(max(lowest, SMALLEST))), -1.0)  # whole decades, at least one
     over = np.concatenate([curve[0] for curve in curves.values()])
-    if not plots.begin(state.zooms, "remaining", size, label, _ends(over), (decade, highest), logarithmic=True):
+    if not plots.begin(state.zooms, "remaining", size, label, _ends(over, unit), (decade, highest), logarithmic=True):
         return
     for name, (over, values, colour) in curves.items():
         if len(over):
@@ -135,7 +138,7 @@ def _energy(
     state: State, size: imgui.ImVec2, x: np.ndarray, shares: dict[str, np.ndarray], label: str | None, unit: str
 ) -> None:
     """Where the emitted power is, stacked: absorbed, escaped, unshot [fraction]."""
-    if not plots.begin(state.zooms, "energy", size, label, _ends(x), (0.0, 1.0)):
+    if not plots.begin(state.zooms, "energy", size, label, _ends(x, unit), (0.0, 1.0)):
         return
     names = (("absorbed", theme.ABSORBED), ("escaped", theme.ESCAPED), ("unshot", theme.UNSHOT))
     shares = shares | {"unshot": shares["remaining"]}
