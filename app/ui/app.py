@@ -86,11 +86,10 @@ class Ui:
         texture_id: Callable[[Any], int],
         legend: Legend | None = None,
     ) -> imgui.ImDrawData:
-        """Build one frame and do what it asked of the session.
+        """Build one frame, which is to be drawn before ``act`` does what it asked of the session.
 
-        size: of the window [display units]; ratio: pixels per unit; seconds: since the last frame. What the user did
-        wrong becomes a toast. Afterwards ``view_rect`` is where the 3-D view goes, and ``take_requests`` what the
-        host has to do.
+        size: of the window [display units]; ratio: pixels per unit; seconds: since the last frame. Afterwards ``view_rect`` is
+        where the 3-D view goes, and ``take_requests`` what the host has to do.
         """
         self.use()
         state = self.state
@@ -108,13 +107,19 @@ class Ui:
         imgui.new_frame()
         self._build(view, io.delta_time)
         imgui.render()
+        return imgui.get_draw_data()
+
+    def act(self, view: View, seconds: float) -> None:
+        """Do what the last frame asked of the session, ``seconds`` after the one before: no earlier than that is drawn, since
+        another solver or scene releases pictures that are in it. What the user did wrong becomes a toast."""
+        self.use()
+        state = self.state
         state.run_actions()
         state.held = self.held
         if state.baking is not None:
             bake.follow(state, state.baking)
         if view.session.opened:
             edits.watch(view, state, seconds)
-        return imgui.get_draw_data()
 
     @property
     def view_rect(self) -> tuple[int, int, int, int]:

@@ -64,7 +64,7 @@ class UiFrame:
         look: bool = True,
         samples: int = 1,
     ) -> list[Request]:
-        """Build and draw one frame into ``target``; what is left for the host to do.
+        """Build and draw one frame into ``target``, and do what it asked of the session; what is left for the host to do.
 
         size: of the window [display units]; ratio: pixels per unit, so that the target has size·ratio pixels;
         seconds: since the last frame. look: draw the view anew, or show it as it was drawn last. samples: pictures that the view
@@ -97,9 +97,10 @@ class UiFrame:
             viewport=(left, bottom, width, height),
         )
         self._renderer.draw(target, data)
+        self._ui.act(view, seconds)
         if Request.RELOAD_SHADERS in requests:
             self._reload()
-        return [r for r in requests if r is not Request.RELOAD_SHADERS]
+        return [r for r in (*requests, *self._ui.take_requests()) if r is not Request.RELOAD_SHADERS]
 
     def _look(self, view: View, target: Framebuffer, scale: Scale | None, *, fresh: bool, look: bool) -> None:
         """Draw the view within the time of a frame: where nothing moves, one more sample of it, until there are enough. fresh:

@@ -435,3 +435,20 @@ def test_ticks_are_round(low: float, high: float, logarithmic: bool, expected: l
 )
 def test_numbers_are_short(value: float, text: str) -> None:
     assert widgets.number(value) == text
+
+
+def test_what_an_edit_releases_was_drawn_before(gpu: Gpu) -> None:
+    """Another solver takes the pictures of the one before away, which are in the frame that it was chosen in."""
+    session = FakeSession(gpu=gpu)
+    session.image = image = gpu.texture((8, 4), 4, "f1")
+    desk = Desk(gpu, session)
+    desk.frames(2)
+
+    def choose() -> None:
+        session.image = None
+        image.release()
+
+    desk.ui.state.act(choose)
+    desk.frames(2)
+    assert session.image is None
+    desk.release()
