@@ -94,18 +94,18 @@ def table_room() -> Scene:
     return quads_scene([*room((4.0, 3.0, 4.0)), lamp, table], materials, [0, 0, 1, 0, 0, 0, 2, 3])
 
 
-EVERY_WAY = pytest.mark.parametrize(
-    ("adaptive", "projection"),
-    [
-        pytest.param(
-            adaptive,
-            projection,
-            id=f"{'adaptive' if adaptive else 'uniform'}-{projection}",
-            marks=() if projection == "hemicube" else pytest.mark.long,
-        )
-        for adaptive, projection in itertools.product((False, True), PROJECTIONS)
-    ],
-)
+WAYS = [
+    pytest.param(
+        adaptive,
+        projection,
+        id=f"{'adaptive' if adaptive else 'uniform'}-{projection}",
+        marks=() if projection == "hemicube" else pytest.mark.long,
+    )
+    for adaptive, projection in itertools.product((False, True), PROJECTIONS)
+]
+EVERY_WAY = pytest.mark.parametrize(("adaptive", "projection"), WAYS)
+# maps are drawn of the scene, whatever its texels: of whole solves, quadtrees by one projection are enough
+EACH_WAY = pytest.mark.parametrize(("adaptive", "projection"), WAYS[: len(PROJECTIONS) + 1])
 FAST = tuple(name for name, family in SOLVERS.items() if not family.quadratic and family.everywhere)
 EVERY_SOLVER = pytest.mark.parametrize("solver", FAST)
 EVERY_LIGHTMAP = pytest.mark.parametrize("adaptive", [False, True], ids=["uniform", "adaptive"])

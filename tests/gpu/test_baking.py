@@ -54,6 +54,7 @@ def frames(session: Session, baking: Baking, until: Callable[[], bool]) -> None:
         session.poll()
         session.advance(fast=True)
         baking.poll()
+        time.sleep(0.001)
 
 
 def names(folder: Path) -> list[str]:

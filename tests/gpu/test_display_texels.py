@@ -24,7 +24,7 @@ def test_display_texels_follow_the_leaves(
     gpu: Gpu, forest: Callable[..., Forest], rng: np.random.Generator, name: str, interpolation: str
 ) -> None:
     """A frame that brings only those of changed leaves up to date shows what one does that begins anew."""
-    trees = forest(SCENES[name](), texels=12000)
+    trees = forest(SCENES[name](), texels=6000)
     trees.lightmap.resize(trees.tree.resize(3000))
     options = DisplayOptions(layer="irradiance", tone_map="clamp", interpolation=interpolation)
     known = DisplayTexels(gpu, trees.lightmap, LeafAges(trees.pool), BORDER[interpolation])

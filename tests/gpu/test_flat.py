@@ -48,6 +48,7 @@ def test_a_scene_is_seen_before_it_is_unfolded_in_the_colours_of_its_materials(g
     while view.session.loading is not None:
         assert time.monotonic() < until, "did not load"
         view.session.poll()
+        time.sleep(0.001)
     assert view.session.opened and not view.draw_flat(target, SIZE)
     gpu.release_all(target, texture)
 

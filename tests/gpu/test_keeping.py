@@ -58,6 +58,7 @@ class Place:
         while not there():
             assert time.monotonic() < end, self.session.message
             self.frame()
+            time.sleep(0.001)
 
     def open(self, path: Path | str) -> Place:
         if Path(path).suffix == ".glow":

@@ -186,7 +186,7 @@ def test_splitting_and_merging_everything_leaves_no_objects(
     trees.grow()  # makes room
     trees.shrink()
     counts, rooms = [], []
-    for _ in range(20):
+    for _ in range(6):
         trees.grow()
         trees.shrink()
         counts.append(held(gpu))

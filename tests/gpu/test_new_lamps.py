@@ -52,6 +52,7 @@ class Dark:
         while self.session.on_its_way is not None:
             assert time.monotonic() < end
             self.session.poll()
+            time.sleep(0.001)
         self.session.work(32)
         self.session.run.settle()
 
@@ -116,6 +117,7 @@ def settle(dark: Dark) -> None:
     while dark.session.on_its_way is not None:
         assert time.monotonic() < end
         frame(dark)
+        time.sleep(0.001)
     frame(dark)
 
 

@@ -38,6 +38,7 @@ class Edited:
         while not there():
             assert time.monotonic() < end
             self.frame()
+            time.sleep(0.001)
 
     def undo(self) -> None:
         self.history.undo(knobs_of(self.view))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 
 import numpy as np
 import pytest
@@ -137,6 +138,7 @@ def test_another_tile_cuts_the_open_scene_anew(gpu: Gpu) -> None:
     session.cut_anew(session.atlas.replace(tile=8))
     while session.loading is not None:
         session.poll()
+        time.sleep(0.001)
     after = session.stats
     assert (session.charts.tile, session.parameters["atlas"]["tile"]) == (8, 8)
     assert after.texels == before.texels and after.tiles > before.tiles

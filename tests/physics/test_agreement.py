@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from solver_scenes import EVERY_LIGHTMAP, EVERY_WAY, UNIT_SQUARE, grey, quads_scene, room, solve, table_room
+from solver_scenes import EACH_WAY, EVERY_LIGHTMAP, UNIT_SQUARE, grey, quads_scene, room, solve, table_room
 
 from app.gpu import Gpu
 from app.reference.dense import DenseSolution, irradiance_at, solve_dense
@@ -57,7 +57,7 @@ def table_dense() -> DenseSolution:
     return solve_dense(table_room(), 380, 2)
 
 
-@EVERY_WAY
+@EACH_WAY
 def test_room_with_a_table(gpu: Gpu, table_dense: DenseSolution, adaptive: bool, projection: str) -> None:
     """Shadow, both sides, colour: means within 3 % of TABLE_MEANS: 1 % is still unshot, and another is lost where patches of a
     quarter of a metre see from their middles past table and lamp."""

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from solver_scenes import (
+    EACH_WAY,
     EVERY_LIGHTMAP,
     EVERY_WAY,
     UNIT_SQUARE,
@@ -126,7 +127,7 @@ def test_book_counts_what_leaves_and_what_black_sides_take(gpu: Gpu, half_open: 
 # -- furnaces ----------------------------------------------------------------------------------------------------------
 
 
-@EVERY_WAY
+@EACH_WAY
 def test_furnace(gpu: Gpu, adaptive: bool, projection: str) -> None:
     furnace_glows_evenly(gpu, 0.5, adaptive, projection)
 
@@ -185,7 +186,7 @@ def test_furnace_from_coarse_to_fine(gpu: Gpu, adaptive: bool) -> None:
     furnace.release()
 
 
-@EVERY_WAY
+@EACH_WAY
 def test_furnace_with_a_ball(gpu: Gpu, adaptive: bool, projection: str) -> None:
     """A ball of 1280 triangles in the room, under texels as large as 20 of them: they must neither hide in the ball nor look
     into it. Of the light, 1 % is still unshot, at most 2 % of B here; texels of several planes shoot and receive as if they were
@@ -245,7 +246,7 @@ def test_a_lone_emitter_sends_everything_away(gpu: Gpu) -> None:
     lamp.release()
 
 
-@EVERY_WAY
+@EACH_WAY
 def test_cornell_box_with_an_audit_per_shot(gpu: Gpu, adaptive: bool, projection: str) -> None:
     """The open box with two blocks and a lamp 0.1 mm under the ceiling. What each shot hands out, shot by shot as the solve
     chooses them: within 1 % in the mean. A patch that a block stands on or cuts is off by more, and shoots less."""
@@ -265,7 +266,7 @@ def test_cornell_box_with_an_audit_per_shot(gpu: Gpu, adaptive: bool, projection
     box.release()
 
 
-@EVERY_WAY
+@EACH_WAY
 def test_cornell_box_book(gpu: Gpu, adaptive: bool, projection: str) -> None:
     """At 4000 texels a block's foot is a texel wide (2 cm), and a patch whose middle lies close to it sees too much or too
     little: the solve loses 1 % of the light, 1.5 % is allowed. The open front is a sixth of the box."""

@@ -66,11 +66,6 @@ CHANGES: dict[str, tuple[Callable[[Scene], Scene], F64, float]] = {
         np.diag([1e-3, 1e-3, 1e-3, 1.0]),
         DENSITY * 1e3,
     ),
-    "a thousand times": (
-        lambda s: moved(s, np.diag([1e3, 1e3, 1e3, 1.0])),
-        np.diag([1e3, 1e3, 1e3, 1.0]),
-        DENSITY / 1e3,
-    ),
     "shuffled": (shuffled, IDENTITY, DENSITY),
     "split": (lambda s: split(s, apart=False), IDENTITY, DENSITY),
     "split in two facets": (lambda s: split(s, apart=True), IDENTITY, DENSITY),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from solver_scenes import EVERY_LIGHTMAP, EVERY_SOLVER, UNIT_SQUARE, grey, quads_scene, room, solve
+from solver_scenes import EVERY_SOLVER, UNIT_SQUARE, grey, quads_scene, room, solve
 
 from app.gpu import Gpu
 from app.solvers.shooting.options import VISIBILITIES
@@ -22,10 +22,13 @@ def way(visibility: str, projection: str = "hemicube") -> dict[str, object]:
     return {"solver": "gathering"} if visibility == RAYS else {"visibility": visibility, "projection": projection}
 
 
-@EVERY_LIGHTMAP
+# maps are drawn of the scene, and looked at point by point, whatever its texels: of quadtrees one way of each kind is enough
+UNIFORM = [*((v, "hemicube") for v in VISIBILITIES), *(("combined", p) for p in HEMISPHERES), (RAYS, "none")]
+QUADTREES = [("combined", "hemicube"), (RAYS, "none")]
+
+
 @pytest.mark.parametrize(
-    ("visibility", "projection"),
-    [*((v, "hemicube") for v in VISIBILITIES), *(("combined", p) for p in HEMISPHERES), (RAYS, "none")],
+    ("adaptive", "visibility", "projection"), [*((False, *w) for w in UNIFORM), *((True, *w) for w in QUADTREES)]
 )
 @pytest.mark.parametrize("double_sided", [False, True], ids=["black outside", "white outside"])
 @pytest.mark.parametrize("shift", [0.0, 0.013], ids=["in line", "out of line"])

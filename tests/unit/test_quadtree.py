@@ -45,9 +45,8 @@ def worst_step(pool: TilePool) -> int:
 
 
 @pytest.mark.parametrize(("name", "tile"), WITH_TILES)
-@pytest.mark.parametrize("seed", range(2))
-def test_whatever_splits_and_merges_the_surface_is_covered_once(name: str, tile: int, seed: int) -> None:
-    tree, rng = tree_of(name, tile=tile), np.random.default_rng(seed)
+def test_whatever_splits_and_merges_the_surface_is_covered_once(name: str, tile: int) -> None:
+    tree, rng = tree_of(name, tile=tile), np.random.default_rng(0)
     pool = tree.pool
     _, areas = pool.scene.normals_areas
     surface = areas[pool.charts.face_triangle].sum()
@@ -73,13 +72,12 @@ def object_areas(pool: TilePool) -> F64:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_neighbours_in_a_chart_differ_by_one_level_at_most(name: str) -> None:
-    for seed in range(3):
-        tree, rng = tree_of(name), np.random.default_rng(seed)
-        assert worst_step(tree.pool) <= 1, "at the start"
-        for _ in range(3):
-            shuffle(tree, rng, rounds=3)
-            assert worst_step(tree.pool) <= 1
-            assert tree.pool.leaves.level.max() > 1, "nothing is tested"
+    tree, rng = tree_of(name), np.random.default_rng(0)
+    assert worst_step(tree.pool) <= 1, "at the start"
+    for _ in range(3):
+        shuffle(tree, rng, rounds=3)
+        assert worst_step(tree.pool) <= 1
+        assert tree.pool.leaves.level.max() > 1, "nothing is tested"
 
 
 def test_a_leaf_deep_in_a_corner_takes_its_neighbours_along() -> None:
@@ -159,7 +157,7 @@ def test_fields_of_a_change_are_as_long_as_each_other() -> None:
 def test_slots_are_used_again() -> None:
     tree = tree_of("table")
     rooms, first = [], places(tree)
-    for _ in range(20):
+    for _ in range(6):
         splits = tree.splits(np.flatnonzero(tree.pool.used).tolist(), DEPTH)
         tree.split(splits)
         assert tree.room + len(tree) == tree.pool.tiles
