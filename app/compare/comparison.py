@@ -74,6 +74,7 @@ class Comparison:
         """Solving begins again: another curve begins."""
         self.errors = Rows(("work", "seconds", "rms", "median"))
         self._measured: object = None
+        self._state: object = None  # at the last call of ``measure``
 
     def measure(self, work: int, seconds: float, state: object, *, wait: bool = False) -> bool:
         """Once per frame: read what was asked for, and ask anew if it is time. work, seconds: of the solve so far; state: what
@@ -83,8 +84,9 @@ class Comparison:
             self._frames += 1
             if wait or self._frames >= FRAMES:
                 self._take()
+        rests, self._state = state == self._state, state
         if self._asked is None and state != self._measured and (wait or time.perf_counter() >= self._due):
-            self._asked = self._probe.look(), work, seconds, state
+            self._asked = self._probe.look(whole=wait or rests), work, seconds, state
             self._frames, self._due = 0, time.perf_counter() + SECONDS
             if wait:
                 self._take()

@@ -114,6 +114,7 @@ class RayGather:
         """What nodes receive now, on its way; ``irradiance`` reads it. position (n, 3) [m], normal (n, 3), shifts (n, SHIFTS)
         from 0 to 1; n at most ``rows``. rays: a multiple of BLOCK."""
         self._write_nodes(position, normal, shifts)
+        self._lightmap.refresh_ambient(whole=False)
         more, values = dict[str, Texture](), dict[str, object]()
         if self._sky is not None:
             more, values = self._sky[1], {"u_sky": tuple(self._sky[0].scale.tolist())}

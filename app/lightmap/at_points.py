@@ -17,6 +17,7 @@ from app.scene.model import F32, F64
 
 def irradiance_of(lightmap: Lightmap, points: Points) -> F64:
     """(n, 3) [W/m²], bilinear, as a bake would hold it: with what is still to come."""
+    lightmap.refresh_ambient(wait=True)
     image = finished(*collapse(lightmap.pool, lightmap.irradiance(ambient=True)), lightmap.charts)
     return light_at(image, lightmap.charts, points)
 

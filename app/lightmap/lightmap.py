@@ -113,13 +113,15 @@ class Lightmap(LightTextures):
         """H of every tile (tiles, t, t, 3) f32 [W/m²]; ``ambient``: H + a, with what is still to come, see common/ambient.glsl.
         Waits for the GPU."""
         H = self.light_of(self._textures["t_irradiance"])
-        return self.with_ambient(H) if ambient else H
+        return H + self.ambient() if ambient else H
 
-    def with_ambient(self, H: F32) -> F32:
-        """H + a of irradiance (…, 3) [W/m²]. Waits for the GPU."""
-        *a, share = np.frombuffer(self._textures["t_ambient"].read(), np.float32)
-        most = share * np.abs(H)
-        return np.asarray(H + np.clip(np.array(a) * np.float32(self.unit), -most, most))
+    def ambient(self) -> F32:
+        """a of every tile (tiles, t, t, 3) f32 [W/m²], or of all (3,). Waits for the GPU."""
+        self.refresh_ambient()
+        texture = self._textures["t_ambient"]
+        if texture.size != self.size:
+            return np.frombuffer(texture.read(), np.float32)[:3] * np.float32(self.unit)
+        return self.light_of(texture)
 
     def residual(self) -> F32:
         """r of every tile (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""

@@ -25,9 +25,10 @@ class Probe:
         self._target = gpu.target(self._made)
         self._pass = Pass(gpu, "lightmap/probe", defines=lightmap.defines("TILE"))
 
-    def look(self) -> ReadBack:
-        """The light as it is now, on its way; ``irradiance`` reads it."""
+    def look(self, *, whole: bool = True) -> ReadBack:
+        """The light as it is now, on its way; ``irradiance`` reads it. whole: see ``LightTextures.refresh_ambient``."""
         lightmap = self._lightmap
+        lightmap.refresh_ambient(whole=whole)
         self._pass.draw(
             self._target,
             textures={"t_points": self._points}

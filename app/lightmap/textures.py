@@ -6,7 +6,8 @@ Tile pool textures hold the leaf tiles of t×t texels side by side [Coombe03, 4.
     t_normal_ids     RG32UI   unit normal (octahedral, 2×snorm16), facet << MATERIAL_BITS | material (facet from 1)
     t_irradiance     storage  H [W/m²]: light received so far, so that radiosity B = E + ρH at any ρ, also 0
     t_residual       storage  r [W/m²]: exitance that is still pending, where a solver has such a term: not yet shot
-    t_ambient        RGBA32F  one texel, a: what the rest of the solve will about add to H, and pictures and bakes show with it
+    t_ambient        RGBA32F  a: what the rest of the solve will about add to H, and pictures and bakes show with it; one texel
+                              for all, unless a solver knows it of each
     t_albedo, t_emission      only where a material has such a texture: the factor is in the material table
 
 and tables: t_pages and t_leaves (where a place of the virtual atlas is in the tile pool, and what its slots hold), t_facets,
@@ -18,7 +19,7 @@ sums them, the a of H holds Σ P F V, the power that a texel got, and the a of r
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,7 @@ class LightTextures:
     """The textures, and targets that draw into them.
 
     columns, rows: of the tile pool in tiles; size: in texels; unit: W/m² per stored unit of H and r; version: counts changes of
-    the leaves.
+    the leaves. ambient_of: of a solver that makes an ambient term, see ``refresh_ambient``.
     """
 
     def __init__(self, gpu: Gpu, pool: TilePool, storage: str, textures: Mapping[str, Texture] | None) -> None:
@@ -51,6 +52,7 @@ class LightTextures:
         self._emit = Pass(gpu, "lightmap/emit", defines=self.defines("MATERIAL_BITS", "EMISSION_TEXTURE"))
         self._textures["t_ambient"] = gpu.texture((1, 1), 4, "f4")
         self.ambient_target = gpu.target(self._textures["t_ambient"])
+        self.ambient_of: Callable[[bool, bool], None] | None = None
         self.version = 0
         self._targets: list[Framebuffer] = []
         self.set_storage(storage)
@@ -74,6 +76,20 @@ class LightTextures:
         """The named textures, to bind; ``t_albedo`` and ``t_emission`` are left out where the scene has none."""
         optional = {"t_albedo", "t_emission"}
         return {n: self._textures[n] for n in names if n in self._textures or n not in optional}
+
+    def refresh_ambient(self, *, whole: bool = True, wait: bool = False) -> None:
+        """Have the ambient term of the light as it is, before it is read; if not ``whole``, as much of it as a frame has time
+        for. wait: also for what is first made in the background."""
+        if self.ambient_of is not None:
+            self.ambient_of(whole, wait)
+
+    def hold_ambient(self) -> None:
+        """Have an ambient term of each texel from now on, none yet."""
+        if self._textures["t_ambient"].size != self.size:
+            self.gpu.release_all(self.ambient_target, self._textures["t_ambient"])
+            self._textures["t_ambient"] = self.gpu.texture(self.size, 4, "f4")
+            self.ambient_target = self.gpu.target(self._textures["t_ambient"])
+            self.ambient_target.clear()
 
     @property
     def light_target(self) -> Framebuffer:
@@ -177,9 +193,13 @@ class LightTextures:
     def resize(self, moves: Moves) -> None:
         """Take over a tile pool that has got another number of slots. The light goes with its leaves."""
         self.gpu.release_all(*self._targets)
-        for name in (*self.pool.tile_arrays(np.empty(0, np.int64)), *LIGHT):
+        of_each = self._textures["t_ambient"].size != (1, 1)
+        for name in (*self.pool.tile_arrays(np.empty(0, np.int64)), *LIGHT, *(["t_ambient"] if of_each else [])):
             self._textures[name] = self.moved(self._textures[name], moves)
         self._make_targets()
+        if of_each:
+            self.gpu.release_all(self.ambient_target)
+            self.ambient_target = self.gpu.target(self._textures["t_ambient"])
         self._follow(moves.new)
 
     def moved(self, texture: Texture, moves: Moves) -> Texture:

@@ -112,9 +112,7 @@ def _ends(kind: str, lightmap: Lightmap, units: str) -> tuple[float, float]:
     pool, sample = lightmap.pool, sampled_tiles(lightmap.pool)
     materials, area = lightmap.scene.materials, pool.surfaces.area[sample]
     emission = sampled_colours(pool, [m.emission for m in materials], pool.emission_tiles, sample)
-    light: F32 = lightmap.with_ambient(sampled_irradiance(lightmap)) * np.float32(
-        value_per_radiance(kind, units) / np.pi
-    )
+    light: F32 = sampled_irradiance(lightmap) * np.float32(value_per_radiance(kind, units) / np.pi)
     if kind == "luminance":
         light = light * sampled_colours(pool, [m.albedo for m in materials], pool.albedo_tiles, sample)
     values = light @ LUMINANCE

@@ -30,11 +30,8 @@ def sampled_colours(pool: TilePool, factors: list[RGB], colours: F32 | None, sam
 
 
 def sampled_irradiance(lightmap: Lightmap) -> F32:
-    """H of the sampled tiles (tiles, t, t, 3) [W/m²]."""
-    pool = lightmap.pool
-    cells, unit = _stored_irradiance(lightmap)
-    tile = np.arange(pool.tiles)[sampled_tiles(pool)]
-    return cells[tile // pool.columns, :, tile % pool.columns, :, :3].astype(np.float32) * unit
+    """H + a of the sampled tiles (tiles, t, t, 3) [W/m²], with what is still to come."""
+    return lightmap.irradiance(ambient=True)[sampled_tiles(lightmap.pool)]
 
 
 def irradiance_at(lightmap: Lightmap, texels: Texels) -> F32:

@@ -73,6 +73,7 @@ def take_light(session: Session, *, parts: bool = False, look: Mapping[str, Any]
     viewer would if None. Waits for the GPU."""
     clock = time.perf_counter()
     lightmap = session.lightmap
+    lightmap.refresh_ambient(wait=True)
     light = [lightmap.irradiance(ambient=True)]
     if parts:
         light.append(np.clip(lightmap.light_of(session.solver.layers["direct"]), 0, light[0]))

@@ -46,6 +46,7 @@ def solve(source: Path, target: Path) -> int:
         if session.run.interrupted:
             return INTERRUPTED
         lightmap, charts = session.lightmap, session.charts
+        lightmap.refresh_ambient(wait=True)
         image = finished(*collapse(lightmap.pool, lightmap.irradiance(ambient=True)), lightmap.charts)
         answer = {
             "image": image,

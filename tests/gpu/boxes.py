@@ -47,9 +47,13 @@ def put(lightmap: Lightmap, name: str, tiles: F64) -> None:
     lightmap.texture(name).write(np.ascontiguousarray(image, np.float32).tobytes())
 
 
-def put_ambient(lightmap: Lightmap, a: tuple[float, float, float], share: float = 1.0) -> None:
-    """Ambient light (RGB) [W/m²], at most so many times what has arrived."""
-    lightmap.texture("t_ambient").write(np.array([*np.array(a) / lightmap.unit, share], np.float32).tobytes())
+def put_ambient(lightmap: Lightmap, a: tuple[float, float, float]) -> None:
+    """The same ambient light (RGB) [W/m²] on all texels, whatever a solver finds."""
+    lightmap.ambient_of = None
+    texture = lightmap.texture("t_ambient")
+    texture.write(
+        np.tile(np.array([*np.array(a) / lightmap.unit, 0.0], np.float32), texture.width * texture.height).tobytes()
+    )
 
 
 def even(lightmap: Lightmap, H: tuple[float, float, float]) -> F64:

@@ -23,6 +23,7 @@ from app.render.options import TONE_MAPS
 from app.render.resolve import BORDER, PLACES_WIDTH
 from app.solvers.gathering.compose import RADIUS
 from app.solvers.pairs.gather import CHOICES
+from app.solvers.shooting.gather_points import RAY_EDGE
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 from app.solvers.shooting.records import BATCH, BLOCK_LEVEL, BLOCK_ROWS, CELL_LEVEL, EMITTER, GROUP, LEVELS, RECORDS
 from app.solvers.shooting.see import ESCAPED_BLOCK
@@ -42,6 +43,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "CELL_LEVEL": (CELL_LEVEL,),
     "BATCH": (BATCH,),
     "BLOCK_ROWS": (BLOCK_ROWS,),
+    "RAY_EDGE": (RAY_EDGE,),
     "GROUP": (GROUP,),
     "BLOCK": (ESCAPED_BLOCK,),
     "BLOCK_LEVEL": (BLOCK_LEVEL,),

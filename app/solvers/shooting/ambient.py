@@ -1,60 +1,183 @@
-"""The ambient term is the irradiance that all unshot light will make on average [Cohen88, section 5].
+"""The ambient term is the irradiance that unshot light will make, shown and baked with H from the first shots on [Cohen88, 5].
 
-It is shown and baked with H, with the light that is still to come from outside. Where the storage can hold a residual below zero
-that of patches is overshot [Feda92]: a patch shoots, with its residual, what it will reflect of the ambient light.
+Of what surfaces have yet to shoot it is gathered by points that know what they see, see gather_points.py; of what lamps and
+sources outside have yet to give, it goes where such light came from the start. Where the storage can hold a residual below zero
+that of patches is overshot [Feda92]: a patch shoots, with its residual, what it will reflect of an even ambient term.
 """
 
 from __future__ import annotations
 
-from app.gpu import Gpu, Pass
+import numpy as np
+
+from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
+from app.lightmap.textures import write_table
+from app.lightmap.tile_pool import TABLE_WIDTH
 from app.solvers.shooting.choose import Bins
+from app.solvers.shooting.gather_points import GatherPoints
 from app.solvers.shooting.ledger import Ledger
-from app.solvers.shooting.records import RECORDS
+from app.solvers.shooting.records import BLOCK_LEVEL, RECORDS
 from app.solvers.shooting.shooters import ShooterBatch
+from app.util.background import BackgroundTask
+from app.visibility.bvh import Bvh
+from app.visibility.rays import tree_is_near, tree_of
+
+SWEEPS = 6  # looks of each point until nothing changes: as many reflections
+RAYS_A_LOOK = 1 << 16  # of one frame, where not all must be
+TRACING = 4  # times as long as to look up what a ray hit
 
 
 class Ambient:
-    """Whoever makes it releases it. overshoot: one texel, what is overshot, see ambient.frag.glsl."""
+    """Whoever makes it releases it.
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch, ledger: Ledger) -> None:
+    overshoot: one texel, what is overshot, see even_ambient.frag.glsl. shown: whether the lightmap is given any. held: while
+    light is taken from those who shoot and has not arrived.
+    """
+
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch, ledger: Ledger, *, shown: bool) -> None:
         self._gpu, self._lightmap, self._shooters, self._ledger = gpu, lightmap, shooters, ledger
-        self.overshoot = gpu.texture((1, 1), 4, "f4")
+        self.overshoot, self._lamps, self._to_come = (gpu.texture((n, 1), 4, "f4") for n in (1, 1, 2))
         self.overshoot_target = gpu.target(self.overshoot)
-        self._estimate = Pass(gpu, "solvers/shooting/ambient", slots=RECORDS)
+        self._lamps_target, self._to_come_target = gpu.target(self._lamps), gpu.target(self._to_come)
+        self._estimate = Pass(gpu, "solvers/shooting/even_ambient", slots=RECORDS)
+        self._add_lamps = Pass(
+            gpu,
+            "solvers/shooting/unshot_lamps",
+            defines=lightmap.defines("MATERIAL_BITS") | {"BLOCK_LEVEL": BLOCK_LEVEL},
+        )
+        self._find_to_come = Pass(gpu, "solvers/shooting/to_come", slots=RECORDS)
+        self._lamp_blocks = gpu.texture((1, 1), 1, "u4")
+        self._lamp_count = 0
+        self._points: GatherPoints | None = None  # once it is shown
+        self._tree: BackgroundTask[Bvh] | None = None
+        self.shown, self.held = shown, False
+        self._sweeps, self._next_row = SWEEPS, 0
+        lightmap.ambient_of = self.refresh
 
-    def update(self, bins: Bins, shots: int = 0, *, shown: bool, to_each_given: float) -> None:
-        """Estimate it from what is unshot in the bins, and from so many shots of a batch since. shown: also in pictures and
-        bakes. to_each_given: see Outside."""
+    def update(self, bins: Bins, shots: int = 0) -> None:
+        """Estimate what is overshot from what is unshot in the bins, and from so many shots of a batch since."""
+        self.changed()
         ledger = self._ledger
-        outside = tuple((ledger.to_come / ledger.watt).tolist())
-        both = [(False, self._lightmap.ambient_target, outside, to_each_given)] * shown
-        both += [(True, self.overshoot_target, (0.0, 0.0, 0.0), 0.0)] * (self._lightmap.storage != "fixed8")
-        for overshoots, target, to_come, ratio in both:
+        if self._lightmap.storage != "fixed8":
             self._estimate.draw(
-                target,
+                self.overshoot_target,
                 textures={
                     "t_unshot": bins.unshot,
                     "t_ledger": ledger.texture,
                     "t_shooters": self._shooters.texture,
                 },
-                uniforms={
-                    "u_shots": shots,
-                    "u_albedo": ledger.albedo,
-                    "u_area": ledger.area,
-                    "u_overshoots": int(overshoots),
-                    "u_outside": to_come,
-                    "u_to_each_given": ratio,
-                },
+                uniforms={"u_shots": shots, "u_albedo": ledger.albedo, "u_area": ledger.area},
             )
 
-    def hide(self) -> None:
-        """Show none."""
-        self._lightmap.ambient_target.clear()
+    def changed(self) -> None:
+        """Other light is unshot than when the lightmap was given its ambient term."""
+        self._sweeps = SWEEPS
+
+    def refresh(self, whole: bool, wait: bool) -> None:
+        """Give the lightmap the ambient term of the light as it is; if not ``whole``, RAYS_A_LOOK towards it. wait: for the tree
+        that rays walk, without which there is none."""
+        if not self.shown or not self._sweeps or (self.held and not whole):
+            return
+        points = self._points_now(wait)
+        if points is None:
+            return
+        self._see_to_come()
+        rays = RAYS_A_LOOK if points.knows(self._next_row) else RAYS_A_LOOK // TRACING
+        rows = points.rows if whole else points.rows_of(rays)
+        looked = 0
+        while self._sweeps and (whole or looked < rows):  # a few sweeps, where all take less than a look
+            some = min(rows, points.rows - self._next_row)
+            points.look(self._to_come, self._next_row, some)
+            looked += some
+            self._next_row = (self._next_row + some) % points.rows
+            self._sweeps -= self._next_row == 0
+
+    def _points_now(self, wait: bool) -> GatherPoints | None:
+        """The points; unless ``wait``, none while their tree is built in the background."""
+        pool = self._lightmap.pool
+        if self._points is None and (wait or tree_is_near(pool)):
+            self._points = GatherPoints(self._gpu, self._lightmap)
+            self._lightmap.hold_ambient()
+        elif self._points is None and self._tree is None:
+            self._tree = BackgroundTask("rays in this scene", lambda tell: tree_of(pool, lambda share: tell("", share)))
+        return self._points
+
+    def _see_to_come(self) -> None:
+        """What lamps and sources outside have yet to give."""
+        ledger, lightmap = self._ledger, self._lightmap
+        self._lamps_target.clear()
+        if self._lamp_count:
+            reads = "t_position_area", "t_normal_ids", "t_materials", "t_residual"
+            self._add_lamps.draw(
+                self._lamps_target,
+                textures=lightmap.textures(*reads) | {"t_lamp_blocks": self._lamp_blocks},
+                vertices=self._lamp_count,
+                points=True,
+                blend="add",
+            )
+        self._find_to_come.draw(
+            self._to_come_target,
+            textures={"t_lamps": self._lamps, "t_ledger": ledger.texture},
+            uniforms={
+                "u_area": ledger.area,
+                "u_outside": tuple((ledger.to_come / ledger.watt).tolist()),
+            },
+        )
+
+    def find_lamps(self) -> None:
+        """See which texels emit now."""
+        pool = self._lightmap.pool
+        emits = np.array([m.emits for m in self._lightmap.scene.materials])
+        face = pool.surfaces.face
+        shines = emits[pool.scene.material_ids[pool.charts.face_triangle[face]]] & (face >= 0)
+        across = pool.tile >> BLOCK_LEVEL
+        blocks = shines.reshape(-1, across, 1 << BLOCK_LEVEL, across, 1 << BLOCK_LEVEL).any(axis=(2, 4))
+        tile, row, column = np.nonzero(blocks)
+        x = tile % pool.columns * across + column
+        y = tile // pool.columns * across + row
+        self._lamp_count = len(x)
+        table = np.zeros((-(-max(len(x), 1) // TABLE_WIDTH), TABLE_WIDTH, 1), np.uint32)
+        table.reshape(-1)[: len(x)] = y << 16 | x
+        self._lamp_blocks = write_table(self._gpu, self._lamp_blocks, table)
+
+    def leaves_changed(self) -> None:
+        """Leaves have split, or merged."""
+        self.find_lamps()
+        self.changed()
+        if self._points is not None:
+            self._points.leaves_changed()
+
+    def resize(self) -> None:
+        """For a lightmap that has got another number of slots."""
+        self.find_lamps()
+        if self._points is not None:
+            self._points.resize()
+            self._next_row = 0
+
+    def show(self, shown: bool) -> None:
+        """Show it from now on, or none."""
+        self.shown = shown
+        self.changed()
+        if not shown:
+            self._lightmap.ambient_target.clear()
+
+    @property
+    def carried(self) -> list[tuple[Texture, Framebuffer]]:
+        """What goes with leaves that split or merge, see LeafFollower."""
+        held = self._points is not None
+        return [(self._lightmap.texture("t_ambient"), self._lightmap.ambient_target)] if held else []
 
     def clear(self) -> None:
-        """Overshoot none."""
+        """Nothing has been shot."""
+        self.held = False
+        self.changed()
         self.overshoot_target.clear()
 
     def release(self) -> None:
-        self._gpu.release_all(self.overshoot_target, self.overshoot)
+        self._lightmap.ambient_of = None
+        if self._tree is not None:
+            self._tree.cancel()
+        if self._points is not None:
+            self._points.release()
+        self._gpu.release_all(self.overshoot_target, self.overshoot, self._lamps_target, self._lamps)
+        self._gpu.release_all(self._to_come_target, self._to_come, self._lamp_blocks)

@@ -56,7 +56,7 @@ class Batch:
         self.shooters, self.bins = ShooterBatch(gpu), Bins(gpu, lightmap)
         self.occluders, self.receivers = occluders_of(gpu, lightmap), Receivers(gpu, lightmap.pool)
         self.ledger = Ledger(gpu, lightmap, self.shooters)
-        self.ambient = Ambient(gpu, lightmap, self.shooters, self.ledger)
+        self.ambient = Ambient(gpu, lightmap, self.shooters, self.ledger, shown=options.ambient)
         self.outside = Outside(gpu, lightmap, self.occluders, self.receivers, self.shooters, self.ledger)
         self.marks = PatchMarks(gpu, lightmap)
         self.groups = EmitterGroups(lightmap, self.ledger, self.marks)
@@ -79,6 +79,7 @@ class Batch:
         if choice.settles:
             shots = self.groups.whole_groups(shots)
         yield from self.choose(choice, shots, bands)
+        self.ambient.held = True
         self.ledger.take(self.ambient.overshoot, shots)
         yield
         for first, some in self.see.groups(shots):
@@ -98,12 +99,8 @@ class Batch:
             self.phases.now.sum_blocks(self.marks.texture, self.ambient.overshoot, band, bands)
             yield
         self.phases.now.reduce(self.bins)
-        self.update_ambient()
+        self.ambient.update(self.bins)
         return made
-
-    def update_ambient(self, shots: int = 0) -> None:
-        """Estimate what is to come from the bins, and from so many shots of the batch since."""
-        self.ambient.update(self.bins, shots, shown=self.options.ambient, to_each_given=self.outside.to_each_given)
 
     def choose(self, choice: Choice, shots: int, bands: int) -> Iterator[None]:
         """The strongest patches; those that fail their audit are divided, and others chosen. [Coombe03, 3.4]"""
@@ -148,7 +145,8 @@ class Batch:
     def enter(self, shots: int) -> None:
         """Enter in the ledger what the batch shot, and see what that leaves to come."""
         self.ledger.enter(self.see.maps.escaped, shots)
-        self.update_ambient(shots)
+        self.ambient.held = False
+        self.ambient.update(self.bins, shots)
         if self.replay is not None:
             self.replay.log.add(shots)
 
@@ -185,6 +183,7 @@ class Batch:
         """See what the scene emits and reflects. at_least: power that groups may be off by in any case."""
         self.ledger.weigh()
         self.groups.weigh(at_least)
+        self.ambient.find_lamps()
 
     def shoot_finer(self) -> None:
         """Finer patches shoot from now on, those of lamps for themselves: strong shots again."""
@@ -229,6 +228,7 @@ class Batch:
         self.auditor.forget()
         self.marks.follow(change)
         self.receivers.follow()
+        self.ambient.leaves_changed()
         if self.replay is not None:
             self.replay.leaves_changed(change)
 
@@ -240,6 +240,7 @@ class Batch:
         self.ledger.resize()
         self.phases.resize()
         self.receivers.follow()
+        self.ambient.resize()
         if self.replay is not None:
             self.replay.resized(moves)
 
@@ -270,6 +271,7 @@ class Batch:
         self.marks.levels[:] = state.array("marks", np.float32, *self.marks.levels.shape)
         self.marks.upload()
         take_over(state, overshoot=self.ambient.overshoot)
+        self.ambient.changed()
         self.outside.restore(state.part("outside"))
         self.ledger.restore(state.part("ledger"))
         if self.replay is not None:

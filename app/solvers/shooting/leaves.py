@@ -41,7 +41,7 @@ class Leaves:
 
     @property
     def carried(self) -> list[tuple[Texture, Framebuffer]]:
-        return self._replay.carried
+        return [*self._replay.carried, *self._batch.ambient.carried]
 
     def options_changed(self) -> None:
         self._replay.all_again = bool(self._replay.log.count)

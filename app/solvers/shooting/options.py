@@ -41,9 +41,9 @@ class ShootingOptions(Options):
     )
     ambient: bool = option(
         True,
-        "show and bake what is unshot as even ambient light (Cohen et al. 1988), at most as much as has arrived",
-        tip="Shows light that is still to come as an even glow, so that the picture is about as bright as it will be. "
-        "It costs nothing; off, the picture brightens as light arrives",
+        "show and bake what is unshot, too, about where it will be: an ambient term (Cohen et al. 1988), gathered by few rays",
+        tip="Shows light that is still to come about where it will be, so that the picture looks early as it will in the "
+        "end. It takes a few milliseconds of a picture; off, the picture brightens as light arrives",
         term="ambient term",
     )
     residual: float = option(

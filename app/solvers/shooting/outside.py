@@ -169,11 +169,6 @@ class Outside:
         shot = self._queue[self._at]
         return float(np.abs(shot.flux).sum()) * self._share_received(shot.kind)
 
-    @property
-    def to_each_given(self) -> float:
-        """Shots to come for each that was made: a texel that got light of those will get about so many times that."""
-        return self.left / max(self.made, 1)
-
     def _share_received(self, kind: str) -> float:
         """About how much of what is sent to the box texels receive: of its kind, or where that has yet to begin, of the other."""
         kinds = [kind] if kind == POINTS or self._box_sent[kind] > 0 else [SUNS, SKY]

@@ -259,10 +259,10 @@ class Shooting:
             self.batch.replay.stop()
         self.options = options
         self.batch.set_options(options)
-        self.batch.ambient.hide()
+        self.batch.ambient.show(options.ambient)
         if self.issued:
             self.batch.unshot()
-            self.batch.update_ambient()
+            self.batch.ambient.update(self.batch.bins)
 
     def set_observer(self, position: F64) -> None:
         """The light is the same wherever it is seen from."""
@@ -289,7 +289,7 @@ class Shooting:
         if not np.allclose([m.emission for m in materials], [m.emission * factor for m in before]):
             batch.groups.divide(batch.phases)
         self._progress = replace(self._progress, remaining=self._unshot_share())
-        batch.update_ambient()
+        batch.ambient.update(batch.bins)
 
     # -- kept for later ------------------------------------------------------------------------------------------------
 

@@ -1,0 +1,50 @@
+"""The ambient term: what is shown from the first shots on is about the light that there will be, where light will be."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from solver_scenes import EVERY_LIGHTMAP, Solution, begin, grey, quads_scene, room
+
+from app.gpu import Gpu
+from app.scene.model import F64, Scene
+
+LIT, LAMP = slice(0, 6), 6  # objects: walls of the room with the lamp, floor and ceiling first
+CEILING, DARK = 1, slice(7, 13)
+
+
+def two_closed_rooms() -> Scene:
+    """One of 2 × 1 × 1 m with a lamp that shines down from under its ceiling, and beside it another without any."""
+    lamp = [[0.7, 0.95, 0.3], [1.3, 0.95, 0.3], [1.3, 0.95, 0.7], [0.7, 0.95, 0.7]]
+    dark = room((1.0, 1.0, 1.0)) + np.array([2.1, 0.0, 0.0])
+    return quads_scene([*room((2.0, 1.0, 1.0)), lamp, *dark], [grey(0.6), grey(0.0, 10.0)], [0] * 6 + [1] + [0] * 6)
+
+
+def shown(solution: Solution) -> F64:
+    """(objects, 3) mean H + a [W/m²]."""
+    covered = solution.lightmap.pool.surfaces.area > 0
+    return solution.means(solution.lightmap.irradiance(ambient=True)[covered].astype(np.float64))
+
+
+@EVERY_LIGHTMAP
+def test_all_walls_show_their_light_from_the_first_batch_on(gpu: Gpu, adaptive: bool) -> None:
+    """Also the ceiling, which turns away from the lamp; and a closed room beside shows none at any time."""
+    rooms = begin(gpu, two_closed_rooms(), texels=400 if adaptive else 2000, adaptive=adaptive, residual=3e-2)
+    pictures = []
+    for shots in itertools.count():
+        rooms.step(8)
+        ended = rooms.solver.poll(wait=True).converged
+        if ended or shots in (0, 4, 16):
+            pictures.append((rooms.means(rooms.H), shown(rooms)))
+        if ended:
+            break
+    (first, _), (_, late) = pictures[0], pictures[-1]
+    assert first[CEILING].max() < 0.01 * late[CEILING].min(), "the lamp alone has shot"
+    # 64 rays of a point are off by 1/√64 of how uneven the light is that they see, several times itself; and the rest of the
+    # lamp is taken to light what its first patches did
+    for _, now in pictures:
+        np.testing.assert_allclose(now[LIT], late[LIT], rtol=0.4)
+        assert now[DARK].max() <= 1e-4 * late[LIT].mean(), "maps leak less through corners"
+    np.testing.assert_allclose(pictures[-1][0][LIT], late[LIT], rtol=0.1)  # 3 % are unshot, and those unevenly
+    rooms.release()
