@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,12 +59,14 @@ def parametrize(
     """
     check(density, texels)
     report = progress or (lambda stage, share: None)
-    report("finding sides that light can reach", 0.0)
-    lit = lit_sides(scene)
-    report("joining corners", 0.05)
-    points, corners = weld(scene)
-    report("finding flat pieces", 0.1)
-    facet = facets(points, corners, scene.material_ids, scene_size(scene))
+    report("joining corners", 0.0)
+    with ThreadPoolExecutor(1) as beside:
+        sides = beside.submit(lit_sides, scene)
+        points, corners = weld(scene)
+        report("finding flat pieces", 0.05)
+        facet = facets(points, corners, scene.material_ids, scene_size(scene))
+        report("finding sides that light can reach", 0.15)
+        lit = sides.result()
     layout, method, warnings = _unfold(scene, lit, points, corners, facet, ends, time_limit, report)
     report("placing pieces side by side", UNFOLDED)
     plain, layout = layout, scaled(layout, scene)

@@ -224,7 +224,7 @@ def test_the_unit_does_not_matter(scale: float) -> None:
 def test_progress_and_method() -> None:
     stages: list[str] = []
     charts = parametrize(SCENES["clutter"], progress=lambda stage, share: stages.append(stage))
-    assert stages[0] == "finding sides that light can reach" and stages[-1] == "joining edges of pieces"
+    assert stages[0] == "joining corners" and stages[-1] == "joining edges of pieces"
     assert all(stage.split()[0].endswith("ing") for stage in stages), "each says what is being done"
     assert charts.method.startswith("12 rectangles, ") and charts.method.endswith(" xatlas charts")
     assert charts.dark_faces == 0 and charts.warnings == ()
