@@ -32,8 +32,7 @@ from app.viewer.ui_frame import UiFrame, save_screenshot
 GL_VERSION = (4, 1)
 TITLE = "Glowtree"
 AWAKE_SECONDS = 1.0  # that frames go on after the last event: tooltips appear, scroll bars settle
-# s between frames while there is only a scene to wait for: loading gets the processor; and of these while a hand is at a control
-LOADING_PAUSE, HELD_PAUSE = 0.1, 0.03
+LOADING_PAUSE = 0.1  # s between frames while there is only a scene to wait for, or an event: loading gets the processor
 REST_SECONDS = 0.5  # between two looks around at rest; an event ends the rest at once
 NOWHERE = -3.4e38  # where Dear ImGui has the mouse when it is outside the window
 BUTTONS = {1: 0, 2: 1, 3: 2}  # left, right, middle: moderngl-window to Dear ImGui
@@ -225,13 +224,10 @@ class ViewerWindow(WindowConfig):
 
     def main_loop(self) -> None:
         """Frame after frame until the window is closed; where nothing changes, wait for an event instead."""
-        import pyglet
-
         self.timer.start()
         while not self.wnd.is_closing:
             if self._at_rest():
-                pyglet.app.platform_event_loop.step(REST_SECONDS)
-                self._pyglet.dispatch_events()  # the step only queued them
+                self._wait(REST_SECONDS)
                 continue
             now, elapsed = self.timer.next_frame()
             self.wnd.use()
@@ -240,7 +236,14 @@ class ViewerWindow(WindowConfig):
                 self.wnd.swap_buffers()
             waiting = self._session.on_its_way is not None or self._session.compared.fetching is not None
             if waiting and not self._session.solving and not self._session.uploading:
-                time.sleep(HELD_PAUSE if self._ui.held else LOADING_PAUSE)
+                self._wait(LOADING_PAUSE)
+
+    def _wait(self, seconds: float) -> None:
+        """For an event, at most so long."""
+        import pyglet
+
+        pyglet.app.platform_event_loop.step(seconds)
+        self._pyglet.dispatch_events()  # the step only queued them
 
     def _wake(self, *_: object) -> None:
         self._awake_until = time.perf_counter() + AWAKE_SECONDS
