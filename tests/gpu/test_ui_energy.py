@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
-from app.session.balance import verdict_of
+from app.session.balance import Verdict, verdict_of
 from app.session.report import notes
 from app.session.run import Stop
 from app.session.session import Session
@@ -113,3 +113,10 @@ def test_progress_never_goes_back_but_for_an_edit(gpu: Gpu, monkeypatch: pytest.
     session.set_material(0, session.materials[1])
     assert session.stats.progress < 1
     session.release()
+
+
+def test_what_is_still_noise_or_missing_is_no_verdict() -> None:
+    """A solution that has hardly begun is not called wrong; what is shot too much stays wrong."""
+    gathering, shooting = SOLVERS["gathering"], SOLVERS["shooting"]
+    assert verdict_of(-0.5, gathering, 0.9) == Verdict(1)
+    assert verdict_of(-0.5, gathering, 0.1).level == verdict_of(-0.5, shooting, 0.9).level == 2
