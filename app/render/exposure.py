@@ -8,6 +8,10 @@ Light not yet shot counts as an even ambient A = r̄ / (1 − ρ̄) [Cohen88, se
 by what escapes, and by how unevenly light will fall (the mean logarithm of the Cornell box's light lies 1.2 EV below that of
 its ambient, of two rooms 2.5 EV): a scene just opened is exposed for a forecast of its light.
 
+What is seen becomes mid grey, whatever it is. No luminance tells a village at night from a lit room, both of about 5 cd/m² in
+the scenes that come along, nor would a key that follows the mean luminance [Krawczyk05]. So a scene may say by how many EV it is
+to be brighter or darker: exposure compensation, as cameras and engines have it.
+
 What leaks through closed corners into a room without light is a few bright lines in the dark. It is exposed as if what is emitted
 fell evenly on everything: dark, as it is.
 """
@@ -49,7 +53,7 @@ def first_exposure(pool: TilePool, seen: Texels, scene: Scene | None = None) -> 
     asked = (some.slot * pool.tile + some.row) * pool.tile + some.column
     sky = scene.sky if scene.lit_by_sky else None
     light = forecast(pool.surfaces, albedo, np.float32(np.pi) * emission, asked, sky, scene.lights)
-    return _exposure(albedo[some] * light.asked)
+    return _exposure(albedo[some] * light.asked, scene.exposure)
 
 
 def exposure_of(lightmap: Lightmap, seen: Texels, mean_residual: F64, mean_emitted: F64 | None = None) -> float:
@@ -69,8 +73,8 @@ def exposure_of(lightmap: Lightmap, seen: Texels, mean_residual: F64, mean_emitt
     light = irradiance_at(lightmap, seen)
     if mean_emitted is not None and mean_residual.mean() < TO_COME * mean_emitted.mean():
         if _only_leaks(light.mean(1), float(mean_emitted.mean())):
-            return _exposure(own * mean_emitted)
-    return _exposure(own * (light + ambient))
+            return _exposure(own * mean_emitted, pool.scene.exposure)
+    return _exposure(own * (light + ambient), pool.scene.exposure)
 
 
 def _only_leaks(light: F64, even: float) -> bool:
@@ -90,13 +94,13 @@ def is_trapped(lightmap: Lightmap, seen: Texels, even: float) -> bool:
     return bool(len(material) and not emits and irradiance_at(lightmap, seen).mean() < TRAPPED * even)
 
 
-def _exposure(reflected: NDArray[np.floating]) -> float:
-    """reflected: ρ (H + A) (n, 3) [W/m²] of what is seen, each as large in the picture."""
+def _exposure(reflected: NDArray[np.floating], compensation: float) -> float:
+    """reflected: ρ (H + A) (n, 3) [W/m²] of what is seen, each as large in the picture; compensation: EV beside the automatic."""
     luminance = reflected @ LUMINANCE / np.pi
     if not (luminance > 0).any():
         return 0.0
     bright = np.quantile(luminance, BRIGHT)
     bright = bright if bright > 0 else luminance.max()
     counted = np.minimum(luminance[luminance > RANGE * bright], bright)
-    exposure = np.log2(KEY) - np.log2(counted).mean()
+    exposure = np.log2(KEY) - np.log2(counted).mean() + compensation
     return float(np.clip(exposure, *EXPOSURES))

@@ -1,7 +1,8 @@
 """Scenes written by hand as TOML. Unknown keys are errors; an error names file, key and reason.
 
     [scene]                     # name; unit = "m" | "cm" | "mm" | "in" | "ft": what every length below is
-                                # counted in, also in .obj, .ply and .stl files
+                                # counted in, also in .obj, .ply and .stl files; exposure = 0, EV by which its picture
+                                # is brighter than the automatic exposure has it, below 0 as for a night
     [[material]]                # name; albedo = [r, g, b]; double_sided = false; opacity = 1: light passes by 1 - opacity
                                 # lightmap_scale = 1: so many times the texels along a metre, 1/16 to 16
                                 # emission = [r, g, b] radiance L [W/(sr m²)], or exitance = [r, g, b] πL [W/m²]
@@ -117,6 +118,7 @@ class _Builder:
         name = self.table.scene.name or self.path.stem
         given = self.parts, self.objects, self.materials, self.cameras, self.warnings, self.lights
         scene = validate(self.path, name, *given, share_of(report, 0.5, 1.0))
+        scene = dataclasses.replace(scene, exposure=self.table.scene.exposure)
         return scene if self.table.sky is None else scene.with_sky(self._sky(self.table.sky))
 
     def _id(self, material: str, where: str) -> int:

@@ -34,7 +34,10 @@ class Table(BaseModel):
 
 
 class SceneTable(Table):
+    """exposure: EV beside the automatic one."""
+
     name: str | None = None
+    exposure: Annotated[float, Field(ge=-8.0, le=8.0)] = 0.0
     unit: Literal["m", "cm", "mm", "in", "ft"] = "m"
 
 

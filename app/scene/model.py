@@ -104,7 +104,8 @@ class Scene:
     listed (m,) i32: the number of the triangle in its file that each is, or is a piece of, among all that the loader lists; -1
     for those that no file has. world_from_file (4, 4): from the file's axes and unit.
     ``warnings`` are one-line counted repairs and omissions. sky: what is seen where no surface is; None is black. lights: lamps
-    without area. Every value is finite, every index in range, every triangle has an area: ``validate`` guarantees it.
+    without area. exposure: EV by which its picture is brighter than automatic exposure has it. Every value is finite, every index
+    in range, every triangle has an area: ``validate`` guarantees it.
     """
 
     name: str
@@ -125,6 +126,7 @@ class Scene:
     source: Path | None = None
     sky: Sky | None = None
     lights: tuple[Light, ...] = ()
+    exposure: float = 0.0
 
     @functools.cached_property
     def corners(self) -> F64:

@@ -124,6 +124,7 @@ ERRORS = {
     "slot": (ROOM + '[[procedural]]\nkind = "grotto"\nsubdivisions = 2\n', "there is no material 'rock'"),
     "camera": (ROOM + '[[camera]]\nname = "c"\nposition = [0,0,0]\ntarget = [0,0,0]\n', "must differ"),
     "unit": ('[scene]\nunit = "furlong"\n' + ROOM, "scene.unit"),
+    "exposure": ("[scene]\nexposure = 20\n" + ROOM, "scene.exposure"),
     "nothing": ("", "no triangles"),
     "flat": (ROOM.replace("[2, 0, 0]", "[0, 0, 0]"), "no triangle has an area"),
 }
