@@ -23,8 +23,6 @@ from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.records import BATCH
 from app.solvers.shooting.solver import PICTURES, Shooting
 
-LAMPS = ("points", "beyond")
-
 
 @dataclass(frozen=True)
 class Family:
@@ -43,8 +41,6 @@ class Family:
     rays: whether it looks along rays, and so needs a tree of the scene's triangles (visibility/rays.py) before it is made.
     everywhere: whether it lights all surfaces alike, wherever they are seen from; else what is far is known roughly.
     quadratic: whether its work grows with the square of the texels.
-    lamps: what lights a scene besides surfaces that emit: "points", point and spot lights, and what is "beyond" all surfaces, sky
-    and directional lights.
     """
 
     title: str
@@ -66,7 +62,6 @@ class Family:
     relights: bool = False
     rays: bool = False
     everywhere: bool = True
-    lamps: tuple[str, ...] = LAMPS
 
 
 SOLVERS: dict[str, Family] = {
@@ -127,7 +122,6 @@ SOLVERS: dict[str, Family] = {
         threshold="change",
         quadratic=True,
         rays=True,
-        lamps=(),
     ),
 }
 DEFAULT_SOLVER = "shooting"

@@ -34,13 +34,13 @@ LOADING = "a scene is loading"
 
 @dataclass(frozen=True)
 class Kind:
-    """A button. lamps: of those of a solver's family, what it is; "" is a surface."""
+    """A button. surface: whether it adds a lamp with area, which is one."""
 
     label: str
     icon: str
     meaning: str
     add: Callable[[View, State], None]
-    lamps: str = ""
+    surface: bool = False
 
 
 def buttons(view: View, state: State) -> None:
@@ -76,11 +76,8 @@ def is_lit(view: View, state: State) -> bool:
 def why_not(view: View, kind: Kind) -> str | None:
     """Why a lamp of that kind cannot be added now."""
     session = view.session
-    family = session.family
-    if not kind.lamps:
+    if kind.surface:
         return why_fixed(view)
-    if kind.lamps not in family.lamps:
-        return f"{family.title} knows emitting surfaces alone; other solvers know all lamps"
     return "there is a sky, see below" if kind.label == "Sky" and session.edited_scene.sky is not None else None
 
 
@@ -258,6 +255,7 @@ KINDS = (
         ICONS.ICON_FA_SQUARE,
         "An area light under the ceiling of the room that the camera looks at. All surfaces are cut anew in the background",
         _ceiling,
+        surface=True,
     ),
     Kind(
         "Area",
@@ -265,34 +263,31 @@ KINDS = (
         "A square of light on the picked surface, else on what is in the middle of the view. All surfaces are cut anew in the "
         "background",
         _area,
+        surface=True,
     ),
     Kind(
         "Point",
         ICONS.ICON_FA_LIGHTBULB,
         "A light without area, half-way to what is picked or looked at, that shines to all sides; drag its handle",
         _point,
-        "points",
     ),
     Kind(
         "Spot",
         ICONS.ICON_FA_BULLSEYE,
         "A light without area, half-way to what is picked or looked at, that shines there in a cone",
         _spot,
-        "points",
     ),
     Kind(
         "Sun",
         ICONS.ICON_FA_SUN,
         "Light from one direction, as strong as the sun through clear air, for scenes that are open to it",
         _sun,
-        "beyond",
     ),
     Kind(
         "Sky",
         ICONS.ICON_FA_CLOUD_SUN,
         "A clear sky and its sun around the scene: it lights what is open to it",
         _sky,
-        "beyond",
     ),
 )
 

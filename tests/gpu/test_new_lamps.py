@@ -27,8 +27,8 @@ from app.ui.state import State
 
 PATIENCE = 60.0  # s
 CAMERA = Camera("front", np.array([(1, 0, 0, 0.5), (0, 1, 0, 0.5), (0, 0, 1, 0.9), (0, 0, 0, 1.0)]), 0.7)
-SURFACES = [kind for kind in KINDS if not kind.lamps]
-OPEN = [kind for kind in KINDS if kind.lamps]
+SURFACES = [kind for kind in KINDS if kind.surface]
+OPEN = [kind for kind in KINDS if not kind.surface]
 
 
 class Dark:

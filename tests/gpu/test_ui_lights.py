@@ -12,7 +12,6 @@ from imgui_bundle import imgui
 
 from app.scene.area_lamps import AreaLamp, Surfaces
 from app.scene.lights import Light
-from app.solvers import SOLVERS
 from app.ui.new_lamps import KINDS
 from app.ui.on_screen import on_screen
 
@@ -75,14 +74,6 @@ def test_lamps_with_area_are_duplicated_and_removed(desk: Desk, where: dict[str,
         desk.session.calls.clear()
         desk.click(*where[button])
         assert [call[0] for call in desk.session.calls] == ["change_surfaces"], button
-
-
-@pytest.mark.parametrize("solver", list(SOLVERS))
-def test_what_cannot_be_lit_is_grey(desk: Desk, where: dict[str, tuple[float, float]], solver: str) -> None:
-    desk.session.family = SOLVERS[solver]
-    desk.front("Lights")
-    desk.click(*where["Sun"])
-    assert len(desk.session.scene.lights) == (solver != "pairs")
 
 
 def test_the_view_is_free_behind_the_offer(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
