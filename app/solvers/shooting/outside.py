@@ -42,6 +42,9 @@ from app.util.parts import run_to_end
 from app.util.state import State, StateError
 from app.visibility.occluders import Occluders
 
+# px: maps of what is sharp are so many times as fine, up to that; of the sun on a floor, edges would have teeth
+FINER, FINEST = 4, 1024
+
 
 @dataclass(frozen=True)
 class Sent:
@@ -80,8 +83,8 @@ class Outside:
     ) -> None:
         self._gpu, self._lightmap, self._occluders = gpu, lightmap, occluders
         self._receivers, self._shooters, self._ledger = receivers, shooters, ledger
-        self._points: PointShots | None = None
-        self._directions: DirectionShots | None = None
+        self._points: dict[bool, PointShots] = {}  # by whether they are sharp, see OutsideShot
+        self._directions: dict[bool, DirectionShots] = {}
         self._box = np.ptp(lightmap.scene.corners.reshape(-1, 3), axis=0)
 
     def set_options(self, options: ShootingOptions, resolution: int) -> None:
@@ -199,7 +202,7 @@ class Outside:
         if count < len(like) and like[count - 1].source is like[count].source:
             count -= 1
         now = like[:count]
-        yield from (self._for_points() if first.kind == POINTS else self._for_directions()).shoot(
+        yield from (self._for_points if first.kind == POINTS else self._for_directions)(first.sharp).shoot(
             now, self._ledger, bands
         )
         self._at += count
@@ -224,41 +227,48 @@ class Outside:
         """Add the first of these to a target, on some receivers, of which rects are the texels, in parts. How many."""
         now = list(takewhile(shots[0].is_like, shots[:BATCH]))
         if now[0].kind == POINTS:
-            yield from self._for_points().replay(now, target, receivers, bands)
+            yield from self._for_points(now[0].sharp).replay(now, target, receivers, bands)
         else:
-            yield from self._for_directions().replay(now, target, rects)
+            yield from self._for_directions(now[0].sharp).replay(now, target, rects)
         return len(now)
 
-    def _for_points(self) -> PointShots:
-        self._points = self._points or PointShots(
-            self._gpu,
-            self._lightmap,
-            self._occluders,
-            self._receivers,
-            self._shooters,
-            self._options,
-            self._resolution,
-        )
-        return self._points
+    def _for_points(self, sharp: bool) -> PointShots:
+        if sharp not in self._points:
+            self._points[sharp] = PointShots(
+                self._gpu,
+                self._lightmap,
+                self._occluders,
+                self._receivers,
+                self._shooters,
+                self._options,
+                self._pixels(sharp),
+            )
+        return self._points[sharp]
 
-    def _for_directions(self) -> DirectionShots:
-        self._directions = self._directions or DirectionShots(
-            self._gpu, self._lightmap, self._occluders, self._shooters, self._resolution
-        )
-        return self._directions
+    def _for_directions(self, sharp: bool) -> DirectionShots:
+        if sharp not in self._directions:
+            self._directions[sharp] = DirectionShots(
+                self._gpu, self._lightmap, self._occluders, self._shooters, self._pixels(sharp)
+            )
+        return self._directions[sharp]
+
+    def _pixels(self, sharp: bool) -> int:
+        """Resolution of maps [px]: what is sharp casts the edges of its shadows in one shot."""
+        return max(self._resolution, min(FINER * self._resolution, FINEST)) if sharp else self._resolution
 
     def warm_up(self) -> Generator[None, None, None]:
         """One shot of each kind that there is. Spoils the light."""
-        for kind in {shot.kind for shot in self._queue}:
-            self._at = next(nth for nth, shot in enumerate(self._queue) if shot.kind == kind)
+        for kind in {(shot.kind, shot.sharp) for shot in self._queue}:
+            self._at = next(nth for nth, shot in enumerate(self._queue) if (shot.kind, shot.sharp) == kind)
             run_to_end(self.shoot(1, 1))
             yield
 
     def release(self) -> None:
-        for kind in (self._points, self._directions):
-            if kind is not None:
-                kind.release()
-        self._points = self._directions = None
+        for points in self._points.values():
+            points.release()
+        for directions in self._directions.values():
+            directions.release()
+        self._points, self._directions = {}, {}
 
 
 def _from_each_on(values: F64) -> F64:

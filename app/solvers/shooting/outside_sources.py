@@ -53,9 +53,16 @@ class OutsideShot:
         """Which of the places or directions of its light it is, from 1; 0: the only one; -1: of the sky."""
         return -1 if self.source.name == SKY else int(self.source.name or 0)
 
+    @property
+    def sharp(self) -> bool:
+        """Whether it is the only one of its light, which casts sharp shadows."""
+        return self.place == 0
+
     def is_like(self, other: OutsideShot) -> bool:
-        """Whether both may be of one batch: of a kind, and both give light, or take it back."""
-        return self.kind == other.kind and (self.light.sum() > 0) == (other.light.sum() > 0)
+        """Whether both may be of one batch: of a kind, as sharp, and both give light, or take it back."""
+        return (
+            self.kind == other.kind and self.sharp == other.sharp and (self.light.sum() > 0) == (other.light.sum() > 0)
+        )
 
     @property
     def values(self) -> list[Any]:
