@@ -112,7 +112,7 @@ def load(
 ) -> Loaded:
     """Read a scene, or take one as it is; unfold it, cut it into texels, with ``expose`` find its exposure, and with ``rays``
     build the tree that they walk. file, make, show: as of ``read_and_unfold``. coarse: is given the scene in coarse texels, from
-    another thread, where better ones will take a while. Raises UserError (SceneError)."""
+    another thread, where better ones will take a while and there is light to show. Raises UserError (SceneError)."""
     tell = _Telling(progress or (lambda stage, share: None))
     options = options or LightmapOptions()
     check(atlas.density, atlas.texels)
@@ -120,7 +120,7 @@ def load(
         early: list[Future[Loaded | None]] = []
 
         def waiting(read: Scene, scene: Scene) -> None:
-            if coarse is not None and len(scene.triangles) >= COARSE_FROM:
+            if coarse is not None and scene.emits and len(scene.triangles) >= COARSE_FROM:
                 early.append(beside.submit(_show_coarse, read, scene, atlas, options, expose, rays, tell.again, coarse))
 
         read, scene, charts, seconds = read_and_unfold(

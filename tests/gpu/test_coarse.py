@@ -16,6 +16,7 @@ from app.atlas import charts_cache
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
 from app.lightmap.options import LightmapOptions
+from app.scene.load import load_scene
 from app.session import loading
 from app.session import session as session_module
 from app.session.session import Session
@@ -120,6 +121,21 @@ def test_charts_that_are_kept_need_no_coarse_light(view: View, better: threading
     session.open("cornell-box")
     frames(session, lambda: session.loading is None or coarse.append(session.coarse) is not None)
     assert not any(coarse[again:])
+
+
+def test_a_scene_without_lamps_is_shown_flat_meanwhile(view: View, better: threading.Event) -> None:
+    """In coarse texels it would be black."""
+    session = view.session
+    dark = load_scene("cornell-box")
+    materials = tuple(dataclasses.replace(material, emission=(0.0, 0.0, 0.0)) for material in dark.materials)
+    session.open(dataclasses.replace(dark, materials=materials))  # type: ignore[arg-type]  # a scene that is read goes, too
+    frames(session, lambda: session.loading is not None and session.loading.stage == "waiting")
+    end = time.monotonic() + 0.5  # coarse texels take less
+    frames(session, lambda: session.opened or time.monotonic() > end)
+    assert not session.opened
+    better.set()
+    frames(session, lambda: session.opened)
+    assert not session.coarse
 
 
 def test_the_processor_is_left_to_better_charts_after_a_while(
