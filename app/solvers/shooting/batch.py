@@ -29,6 +29,7 @@ from app.solvers.shooting.audit import Audit, Auditor
 from app.solvers.shooting.choose import ROOT_LEVEL, Bins, Choice
 from app.solvers.shooting.coarse_to_fine import Phases
 from app.solvers.shooting.emitter_groups import EmitterGroups
+from app.solvers.shooting.equipment import Equipment
 from app.solvers.shooting.ledger import Ledger
 from app.solvers.shooting.material_edits import MaterialEdits
 from app.solvers.shooting.options import ShootingOptions
@@ -57,7 +58,8 @@ class Batch:
         self.occluders, self.receivers = occluders_of(gpu, lightmap), Receivers(gpu, lightmap.pool)
         self.ledger = Ledger(gpu, lightmap, self.shooters)
         self.ambient = Ambient(gpu, lightmap, self.shooters, self.ledger, shown=options.ambient)
-        self.outside = Outside(gpu, lightmap, self.occluders, self.receivers, self.shooters, self.ledger)
+        equipment = Equipment(gpu, lightmap, self.occluders, self.receivers, self.shooters)
+        self.outside = Outside(equipment, self.ledger)
         self.marks = PatchMarks(gpu, lightmap)
         self.groups = EmitterGroups(lightmap, self.ledger, self.marks)
         self.auditor = Auditor(gpu, lightmap, self.shooters, self.ledger, enabled=audits)

@@ -13,16 +13,14 @@ from collections.abc import Generator, Sequence
 
 import numpy as np
 
-from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
-from app.lightmap.lightmap import Lightmap
+from app.gpu import Framebuffer, Mesh, Pass, Texture
 from app.scene.sky_directions import axes_of
 from app.solvers.shooting.choose import band_of
+from app.solvers.shooting.equipment import Equipment
 from app.solvers.shooting.ledger import Ledger
 from app.solvers.shooting.outside_sources import OutsideShot
 from app.solvers.shooting.records import BATCH, BLOCK_ROWS, IN_BLOCKS, OPEN, RECORDS, SHOOTER
 from app.solvers.shooting.see import MAPS_TEXELS
-from app.solvers.shooting.shooters import ShooterBatch
-from app.visibility.occluders import Occluders
 
 # px along the edge of a map, for each of a full face of a patch's map: a texel is at least one sample there, and two here, since
 # one direction of a sharp sun casts an edge by itself
@@ -34,10 +32,9 @@ SENT_BLOCK = 32  # samples along the edge of a block that direction_sent.frag.gl
 class DirectionShots:
     """What makes them, with maps that fit the resolution of a patch's [px]. Whoever makes it releases it."""
 
-    def __init__(
-        self, gpu: Gpu, lightmap: Lightmap, occluders: list[Occluders], shooters: ShooterBatch, resolution: int
-    ) -> None:
-        self._gpu, self._lightmap, self._occluders, self._shooters = gpu, lightmap, occluders, shooters
+    def __init__(self, equipment: Equipment, resolution: int) -> None:
+        gpu, lightmap, occluders = equipment.gpu, equipment.lightmap, equipment.occluders
+        self._gpu, self._lightmap, self._occluders, self._shooters = gpu, lightmap, occluders, equipment.shooters
         pixels = self._pixels = PER_FACE_PIXEL * resolution
         self._most_maps = max(1, min(BATCH, MAPS_TEXELS // pixels**2))
         defines: dict[str, object] = {"PIXELS": pixels, "MARGIN": MARGIN, **IN_BLOCKS}

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from app.gpu import Framebuffer, Gpu, Mesh
-from app.lightmap.lightmap import Lightmap
+from app.gpu import Framebuffer, Mesh
 from app.scene.lights import Light
 from app.scene.model import F64
 from app.solvers.shooting.direction_shots import DirectionShots
+from app.solvers.shooting.equipment import Equipment
 from app.solvers.shooting.ledger import Ledger
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.outside_sources import (
@@ -35,12 +35,9 @@ from app.solvers.shooting.outside_sources import (
     sources_of,
 )
 from app.solvers.shooting.point_shots import PointShots
-from app.solvers.shooting.receivers import Receivers
 from app.solvers.shooting.records import BATCH
-from app.solvers.shooting.shooters import ShooterBatch
 from app.util.parts import run_to_end
 from app.util.state import State, StateError
-from app.visibility.occluders import Occluders
 
 # px: maps of what is sharp are so many times as fine, up to that; of the sun on a floor, edges would have teeth
 FINER, FINEST = 4, 1024
@@ -72,20 +69,11 @@ class Outside:
     made: shots so far; sent: as it was after the last of its batches.
     """
 
-    def __init__(
-        self,
-        gpu: Gpu,
-        lightmap: Lightmap,
-        occluders: list[Occluders],
-        receivers: Receivers,
-        shooters: ShooterBatch,
-        ledger: Ledger,
-    ) -> None:
-        self._gpu, self._lightmap, self._occluders = gpu, lightmap, occluders
-        self._receivers, self._shooters, self._ledger = receivers, shooters, ledger
+    def __init__(self, equipment: Equipment, ledger: Ledger) -> None:
+        self._equipment, self._lightmap, self._ledger = equipment, equipment.lightmap, ledger
         self._points: dict[bool, PointShots] = {}  # by whether they are sharp, see OutsideShot
         self._directions: dict[bool, DirectionShots] = {}
-        self._box = np.ptp(lightmap.scene.corners.reshape(-1, 3), axis=0)
+        self._box = np.ptp(self._lightmap.scene.corners.reshape(-1, 3), axis=0)
 
     def set_options(self, options: ShootingOptions, resolution: int) -> None:
         """Use other knobs from the next shot on."""
@@ -234,22 +222,12 @@ class Outside:
 
     def _for_points(self, sharp: bool) -> PointShots:
         if sharp not in self._points:
-            self._points[sharp] = PointShots(
-                self._gpu,
-                self._lightmap,
-                self._occluders,
-                self._receivers,
-                self._shooters,
-                self._options,
-                self._pixels(sharp),
-            )
+            self._points[sharp] = PointShots(self._equipment, self._options, self._pixels(sharp))
         return self._points[sharp]
 
     def _for_directions(self, sharp: bool) -> DirectionShots:
         if sharp not in self._directions:
-            self._directions[sharp] = DirectionShots(
-                self._gpu, self._lightmap, self._occluders, self._shooters, self._pixels(sharp)
-            )
+            self._directions[sharp] = DirectionShots(self._equipment, self._pixels(sharp))
         return self._directions[sharp]
 
     def _pixels(self, sharp: bool) -> int:

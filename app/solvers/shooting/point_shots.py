@@ -12,37 +12,26 @@ from collections.abc import Generator, Mapping, Sequence
 import numpy as np
 
 from app.direct_light.punctual import light_rows
-from app.gpu import Framebuffer, Gpu, Mesh
-from app.lightmap.lightmap import Lightmap
+from app.gpu import Framebuffer, Mesh
 from app.scene.sky_directions import axes_of
+from app.solvers.shooting.equipment import Equipment
 from app.solvers.shooting.ledger import Ledger
 from app.solvers.shooting.options import ShootingOptions
 from app.solvers.shooting.outside_sources import OutsideShot, share_of_shot
 from app.solvers.shooting.receive import Receive
-from app.solvers.shooting.receivers import Receivers
 from app.solvers.shooting.records import BATCH, BLOCK_ROWS, SHOOTER
 from app.solvers.shooting.see import See
-from app.solvers.shooting.shooters import ShooterBatch
-from app.visibility.occluders import Occluders
 
 
 class PointShots:
     """What makes them, for one choice of options. Whoever makes it releases it."""
 
-    def __init__(
-        self,
-        gpu: Gpu,
-        lightmap: Lightmap,
-        occluders: list[Occluders],
-        receivers: Receivers,
-        shooters: ShooterBatch,
-        options: ShootingOptions,
-        resolution: int,
-    ) -> None:
+    def __init__(self, equipment: Equipment, options: ShootingOptions, resolution: int) -> None:
+        gpu, lightmap, shooters = equipment.gpu, equipment.lightmap, equipment.shooters
         self._gpu, self._lightmap, self._shooters = gpu, lightmap, shooters
         self._lights = gpu.texture((4, BATCH), 4, "f4")
-        self._see = See(gpu, occluders, shooters, options, resolution, lights=self._lights)
-        self._receive = Receive(gpu, lightmap, receivers, shooters, self._see, options)
+        self._see = See(gpu, equipment.occluders, shooters, options, resolution, lights=self._lights)
+        self._receive = Receive(gpu, lightmap, equipment.receivers, shooters, self._see, options)
 
     def shoot(self, shots: Sequence[OutsideShot], ledger: Ledger, bands: int) -> Generator[None, None, None]:
         """These, up to a batch, in parts."""
