@@ -31,7 +31,8 @@ from app.atlas.charts import Charts
 from app.bake.glb import GlbBuilder
 from app.bake.gltf_materials import MaterialWriter
 from app.scene.cameras import look_at
-from app.scene.lights import LUMENS_PER_WATT, Light
+from app.scene.colorimetry import LUMENS_PER_WATT
+from app.scene.lights import Light
 from app.scene.model import F32, F64, Camera, Scene
 
 # Positions are 32-bit floats: beyond this distance from the origin, in radii of the scene, nodes carry the offset, so

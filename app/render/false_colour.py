@@ -1,4 +1,4 @@
-"""False colour: illuminance E_v = 179·Y(H) [lx] and luminance L_v = 179·Y(B)/π [cd/m²] as colours with a scale, or both in W, see
+"""False colour: illuminance E_v = 683·Y(H) [lx] and luminance L_v = 683·Y(B)/π [cd/m²] as colours with a scale, or both in W, see
 app/render/units.py."""
 
 from __future__ import annotations

@@ -69,7 +69,8 @@ class DisplayOptions(Options):
         "photometric",
         "what light is counted in: lux, cd/m² and lumen, or watts",
         choices=UNITS,
-        tip="What light is counted in, everywhere in the window: lux, candela and lumen, as people see it, or watts",
+        tip="What light is counted in, everywhere in the window: lux, candela and lumen, as people see it, or watts. A watt is "
+        "683 lumen, as in glTF files, so that a lamp reads what its file says",
     )
     false_colour: str = option(
         "off",

@@ -1,8 +1,6 @@
-"""Light in numbers, by one choice for all of them: radiometric (W) or photometric (lm), of which 179 are a watt of white light.
+"""Light in numbers, by one choice for all of them: radiometric (W) or photometric (lm), of which 683 are a watt.
 
-179 lm/W is Radiance's luminous efficacy of white light [Ward94; WHTEFFICACY in RADIANCE's color.h], so the numbers are
-those that its tools give for the same scene. One number for three channels is their luminance Y from linear Rec.709, in watts as
-in lumen.
+Both are of the luminance Y of linear Rec.709, the one number for three channels: see colorimetry.py.
 """
 
 from __future__ import annotations
@@ -12,10 +10,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from app.scene.colorimetry import LUMENS_PER_WATT
+
 Units = Literal["photometric", "radiometric"]
 
 UNITS: tuple[Units, ...] = ("photometric", "radiometric")
-WHITE_EFFICACY = 179.0  # lm/W
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec.709 [IEC 61966-2-1]
 
 
@@ -47,7 +46,7 @@ QUANTITIES: Mapping[str, Mapping[str, Quantity]] = {
 
 def per_watt(units: str) -> float:
     """How much of the unit a watt is."""
-    return WHITE_EFFICACY if units == "photometric" else 1.0
+    return LUMENS_PER_WATT if units == "photometric" else 1.0
 
 
 def measure(rgb: Sequence[float], units: str) -> float:

@@ -1,8 +1,8 @@
 """Radiance of the clear sky, and irradiance from the sun, by where the sun stands and how hazy the air is [Preetham99].
 
 The sky's luminance and chromaticity are those of the paper, table 2 and appendix A.2; the sun's light is a black body's of
-5778 K, attenuated as in its appendix A.1 by molecules, aerosols and ozone. Luminance becomes radiance by the efficacy of white
-light that false colour counts with, so that lux and cd/m² are as outdoors. Below the horizon lies a ground, diffuse, of albedo
+5778 K, attenuated as in its appendix A.1 by molecules, aerosols and ozone. Luminance becomes radiance by the lumens of a watt
+that all light is counted with, so that lux and cd/m² are as outdoors. Below the horizon lies a ground, diffuse, of albedo
 GROUND, that sky and sun light. Works badly for a sun below about 5°, where the model was not fitted, and for turbidities outside
 2 to 6; a high sun's sky is up to twice as bright as measured ones [Zotti07].
 """
@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.scene.colorimetry import NM, PEAK_EFFICACY, REC709_FROM_XYZ, STEP, black_body, matching
+from app.scene.colorimetry import LUMENS_PER_WATT, NM, REC709_FROM_XYZ, STEP, black_body, matching
 
 F64 = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 GROUND = 0.2  # albedo: usual where nothing is known of the ground [Liu63]
-WHITE_EFFICACY = 179.0  # lm/W, of white light [Ward94]
 SUN_KELVIN, SUN_STERADIANS = 5778.0, 6.72e-5  # effective temperature, IAU 2015; a disc of 0.53°
 OZONE_CM = 0.35  # column of it [Preetham99, A.1]
 LEVEL = 1e-3  # least cosine that is looked up beside the horizon, where the model divides by it
@@ -75,7 +74,7 @@ def _above(directions: F64, towards_sun: F64, turbidity: float) -> F64:
         at_zenith * _perez(p, cosine, gamma) / _perez(p, 1.0, theta_sun)
         for at_zenith, p in zip(zenith, PEREZ @ [turbidity, 1.0], strict=True)
     )
-    XYZ = np.stack([x / y * Y, Y, (1 - x - y) / y * Y], axis=-1) * (1000 / WHITE_EFFICACY)
+    XYZ = np.stack([x / y * Y, Y, (1 - x - y) / y * Y], axis=-1) * (1000 / LUMENS_PER_WATT)
     return np.asarray(np.maximum(XYZ @ REC709_FROM_XYZ.T, 0.0))
 
 
@@ -104,5 +103,5 @@ def sun_irradiance(height: float, turbidity: float) -> F64:
     ozone = np.interp(NM, OZONE_NM, OZONE_ABSORPTION) * OZONE_CM
     depth = 0.008735 * um**-4.08 + aerosols * um**-1.3 + ozone
     E = black_body(SUN_KELVIN) * SUN_STERADIANS * np.exp(-air_mass * depth)
-    XYZ = matching() @ E * STEP * (PEAK_EFFICACY / WHITE_EFFICACY)
+    XYZ = matching() @ E * STEP
     return np.asarray(np.maximum(REC709_FROM_XYZ @ XYZ, 0.0))

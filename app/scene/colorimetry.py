@@ -1,4 +1,10 @@
-"""Spectra and colour temperatures as linear Rec.709: matching functions, black bodies, and how many kelvin a colour has."""
+"""Spectra and colour temperatures as linear Rec.709: matching functions, black bodies, how many kelvin a colour has, and how many
+lumen a watt is.
+
+Here a watt is 683 lm wherever light is read, made, shown or written: of linear Rec.709 the luminance Y = ∫ ȳ L dλ is in watts as
+the eye weighs them, and 683 lm/W is what the SI counts those by. glTF's files have lights in candela and lux, which Blender
+writes by that number, too. RADIANCE counts 179 lm for a watt of all wavelengths of white light [Ward94] instead.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +15,7 @@ import numpy as np
 F64 = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 RGB = tuple[float, float, float]
 
-PEAK_EFFICACY = 683.0  # lm/W, at 555 nm: what ȳ counts from
+LUMENS_PER_WATT = 683.0  # K_cd, at 555 nm, where ȳ is 1 [SI brochure, 9th edition, 2.3.1]
 REC709_FROM_XYZ = np.array(  # ITU-R BT.709-6, white D65
     [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
 )

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.scene.colorimetry import LUMENS_PER_WATT
 from app.scene.gltf_draco import decompress
 from app.scene.gltf_file import GltfFile
 from app.scene.gltf_materials import UNKNOWN_ALBEDO, read_materials
@@ -24,7 +25,7 @@ from app.scene.gltf_pose import joint_matrices, morphed, skinning, turned_normal
 from app.scene.gltf_schema import Light as GltfLight
 from app.scene.gltf_schema import Mesh, Node, Primitive
 from app.scene.gltf_sky import read_sky
-from app.scene.lights import LUMENS_PER_WATT, Light
+from app.scene.lights import Light
 from app.scene.model import F64, Camera, Material, Scene
 from app.scene.outline import Outline, colour_textures
 from app.scene.validate import Part, check_triangle_count, validate

@@ -3,8 +3,7 @@
     E = I(ω) w(d) cos θ / d²,    w = clamp(1 - (d / range)⁴, 0, 1),    and from afar E = E_0 cos θ
 
 What a spot sends out falls between its cones: I(ω) = I sat(s cos ω + o)², s = 1 / max(0.001, cos inner - cos outer),
-o = -s cos outer, ω from its axis. Files count in candela and lux; 683 of either is 1 W, as Blender has it, so that lights and
-emissive surfaces are on one scale.
+o = -s cos outer, ω from its axis. Files count in candela and lux; how much of either a watt is, colorimetry.py says.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ Vector = tuple[float, float, float]
 LightKind = Literal["point", "spot", "directional"]
 
 OUTER = math.pi / 4  # of a spot whose file does not say
-LUMENS_PER_WATT = 683.0  # of radiant power as files count it
 SHARPEST = 1e-3  # cos inner - cos outer, at least
 
 

@@ -11,8 +11,8 @@ from app.errors import SceneError
 from app.scene.authored import MESH_LOADERS, load_authored
 from app.scene.cameras import default_camera
 from app.scene.ceiling_light import with_ceiling_light
+from app.scene.colorimetry import LUMENS_PER_WATT
 from app.scene.library import scene_names, scene_path
-from app.scene.lights import LUMENS_PER_WATT
 from app.scene.model import Scene
 from app.scene.options import PHOTOMETRIC, FileOptions
 from app.scene.orientation import oriented

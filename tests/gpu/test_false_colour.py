@@ -22,7 +22,7 @@ __all__ = ["box", "cornell"]
 def test_false_colour_is_the_colour_of_the_value(gpu: Gpu, box: Lightmap, logarithmic: bool, share: float) -> None:
     """A share of the top of the scale has the colour of the legend there, whatever the exposure."""
     high = 500.0
-    put(box, "t_irradiance", even(box, (1, 1, 1)) * (share * high / 179.0))
+    put(box, "t_irradiance", even(box, (1, 1, 1)) * (share * high / 683.0))
     display = DisplayOptions(
         false_colour="illuminance", false_colour_max=high, false_colour_log=logarithmic, exposure=7
     )
@@ -66,7 +66,7 @@ def test_a_logarithmic_scale_spans_what_is_lit(box: Lightmap) -> None:
     lamp = emits[box.scene.material_ids[box.charts.face_triangle[face]]] & (face >= 0)
     assert lamp.any()
     lux[lamp] = 1e6
-    put(box, "t_irradiance", np.repeat((lux / 179)[..., None], 3, -1))
+    put(box, "t_irradiance", np.repeat((lux / 683)[..., None], 3, -1))
     low, high, _ = false_colour_scale(DisplayOptions(false_colour="illuminance"), box)
     assert 8 <= low <= 12 and 900 <= high <= 1200  # 1 % and 99 % of two decades, rounded outwards to short numbers
 
@@ -75,12 +75,12 @@ def test_scale_and_exposure_come_from_the_light(box: Lightmap) -> None:
     H = (1.0, 2.0, 0.5)
     put(box, "t_irradiance", even(box, H))
     put(box, "t_residual", even(box, (0.0, 0.0, 0.0)))
-    lux = 179 * np.array(H) @ LUMINANCE
+    lux = 683 * np.array(H) @ LUMINANCE
     scale = false_colour_scale(DisplayOptions(false_colour="illuminance", false_colour_log=False), box)
     assert lux <= scale.high <= 1.5 * lux
     luminance = false_colour_scale(DisplayOptions(false_colour="luminance", false_colour_log=False), box)
     brightest = max(np.array(m.albedo) * H @ LUMINANCE for m in box.scene.materials if not m.emits)
-    assert 179 / np.pi * brightest <= luminance.high <= 1.5 * 179 / np.pi * brightest
+    assert 683 / np.pi * brightest <= luminance.high <= 1.5 * 683 / np.pi * brightest
     assert luminance.unit == "cd/m²"
 
     seen = seen_by_first(box)

@@ -44,8 +44,8 @@ def lamp_of(desk: Desk, quantities: str) -> None:
 def test_a_lamp_is_edited_in_candela_and_lumen(desk: Desk, sliders: dict[str, tuple[float, str]]) -> None:
     """Its surface has 1 m²; a diffuse one gives off π times its luminance per m²."""
     lamp_of(desk, "photometric")
-    assert sliders["##strength"] == (pytest.approx(179 * Y), "2,235 cd/m²")
-    assert sliders["##flux"] == (pytest.approx(np.pi * 179 * Y), "7,021 lm")
+    assert sliders["##strength"] == (pytest.approx(683 * Y), "8,528 cd/m²")
+    assert sliders["##flux"] == (pytest.approx(np.pi * 683 * Y), "26,790 lm")
     lamp_of(desk, "radiometric")
     assert sliders["##strength"] == (pytest.approx(17.0), "17.00 W/(sr m²)")
     assert sliders["##flux"] == (pytest.approx(np.pi * LAMP.sum()), "103.7 W"), "as the energy of a solve"
@@ -54,8 +54,8 @@ def test_a_lamp_is_edited_in_candela_and_lumen(desk: Desk, sliders: dict[str, tu
 @pytest.mark.parametrize(
     ("label", "value", "quantities", "emission"),
     [
-        ("##strength", 179.0, "photometric", LAMP / Y),
-        ("##flux", 179.0, "photometric", LAMP / Y / np.pi),
+        ("##strength", 683.0, "photometric", LAMP / Y),
+        ("##flux", 683.0, "photometric", LAMP / Y / np.pi),
         ("##strength", 34.0, "radiometric", 2 * LAMP),
         ("##flux", 33.0, "radiometric", LAMP / np.pi),
     ],
@@ -104,8 +104,8 @@ def test_a_right_click_puts_a_lamp_back(desk: Desk, monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize(
     ("light", "texts"),
     [
-        (Light("a", intensity=(1.0, 1.0, 1.0)), ("179.0 cd", "2,249 lm", "1.000 W/sr", "37.70 W")),
-        (Light("a", "directional", intensity=(2.0, 2.0, 2.0)), ("358.0 lx", None, "2.000 W/m²", None)),
+        (Light("a", intensity=(1.0, 1.0, 1.0)), ("683.0 cd", "8,583 lm", "1.000 W/sr", "37.70 W")),
+        (Light("a", "directional", intensity=(2.0, 2.0, 2.0)), ("1,366 lx", None, "2.000 W/m²", None)),
     ],
     ids=["point", "directional"],
 )
@@ -125,10 +125,10 @@ def test_lights_are_in_candela_lumen_and_lux(
 
 
 def test_a_top_that_was_given_stays_where_it_is(desk: Desk) -> None:
-    display = desk.session.display.replace(false_colour="illuminance", false_colour_max=358.0)
+    display = desk.session.display.replace(false_colour="illuminance", false_colour_max=1366.0)
     watts = counted(display, "radiometric")
     assert watts.false_colour_max == pytest.approx(2.0)
-    assert counted(watts, "photometric").false_colour_max == pytest.approx(358.0)
+    assert counted(watts, "photometric").false_colour_max == pytest.approx(1366.0)
     assert counted(watts, "radiometric") is watts
 
 

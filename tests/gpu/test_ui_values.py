@@ -16,8 +16,8 @@ from app.ui.panels import energy
 
 __all__ = ["desk", "session"]
 
-H = 179 * (16 * 0.2126 + 11 * 0.7152 + 3 * 0.0722)  # lx, of PICKED
-B = 179 * (12 * 0.2126 + 8 * 0.7152 + 2 * 0.0722)  # lm/m²
+H = 683 * (16 * 0.2126 + 11 * 0.7152 + 3 * 0.0722)  # lx, of PICKED
+B = 683 * (12 * 0.2126 + 8 * 0.7152 + 2 * 0.0722)  # lm/m²
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def picked(desk: Desk) -> None:
 
 def test_what_is_inspected_is_in_lux_or_in_watts(desk: Desk, copies: dict[str, tuple[float, float]]) -> None:
     picked(desk)
-    assert {f"{H:,.0f} lx", f"{B:,.0f} lm/m²", f"{B / np.pi:,.1f} cd/m²", "70.0 %"} <= set(copies)
+    assert {f"{H:,.0f} lx", f"{B:,.0f} lm/m²", f"{B / np.pi:,.0f} cd/m²", "70.0 %"} <= set(copies)
     desk.session.display = desk.session.display.replace(quantities="radiometric")
     copies.clear()
     desk.frames(2)
@@ -58,7 +58,7 @@ def test_values_are_copied_by_a_click(desk: Desk, copies: dict[str, tuple[float,
     if where in tab:
         imgui.set_window_focus(tab[where])
         desk.frames(4)
-    energy = widgets.number(179 * desk.session.stats.emitted / 3)
+    energy = widgets.number(683 * desk.session.stats.emitted / 3)
     shown, copied = {
         "energy": (energy, energy.replace(",", "")),
         "inspect": (f"{B:,.0f} lm/m²", f"{B:.0f} lm/m²"),
@@ -83,7 +83,7 @@ def test_the_light_under_the_pointer_is_in_the_status_bar(desk: Desk, monkeypatc
     desk.frames(15)
     assert pointer.in_words(desk.session, desk.ui.state) == (f"{H:,.0f} lx", f"{B / np.pi:,.0f} cd/m²", "white wall")
     desk.session.display = desk.session.display.replace(quantities="radiometric")
-    assert pointer.in_words(desk.session, desk.ui.state)[0] == f"{H / 179:.1f} W/m²"
+    assert pointer.in_words(desk.session, desk.ui.state)[0] == f"{H / 683:.1f} W/m²"
     assert ("pick",) not in [call[:1] for call in desk.session.calls] and desk.ui.state.picked is None
     desk.point(5, 300)
     desk.frames()
@@ -137,7 +137,7 @@ def test_energy_is_in_the_same_units(desk: Desk, monkeypatch: pytest.MonkeyPatch
     desk.frames(3)
     assert "Energy [lm]" in sections
     power = np.array([3.0, 2.0, 1.0])
-    assert energy._flux(power, desk.session) == pytest.approx(179 * power @ [0.2126, 0.7152, 0.0722])
+    assert energy._flux(power, desk.session) == pytest.approx(683 * power @ [0.2126, 0.7152, 0.0722])
     desk.session.display = desk.session.display.replace(quantities="radiometric")
     assert energy._flux(power, desk.session) == 6.0
 

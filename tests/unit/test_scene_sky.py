@@ -16,7 +16,7 @@ from app.commands.flags import sky_of
 from app.direct_light.sky_map import NORMALS, chances, irradiance_table
 from app.errors import SceneError
 from app.scene.authored import load_authored
-from app.scene.clear_sky import WHITE_EFFICACY
+from app.scene.colorimetry import LUMENS_PER_WATT
 from app.scene.images import ImageError
 from app.scene.load import load_scene
 from app.scene.model import F32
@@ -73,13 +73,13 @@ def test_the_clear_sky_is_brightest_at_the_sun_and_blue_away_from_it() -> None:
     # kcd/m² at the zenith [Preetham99, A.2]
     chi = (4 / 9 - 2.5 / 120) * (np.pi - 2 * math.radians(50))
     zenith = (4.0453 * 2.5 - 4.9710) * math.tan(chi) - 0.2155 * 2.5 + 2.4192
-    assert light[0].mean() * WHITE_EFFICACY / 1000 == pytest.approx(zenith, rel=0.02)  # the first row is 0.7° from it
+    assert light[0].mean() * LUMENS_PER_WATT / 1000 == pytest.approx(zenith, rel=0.02)  # the first row is 0.7° from it
 
 
 def test_the_sun_reddens_and_fades_as_it_sinks() -> None:
     """Of a high one 90 to 100 klx are measured; below the horizon there is none."""
     light = [Sky(sun=Sun(0, height)).sun_irradiance for height in (70, 20, 5)]
-    lux = [float(E @ LUMINANCE) * WHITE_EFFICACY for E in light]
+    lux = [float(E @ LUMINANCE) * LUMENS_PER_WATT for E in light]
     assert 85e3 < lux[0] < 105e3 and lux[0] > lux[1] > lux[2] > 0
     assert np.all(np.diff([E[0] / E[2] for E in light]) > 0)
     assert not Sky(sun=Sun(0, -1)).sun_irradiance.any()

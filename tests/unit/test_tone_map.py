@@ -87,9 +87,9 @@ def test_top_of_an_automatic_scale(value: float, top: float) -> None:
 
 
 def test_white_of_one_watt_per_steradian() -> None:
-    """179 lm/W: radiance 1 is 179 cd/m²; a white surface that shows it receives π W/m², 562 lx."""
-    assert value_per_radiance("luminance") == pytest.approx(179.0)
-    assert value_per_radiance("illuminance") == pytest.approx(562.345, abs=1e-3)
+    """683 lm/W: radiance 1 is 683 cd/m²; a white surface that shows it receives π W/m², 2146 lx."""
+    assert value_per_radiance("luminance") == pytest.approx(683.0)
+    assert value_per_radiance("illuminance") == pytest.approx(2145.708, abs=1e-3)
 
 
 def test_every_option_of_the_display_has_its_table_entry() -> None:

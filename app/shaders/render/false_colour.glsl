@@ -1,5 +1,5 @@
 // A number per pixel as a colour: viridis (van der Walt and Smith, CC0), sixth-order fit by Matt Zucker (CC0). The
-// radiance becomes luminous by Radiance's white efficacy of 179 lm/W [Ward94], see app/render/units.py.
+// radiance becomes luminous by 683 lm/W, see app/render/units.py.
 uniform float u_per_radiance;  // what is measured per W/(sr m²)
 uniform vec2 u_range;          // lowest and highest value; a linear scale begins at 0
 uniform float u_logarithmic;   // 0 or 1
