@@ -15,7 +15,7 @@ class AtlasOptions(Options):
     density: float | None = option(
         None,
         "texels per metre; unset: from --texels",
-        unit="1/m",
+        unit="texels/m",
         minimum=1e-9,
         maximum=1e9,
         logarithmic=True,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping
+from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -23,6 +24,18 @@ from app.render.surfaces import Rect, Surfaces
 from app.scene.model import F64
 
 GL_DEPTH_CLAMP = 0x864F  # OpenGL 3.2: what lies before the near plane is drawn at it instead of being cut away
+
+
+class Look(TypedDict, total=False):
+    """How a picture is drawn. scale: of the false colour; left out, it is found from the light, which waits for the GPU.
+    samples: pictures, each a part of a pixel aside, that it is the mean of, 1 unless told otherwise: smooth edges. add: to those
+    of the last picture, which was of the same. whole: show all light as it is now, as it is unless told otherwise; False bounds
+    the work of a frame, a large lightmap is then brought up to date over several."""
+
+    scale: Scale | None
+    samples: int
+    add: bool
+    whole: bool
 
 
 class FrameRenderer:
@@ -67,30 +80,31 @@ class FrameRenderer:
         offered: Mapping[str, Texture] | None = None,
         shooter: Rect | None = None,
         rays: RayPicture | None = None,
-        scale: Scale | None = None,
-        samples: int = 1,
-        add: bool = False,
-        whole: bool = True,
+        **look: Unpack[Look],
     ) -> bool:
         """Draw into the lower left ``size`` (width, height) [px] of ``target``. False where nothing is drawn: not all of the
         layer that is asked for is there yet, and what was drawn last stays.
 
         reference: for ``display.show`` and for layers that compare; None where there is none. offered: what layers need that a
         solver must offer, see app/render/layers.py.
-        shooter: the patch to mark for ``display.last_shooter``: (u, v, u, v) in atlas texels. rays: to draw. scale: of the
-        false colour; left out, it is found from the light, which waits for the GPU.
-        samples: pictures, each a part of a pixel aside, that this one is the mean of: smooth edges. add: to those of the last
-        call, which was of the same. whole: show all light as it is now; False bounds the work of a frame, a large lightmap is
-        then brought up to date over several. Raises GpuError for a picture larger than a texture can be.
+        shooter: the patch to mark for ``display.last_shooter``: (u, v, u, v) in atlas texels. rays: to draw. Raises GpuError for
+        a picture larger than a texture can be.
         """
         kind = measured(display)
         layer = LAYER.get(kind, display.layer)
+        scale, samples, add = look.get("scale"), look.get("samples", 1), look.get("add", False)
         scale = None if kind == "off" or self._linear else scale or false_colour_scale(display, lightmap, offered)
         surfaces = self._surfaces_of(lightmap, display.interpolation)
         if not add:
             self._mean.clear()
         if not self._mean.count and not surfaces.resolve(
-            layer, display, size, scale=scale, reference=reference, offered=offered, whole=whole
+            layer,
+            display,
+            size,
+            scale=scale,
+            reference=reference,
+            offered=offered,
+            whole=look.get("whole", True),
         ):
             return False
         sky = lightmap.scene.sky if layer == "combined" else None
@@ -128,6 +142,10 @@ class FrameRenderer:
             yield
         finally:
             self._gpu.ctx.disable_direct(GL_DEPTH_CLAMP)
+
+    def forget_samples(self) -> None:
+        """A picture that is added is the first of its mean."""
+        self._mean.clear()
 
     @property
     def samples(self) -> int:

@@ -1,4 +1,5 @@
-"""Lamps that are surfaces: a rectangle of light is added, or the triangles of a material that emits are copied or taken away."""
+"""Lamps that are surfaces: a rectangle of light is added, or the triangles of a material that emits are copied, moved or taken
+away."""
 
 from __future__ import annotations
 
@@ -49,6 +50,27 @@ def with_copy(scene: Scene, index: int, shift: F64, name: str, radiance: RGB) ->
     return _with(scene, scene.positions[used] + shift, new, lamp, name)
 
 
+def with_shift(scene: Scene, index: int, shift: F64) -> Scene:
+    """The scene with the triangles of material ``index`` moved by (3,) [m]."""
+    chosen = np.flatnonzero(scene.material_ids == index)
+    used, numbers = np.unique(scene.triangles[chosen], return_inverse=True)
+    triangles = scene.triangles.copy()
+    triangles[chosen] = len(scene.positions) + numbers.reshape(-1, 3)
+    positions = np.concatenate([scene.positions, scene.positions[used] + shift])
+    listed = None if scene.listed is None else np.where(scene.material_ids == index, np.int32(-1), scene.listed)
+    return dataclasses.replace(scene, positions=positions, triangles=triangles, listed=listed)
+
+
+def hangs_together(scene: Scene, index: int) -> bool:
+    """Whether a corner of the triangles of material ``index`` is one of another material's, too."""
+    own = scene.material_ids == index
+    corners, others = scene.corners[own].reshape(-1, 3), scene.corners[~own].reshape(-1, 3)
+    if not len(corners):
+        return False
+    near = others[((others >= corners.min(axis=0)) & (others <= corners.max(axis=0))).all(axis=1)]
+    return not {tuple(corner) for corner in corners.tolist()}.isdisjoint(tuple(corner) for corner in near.tolist())
+
+
 def without_surfaces(scene: Scene, materials: Sequence[int]) -> Scene:
     """The scene without the triangles of these materials, which stay; as it is where nothing else is there."""
     kept = ~np.isin(scene.material_ids, materials)
@@ -78,4 +100,4 @@ def _with(scene: Scene, positions: F64, new: dict[str, Any], lamp: Material, nam
     )
 
 
-__all__ = ["new_name", "with_copy", "with_rectangle", "without_surfaces"]
+__all__ = ["hangs_together", "new_name", "with_copy", "with_rectangle", "with_shift", "without_surfaces"]

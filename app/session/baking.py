@@ -56,6 +56,9 @@ class Goal(Options):
         minimum=0.05,
         maximum=50,
         logarithmic=True,
+        label="Error at most",
+        tip="The bake is done once half of all texels are expected to be off by no more than this; without it, once as little "
+        "remains as is asked for above. Half the error takes up to four times as long",
     )
 
 

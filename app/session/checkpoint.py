@@ -33,6 +33,9 @@ class CheckpointOptions(Options):
         maximum=86_400,
         usual=(0, 600),
         zero="never",
+        label="Checkpoint every",
+        tip="The light so far is written into the folder so often, and a bake that was stopped, or a crash, goes on from there. "
+        "It is written beside the solve, which hardly waits",
     )
 
 

@@ -21,7 +21,7 @@ from pydantic import ValidationError
 from app.errors import UserError
 from app.options import Options
 from app.render.camera import CameraView
-from app.scene.area_lamps import AreaLamp, Key, Surfaces, keys_of, with_surfaces
+from app.scene.area_lamps import AreaLamp, Key, Moved, Surfaces, keys_of, with_surfaces
 from app.scene.gltf_file import first_problem
 from app.scene.images import ImageError
 from app.scene.library import scene_names, scene_path
@@ -38,6 +38,7 @@ from app.session.document_tables import (
     KeyTable,
     LightTable,
     MaterialTable,
+    MovedTable,
     ScaleTable,
     SceneTable,
     SkyTable,
@@ -64,6 +65,7 @@ def document_of(view: View, tables: Mapping[str, Options], folder: Path) -> Docu
         settings={"solver": session.chosen_solver} | {name: _given(options) for name, options in tables.items()},
         area_lamps=[_area_lamp(lamp) for lamp in session.asked_surfaces.lamps],
         removed=[_key(key) for key in session.asked_surfaces.removed],
+        moved=[MovedTable(key=_key(moved.key), shift=moved.shift) for moved in session.asked_surfaces.moved],
         scales=[_scale(key, scale) for key, scale in session.asked_surfaces.scales],
         materials=_edited(session.unedited.materials, now.materials),
         lights=None if now.lights == came.lights else [_light(light) for light in now.lights],
@@ -236,10 +238,11 @@ def version_of(document: Document) -> Version:
 
 
 def surfaces_of(document: Document) -> Surfaces:
-    """That were added, removed, and are cut more or less finely."""
+    """That were added, removed and moved, and are cut more or less finely."""
     return Surfaces(
         tuple(area_lamp_of(lamp) for lamp in document.area_lamps),
         tuple(_key_of(key) for key in document.removed),
+        tuple(Moved(_key_of(moved.key), moved.shift) for moved in document.moved),
         tuple((_key_of(scale), scale.lightmap_scale) for scale in document.scales),
     )
 
@@ -285,9 +288,10 @@ def put_back(document: Document, view: View) -> list[str]:
 
 
 def _missing(document: Document, came: tuple[Material, ...]) -> list[str]:
-    """What to say of surfaces that are not there to be copied, removed or cut more finely."""
+    """What to say of surfaces that are not there to be copied, removed, moved or cut more finely."""
     known, surfaces = set(keys_of(came)), surfaces_of(document)
-    asked = [*(lamp.of for lamp in surfaces.lamps if lamp.of is not None), *surfaces.removed]
+    copied = [lamp.of for lamp in surfaces.lamps if lamp.of is not None]
+    asked = [*copied, *surfaces.removed, *(moved.key for moved in surfaces.moved)]
     asked += [key for key, _ in surfaces.scales if key[0] not in {lamp.name for lamp in surfaces.lamps}]
     names = list(dict.fromkeys(name or "a material without name" for name, _ in set(asked) - known))
     what = "what was made of its surfaces is lost"

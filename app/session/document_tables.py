@@ -120,6 +120,13 @@ class AreaLampTable(Table):
         return self
 
 
+class MovedTable(Table):
+    """Surfaces of the scene's own that are elsewhere."""
+
+    key: KeyTable
+    shift: Vec3
+
+
 class CameraTable(Table):
     """world_from_camera: rows of a rigid matrix."""
 
@@ -147,14 +154,16 @@ class SceneTable(FileTable):
 
 
 class Document(Table):
-    """lights, sky: all of them, where they were edited. area_lamps, removed, scales: lamps with area that were added, materials
-    whose surfaces were removed, and those that are cut more or less finely. settings: as of ``settings.checked``."""
+    """lights, sky: all of them, where they were edited. area_lamps, removed, moved, scales: lamps with area that were added,
+    materials whose surfaces were removed or moved, and those that are cut more or less finely. settings: as of
+    ``settings.checked``."""
 
     glowtree: str
     scene: SceneTable
     settings: dict[str, Any]
     area_lamps: list[AreaLampTable] = []
     removed: list[KeyTable] = []
+    moved: list[MovedTable] = []
     scales: list[ScaleTable] = []
     materials: list[MaterialTable] = []
     lights: list[LightTable] | None = None
@@ -166,11 +175,11 @@ class Document(Table):
     @property
     def edits(self) -> tuple[object, ...]:
         """What of it was made by hand and would be missed."""
-        surfaces = self.area_lamps, self.removed, self.scales
+        surfaces = self.area_lamps, self.removed, self.moved, self.scales
         return *surfaces, self.materials, self.lights, self.sky, self.no_sky, self.bookmarks
 
 
 __all__ = [
-    *("AreaLampTable", "CameraTable", "Document", "FileTable", "KeyTable", "LightTable", "MaterialTable", "ScaleTable"),
-    *("SceneTable", "SkyTable", "SunTable"),
+    *("AreaLampTable", "CameraTable", "Document", "FileTable", "KeyTable", "LightTable", "MaterialTable", "MovedTable"),
+    *("ScaleTable", "SceneTable", "SkyTable", "SunTable"),
 ]

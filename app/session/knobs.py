@@ -106,6 +106,8 @@ def _surfaces(before: Surfaces, after: Surfaces) -> str:
         return f"texel density of {', '.join(sorted(names)) or 'the material'}"
     if before.removed != after.removed:
         return f"lamp {'added' if len(after.removed) < len(before.removed) else 'removed'}"
+    if before.moved != after.moved:
+        return "lamp moved"
     return _things(before.lamps, after.lamps, "lamp")
 
 

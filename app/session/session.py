@@ -61,10 +61,10 @@ class Session(EditableScene):
     through ``message`` instead. Whoever makes it releases it.
 
     options: of the solver that is at work. atlas, light: how scenes are cut, and how their light is held. expose_on_open:
-    whether the exposure is forecast of a scene that opens. read: the open scene as it was read. surfaces: that were added to it
-    and removed; unedited: it with these as it was cut, the same through other edits. edited: what edits are of: another object
-    where those of before are not edits of what is open now. fixed: why its surfaces have to stay as they are, if so. reading: how
-    it was read. load_seconds: of each stage of opening. message: what the user should know.
+    whether the exposure is forecast of a scene that opens. read: the open scene as it was read. surfaces: that were added to it,
+    moved and removed; unedited: it with these as it was cut, the same through other edits. edited: what edits are of: another
+    object where those of before are not edits of what is open now. fixed: why its surfaces have to stay as they are, if so.
+    reading: how it was read. load_seconds: of each stage of opening. message: what the user should know.
     """
 
     def __init__(

@@ -32,6 +32,7 @@ class Stats:
     refining: bool  # whether leaves come and go
     leaves: str  # what is being done for them
     note: str | None
+    doing: str  # see Progress
     edit_work: int | None  # since the materials were last edited
     fresh_work: int | None  # that it took from nothing until converged
     texels: int
@@ -68,6 +69,7 @@ def stats_of(run: Run, lightmap: Lightmap) -> Stats:
         refining=progress.refining,
         leaves=progress.leaves,
         note=progress.note,
+        doing=progress.doing,
         edit_work=run.effort.edit_work(progress.done),
         fresh_work=run.effort.fresh_work,
         texels=lightmap.texel_count,

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Unpack
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from app.render.camera import CameraView
 from app.render.exposure import exposure_of, first_exposure, is_trapped
 from app.render.false_colour import Scale, false_colour_scale
 from app.render.flat import FlatMesh
-from app.render.frame import FrameRenderer
+from app.render.frame import FrameRenderer, Look
 from app.render.layers import LAYER_SHADERS, SEAMS, layers_with
 from app.render.options import DisplayOptions
 from app.render.pick import with_texel
@@ -34,32 +35,39 @@ from app.solvers import HEMISPHERE, Inspection, Rays
 
 SIZE = (1280, 720)  # px, of a picture before the first one
 TRAPPED = "the light is trapped: none of it reaches what the camera sees"
+LOOK_SECONDS = 0.5  # between two looks whether light is trapped: each reads what is seen
 RAYS_SECONDS = 0.25  # between two looks at the rays that are drawn, while light moves
 
 
 class View:
     """A camera in the open scene, how its light is displayed, and the renderer. Whoever makes it releases it, before the session.
 
-    It is made before a scene opens: camera is set then. bookmarks: of cameras, by digit.
-    marked: the texel (column, row) of the tile pool whose rays are drawn,
+    It is made before a scene opens: camera is set then. bookmarks: of cameras, by digit. linear: whether its pictures are of
+    radiance. marked: the texel (column, row) of the tile pool whose rays are drawn,
     where the solver has any.
     """
 
-    def __init__(self, session: Session, display: DisplayOptions | None = None) -> None:
+    def __init__(
+        self, session: Session, display: DisplayOptions | None = None, *, follows: bool = True, linear: bool = False
+    ) -> None:
+        """follows: whether it goes along with scenes that open. linear: as of FrameRenderer."""
         self.session, self.display = session, display or DisplayOptions()
         self.camera: CameraView
         self.bookmarks: dict[int, CameraView] = {}
+        self.linear = linear
         self.marked: tuple[int, int] | None = None
         self._size = SIZE
-        self._looked_at: object = None
+        self._looked_at: tuple[object, object] = (None, None)  # light, and from where
+        self._look_due = 0.0
         self._flat: FlatMesh | None = None  # of the scene that is loading
         self._flat_drawn: object = None
-        self._renderer, self._rays = FrameRenderer(session.gpu), RayPicture(session.gpu)
+        self._renderer, self._rays = FrameRenderer(session.gpu, linear=linear), RayPicture(session.gpu)
         self._seams = SeamJumps(session.gpu)
         self._texel_note: tuple[object, str | None] = (None, None)  # and of which light
         self._rays_of: object = None
         self._rays_due = 0.0
-        session.follow(self._prepare, self._opened)
+        if follows:
+            session.follow(self._prepare, self._opened)
 
     def _prepare(self, lightmap: Lightmap) -> Callable[[], None]:
         self._renderer.prepare(lightmap, self.display.interpolation)
@@ -91,59 +99,34 @@ class View:
 
     # -- pictures ------------------------------------------------------------------------------------------------------
 
-    def draw(
-        self,
-        target: Framebuffer,
-        size: tuple[int, int],
-        *,
-        scale: Scale | None = None,
-        samples: int = 1,
-        add: bool = False,
-        whole: bool = True,
-    ) -> bool:
-        """The picture of the solution as it is now; if not ``whole``, brought up to date over several frames. Whether it was
-        drawn, see ``FrameRenderer.render``. samples, add: the mean of how many, and of those before, too."""
-        self._size = size
-        return self._render(
-            self._renderer, target, self.shown, size, scale=scale, samples=samples, add=add, whole=whole
-        )
-
-    def draw_radiance(self, target: Framebuffer, size: tuple[int, int], *, samples: int) -> None:
-        """The same picture as radiance [W/(sr m²)], neither exposed nor tone-mapped, into a target of floats; of layers that are
-        no light, what they show."""
-        renderer = FrameRenderer(self.session.gpu, linear=True)
-        try:
-            self._render(renderer, target, self.shown.replace(exposure=0.0, false_colour="off"), size, samples=samples)
-        finally:
-            renderer.release()
-
-    def _render(
-        self,
-        renderer: FrameRenderer,
-        target: Framebuffer,
-        display: DisplayOptions,
-        size: tuple[int, int],
-        *,
-        scale: Scale | None = None,
-        samples: int = 1,
-        add: bool = False,
-        whole: bool = True,
-    ) -> bool:
-        return renderer.render(
+    def draw(self, target: Framebuffer, size: tuple[int, int], **look: Unpack[Look]) -> bool:
+        """The picture of the solution as it is now; whether it was drawn, see ``FrameRenderer.render``."""
+        self._size, whole = size, look.get("whole", True)
+        return self._renderer.render(
             target,
             size,
             self.session.lightmap,
             self.camera,
-            display,
+            self.shown,
             reference=self._reference(whole=whole),
             offered=self._offered(whole=whole),
             shooter=self._last_shooter,
             rays=self._marked_rays(whole=whole),
-            scale=scale,
-            samples=samples,
-            add=add,
-            whole=whole,
+            **look,
         )
+
+    def twin(self, *, linear: bool = False) -> View:
+        """A view of the same from the same place with a renderer of its own, for as long as this scene is open; whoever asks for
+        it releases it. linear: of radiance [W/(sr m²)], neither exposed nor tone-mapped, into targets of floats; of layers that
+        are no light, what they show."""
+        display = self.shown.replace(exposure=0.0, false_colour="off") if linear else self.display
+        twin = View(self.session, display, follows=False, linear=linear)
+        twin.camera, twin.marked = self.camera.copy(), self.marked
+        return twin
+
+    def forget_samples(self) -> None:
+        """A picture that is added is the first."""
+        self._renderer.forget_samples()
 
     @property
     def samples(self) -> int:
@@ -209,15 +192,20 @@ class View:
 
     def look_for_light(self) -> str | None:
         """What to say where all light has been distributed and none of it is where the camera sees anything. Looked up once for a
-        solution; it becomes the session's message, too."""
+        solution and a place of the camera, not in every frame while that moves; it becomes the session's message, too."""
         session = self.session
         if not session.opened or not session.run.converged:
             self._say_no_longer()
             return None
-        state = session.lightmap, session.solver.issued
-        if state == self._looked_at:
+        light, place = (
+            (session.lightmap, session.solver.issued),
+            (*self.camera.world_from_camera.flat, self.camera.yfov),
+        )
+        moving = light == self._looked_at[0] and time.perf_counter() < self._look_due
+        if (light, place) == self._looked_at or moving:
             return None
-        self._looked_at = state
+        self._look_due = time.perf_counter() + LOOK_SECONDS
+        self._looked_at = light, place
         balance = session.run.energy
         even = float(np.mean(balance.emitted)) / max(balance.area, 1e-300)
         width, height = self._size

@@ -40,8 +40,8 @@ class Progress:
     the noise that is left, over the mean [-]; 1 before any work, and not finite where the light is not. escaped: power that left
     the scene, RGB [W]. converged: whether what remains is as little as the options ask for, and nothing else changes any more.
     refining: whether leaves of a quadtree come or go, or do not yet hold all of their light. leaves: what is being done for them
-    then, in a few words. note: what the user should know of
-    the solution, if anything.
+    then, in a few words. note: what the user should know of the solution, if anything. doing: what is being done that what
+    remains does not tell, in a few words.
     """
 
     done: int
@@ -51,6 +51,7 @@ class Progress:
     refining: bool = False
     leaves: str = ""
     note: str | None = None
+    doing: str = ""
 
     @property
     def measured(self) -> list[Any]:

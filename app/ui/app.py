@@ -64,7 +64,7 @@ class Ui:
         self.state.recent = Recent(None if state_folder is None else state_folder / "recent.json")
         self.state.asides = self.state.keeping.asides()
         self._files = Files(suffixes, native=native_dialog)
-        self._picture = PictureDialog()
+        self._picture = PictureDialog(native=native_dialog)
 
     def use(self) -> None:
         """Make this interface's contexts the current ones."""
@@ -140,6 +140,8 @@ class Ui:
             or state.drag_button >= 0
             or state.flying
             or self._files.waiting
+            or self._picture.waiting
+            or state.saving is not None
             or (state.baking is not None and state.baking.active)
         )
 
@@ -163,7 +165,9 @@ class Ui:
         return requests
 
     def release(self) -> None:
-        """Destroy the contexts; a bake that is being written is waited for."""
+        """Destroy the contexts; a bake that is being written is waited for, and what a crash has left is there for others."""
+        for aside in self.state.asides:
+            aside.lock.release()
         if self.state.baking is not None:
             self.state.baking.release()
         self.use()
@@ -187,6 +191,7 @@ class Ui:
     def _build(self, view: View, seconds: float) -> None:
         state = self.state
         keys.dispatch(view, state)
+        state.lights_shown = False
         if state.show_ui:
             with theme.see_through():
                 overlays.menu_bar(view, state)

@@ -36,10 +36,13 @@ def linear_from_screen(screen: RGB) -> RGB:
     return rgb(float(c) for c in linear_from_srgb(np.array(screen, np.float32)))
 
 
-def edit_colour(label: str, linear: RGB, *, code: bool = False, most: float = 1.0) -> RGB:
+def edit_colour(
+    label: str, linear: RGB, *, code: bool = False, most: float = 1.0, typed: dict[RGB, RGB] | None = None
+) -> RGB:
     """A swatch that opens a picker; a linear colour in and out, ``linear`` itself where it was not edited. code: with its hex
-    code beside it. most: that a channel can be. Channels that were not edited keep all their digits."""
-    shown = screen_from_linear(linear)
+    code beside it. most: that a channel can be; typed: what was asked for where that is more, by what it was held at, which
+    is still shown. Channels that were not edited keep all their digits."""
+    shown = (typed or {}).get(linear) or screen_from_linear(linear)
     flags = FLAGS if code else FLAGS | int(imgui.ColorEditFlags_.no_inputs)
     changed, edited = imgui.color_edit3(label, list(shown), flags)
     if not changed or not all(map(math.isfinite, edited)):
@@ -48,7 +51,10 @@ def edit_colour(label: str, linear: RGB, *, code: bool = False, most: float = 1.
     by_code = all(abs(c / STEP - round(c / STEP)) < 1e-3 for c in screen)  # which rounds the other channels, too
     same = STEP / 2 if by_code else FINEST
     channels = zip(linear, shown, screen, linear_from_screen(screen), strict=True)
-    return rgb(old if abs(now - was) < same else min(new, most) for old, was, now, new in channels)
+    edited_to = rgb(old if abs(now - was) < same else min(new, most) for old, was, now, new in channels)
+    if typed is not None and max(edited_to) >= most:
+        typed[edited_to] = screen
+    return edited_to
 
 
 def swatch(label: str, linear: RGB, side: float) -> None:

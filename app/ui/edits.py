@@ -38,7 +38,7 @@ def let_go(view: View, state: State) -> None:
     """Take the control out of the hand that holds it, and back to where it was before."""
     imgui.internal.clear_active_id()
     state.drag_button, state.light_held, state.split_held = -1, False, False
-    state.area_held, state.lamp_place, state.scale = False, None, None
+    state.area_held, state.held_lamp, state.scale = False, None, None
     state.act(lambda: state.edits.cancel(_knobs(view, state)))
 
 

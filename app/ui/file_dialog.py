@@ -37,8 +37,9 @@ class FileDialog:
         self._folder = Path.cwd()
         self._opening = False
 
-    def open(self) -> None:
-        """Ask, from the folder of the last answer on."""
+    def open(self, folder: Path | None = None) -> None:
+        """Ask, from that folder on, or from that of the last answer."""
+        self._folder = folder or self._folder
         if not self._native:
             self._opening = True
         elif self._pending is None and self._folders:
@@ -46,6 +47,11 @@ class FileDialog:
         elif self._pending is None:
             patterns = " ".join(f"*{s}" for s in self._suffixes) or "*"
             self._pending = portable_file_dialogs.open_file(self._title, str(self._folder), [self._kind, patterns])
+
+    @property
+    def shown(self) -> bool:
+        """Whether its list stands over everything, or is about to."""
+        return self._opening or imgui.is_popup_open(self._title)
 
     @property
     def waiting(self) -> bool:

@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 from app.scene.library import scenes_folder
 from app.session.keeping import SUFFIX
 from app.session.settings import Settings, settings_of, write_settings
-from app.ui import settings, theme
+from app.ui import recovery, settings, theme
 from app.ui.file_dialog import FileDialog
 from app.ui.save_dialog import SaveDialog
 from app.ui.state import State
@@ -141,6 +141,7 @@ def menu(view: View, state: State) -> None:
             if imgui.menu_item(Path(source).stem, "", False)[0]:
                 state.leave_for(partial(view.session.open, source))
         imgui.end_menu()
+    recovery.menu(state)
     imgui.separator()
     if imgui.menu_item(f"{ICONS.ICON_FA_FLOPPY_DISK}  Save session", "Ctrl+S", False, opened)[0]:
         save(view, state)

@@ -45,14 +45,14 @@ def edit_light(
     imgui.same_line()
     new = _amount("##strength", strength, _per_strength(tint, quantities), known[kind].unit, weakest)
     back = widgets.put_back(back, True)
-    widgets.tooltip(f"{name.capitalize()}. {HELP[kind]}. {widgets.AS_READ}")
+    widgets.tooltip(f"{name.capitalize()}. {HELP[kind]}. {widgets.SLIDES}")
     if spread is not None:
         widgets.labelled("Flux")
         whole = spread * (sum(tint) if quantities == "radiometric" else _per_strength(tint, quantities))
         new = _amount("##flux", new, whole, known["flows"].unit, weakest)
         back = widgets.put_back(back, True)
-        widgets.tooltip(f"{known['flows'].name.capitalize()}: all that it gives off. {widgets.AS_READ}")
-    new_tint = _temperature(new_tint)
+        widgets.tooltip(f"{known['flows'].name.capitalize()}: all that it gives off. {widgets.SLIDES}")
+    new_tint = _temperature(new_tint, shines=strength > 0)
     if widgets.put_back(back, True):
         return came, colour.tint_and_strength(came, tint)[0]
     same = (new_tint, new) == (tint, strength)
@@ -74,11 +74,15 @@ def _amount(label: str, strength: float, factor: float, unit: str, weakest: floa
     return strength if edited == shown else edited / factor
 
 
-def _temperature(tint: RGB) -> RGB:
-    kelvin = kelvin_of_colour(tint)
+def _temperature(tint: RGB, *, shines: bool) -> RGB:
+    """The tint after its temperature was edited. shines: whether there is light that has one."""
+    kelvin = kelvin_of_colour(tint) if shines else None
     widgets.labelled("Temperature")
     imgui.set_next_item_width(-1)
     shown = WARM if kelvin is None else kelvin
+    imgui.begin_disabled(not shines)
     edited = slider.slide("##kelvin", shown, KELVIN, "none" if kelvin is None else f"{shown:,.0f} K")
-    widgets.tooltip("Of a black body that has this colour: a candle 1,900 K, a filament 2,700 K, daylight 6,500 K")
+    imgui.end_disabled()
+    help = "Of a black body that has this colour: a candle 1,900 K, a filament 2,700 K, daylight 6,500 K"
+    widgets.tooltip(f"{help}. {widgets.SLIDES}" if shines else f"{help}\nNo effect now: it gives no light")
     return tint if edited == shown else colour_of_kelvin(edited)

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from imgui_bundle import imgui
 
-from app.scene.area_lamps import AreaLamp, keys_of, middle_of
+from app.scene.area_lamps import AreaLamp
 from app.scene.ceiling_light import MEAN_IRRADIANCE, ceiling_light
 from app.scene.lamp_surfaces import new_name
 from app.scene.lights import Light
 from app.scene.model import RGB
 from app.scene.sky import DEFAULT_SUN, SUN_ANGLE, Sky, Sun
-from app.ui import theme, widgets
+from app.ui import area_edits, theme, widgets
 from app.ui.state import State
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ PER_ROW = 3
 EDGE = 0.1  # of a rectangle, of the scene's diagonal
 GAP = 1e-3  # in front of the surface that it is put on, of the same
 NEARER = 0.5  # of the way to what is looked at, where a point or spot light is put
-LOADING = "a scene is loading"
+DARK = "Nothing emits light"
 
 
 @dataclass(frozen=True)
@@ -58,18 +58,10 @@ def buttons(view: View, state: State) -> None:
         widgets.tooltip(kind.meaning + ("" if off is None else f"\nNot now: {off}"))
 
 
-def used_materials(view: View, state: State) -> tuple[int, ...]:
-    """Those that are on some triangle."""
-    scene = view.session.unedited
-    if state.used[0] is not scene:
-        state.used = scene, tuple(np.unique(scene.material_ids).tolist())
-    return state.used[1]
-
-
 def is_lit(view: View, state: State) -> bool:
     """Whether anything shines in the open scene, as it was edited."""
     scene = view.session.edited_scene
-    shines = any(scene.materials[index].emits for index in used_materials(view, state))
+    shines = any(scene.materials[index].emits for index in area_edits.used_materials(view, state))
     return shines or scene.lit_by_sky or scene.lit_by_lights
 
 
@@ -77,7 +69,7 @@ def why_not(view: View, kind: Kind) -> str | None:
     """Why a lamp of that kind cannot be added now."""
     session = view.session
     if kind.surface:
-        return why_fixed(view)
+        return area_edits.why_fixed(view)
     return "there is a sky, see below" if kind.label == "Sky" and session.edited_scene.sky is not None else None
 
 
@@ -99,51 +91,6 @@ def light_beside(view: View, light: Light, size: float) -> Light:
     name = new_name(light.kind, [other.name for other in view.session.edited_scene.lights])
     x, y, z = light.position
     return replace(light, name=name, position=light.position if light.from_afar else (x + EDGE * size / 2, y, z))
-
-
-def added_lamp(view: View, index: int) -> AreaLamp | None:
-    """The lamp with area that material ``index`` is of, if it was added."""
-    session = view.session
-    if index < len(session.read.materials):
-        return None
-    name = session.materials[index].name
-    return next(lamp for lamp in session.surfaces.lamps if lamp.name == name)
-
-
-def duplicate_surfaces(view: View, index: int) -> None:
-    """The lamp of material ``index`` once more, beside itself."""
-    scene, now = view.session.unedited, view.session.materials[index]
-    corners = scene.corners[scene.material_ids == index].reshape(-1, 3)
-    size = np.ptp(corners, axis=0)
-    shift = np.where(np.arange(3) == np.argmax(size * (1, 0.5, 1)), 1.5 * size, 0.0)  # rather not upwards
-    x, y, z = (middle_of(scene, index) + shift).tolist()
-    like = added_lamp(view, index) or AreaLamp("", (x, y, z), now.emission, of=keys_of(scene.materials)[index])
-    name = _name(view, scene.materials[index].name or "lamp")
-    _add(view, replace(like, name=name, position=(x, y, z), emission=now.emission))
-
-
-def remove_surfaces(view: View, index: int) -> None:
-    """Take the lamp of material ``index`` away, with its surfaces."""
-    session, lamp = view.session, added_lamp(view, index)
-    now = session.asked_surfaces
-    if lamp is None:
-        less = replace(now, removed=(*now.removed, keys_of(session.read.materials)[index]))
-    else:
-        less = replace(now, lamps=tuple(other for other in now.lamps if other.name != lamp.name))
-    session.change_surfaces(less)
-
-
-def move_surfaces(view: View, name: str, position: RGB) -> None:
-    """Put the added lamp of that name there, with its middle at (3,) [m]."""
-    now = view.session.asked_surfaces
-    lamps = tuple(replace(lamp, position=position) if lamp.name == name else lamp for lamp in now.lamps)
-    if lamps != now.lamps:
-        view.session.change_surfaces(replace(now, lamps=lamps))
-
-
-def why_fixed(view: View) -> str | None:
-    """Why the surfaces of the open scene cannot be changed now."""
-    return LOADING if view.session.loading is not None else view.session.fixed
 
 
 def add_light(view: View, light: Light, state: State) -> None:
@@ -176,7 +123,7 @@ def _sky(view: View, state: State) -> None:
 
 
 def _ceiling(view: View, state: State) -> None:
-    _add(view, ceiling_light(view.session.unedited, _name(view, "ceiling light")))
+    area_edits.add(view, ceiling_light(view.session.unedited, area_edits.free_name(view, "ceiling light")))
 
 
 def _area(view: View, state: State) -> None:
@@ -190,13 +137,8 @@ def _area(view: View, state: State) -> None:
         point, normal = point - edge * view.camera.forward, -view.camera.forward
     across = np.cross((0.0, 1.0, 0.0) if abs(normal[1]) < 0.9 else (1.0, 0.0, 0.0), normal)
     L = MEAN_IRRADIANCE * max(float((high - low)[0] * (high - low)[2]), edge**2) / (math.pi * edge**2)
-    name, middle = _name(view, "area light"), point + GAP * size * normal
-    _add(view, AreaLamp(name, _triple(middle), (L, L, L), (edge, edge), _unit(normal), _unit(across)))
-
-
-def _add(view: View, lamp: AreaLamp) -> None:
-    now = view.session.asked_surfaces
-    view.session.change_surfaces(replace(now, lamps=(*now.lamps, lamp)))
+    name, middle = area_edits.free_name(view, "area light"), point + GAP * size * normal
+    area_edits.add(view, AreaLamp(name, _triple(middle), (L, L, L), (edge, edge), _unit(normal), _unit(across)))
 
 
 def _triple(vector: F64) -> RGB:
@@ -236,13 +178,6 @@ def _surface(view: View, state: State) -> tuple[F64, F64 | None]:
     if picked is None:
         return view.camera.target, None
     return np.array(picked.position), np.array(picked.normal)
-
-
-def _name(view: View, kind: str) -> str:
-    """That no material has, nor one that may come back."""
-    session = view.session
-    names = [material.name for material in session.materials] + [name for name, _ in session.material_edits]
-    return new_name(kind, names)
 
 
 def _light_name(view: View, kind: str) -> str:
@@ -291,17 +226,4 @@ KINDS = (
     ),
 )
 
-__all__ = [
-    *(
-        "KINDS",
-        "add_light",
-        "added_lamp",
-        "buttons",
-        "duplicate_surfaces",
-        "is_lit",
-        "light_beside",
-        "move_surfaces",
-        "pair_of_buttons",
-    ),
-    *("move_surfaces", "remove_surfaces", "used_materials", "why_fixed", "why_not"),
-]
+__all__ = ["DARK", "KINDS", "add_light", "buttons", "is_lit", "light_beside", "pair_of_buttons", "why_not"]

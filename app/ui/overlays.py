@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from app.render.units import QUANTITIES, UNITS
 from app.session.balance import verdict_of
-from app.ui import bookmarks, edits, files, new_lamps, pointer, text_size, theme, widgets
+from app.ui import bookmarks, edits, files, new_lamps, pointer, recovery, text_size, theme, widgets
 from app.ui.keys import POINTER, SHORTCUTS, flip_pace
 from app.ui.layout import PANELS
 from app.ui.panels.display import counted
@@ -32,7 +32,6 @@ FLOATING = int(
 )
 LOADING_EM = 24.0
 NO_LAMPS_EM = 22.0
-NO_LAMPS = "Nothing shines in this scene: add a lamp"
 TOAST_EM = 34.0
 LEGEND_EM = (1.2, 13.0)  # width and height of the colour bar
 LEGEND_MARGIN_EM = 1.0
@@ -103,6 +102,7 @@ def status_bar(view: View, state: State) -> None:
             imgui.text_colored(imgui.ImVec4(*colour), text)
             widgets.copied_by_click(text)
             imgui.separator()
+        recovery.offer(state)
         if state.stats is not None:
             _pace(view, state)
             if state.stats.refining and state.stats.leaves:
@@ -216,7 +216,7 @@ def no_lamps(view: View, state: State) -> None:
     imgui.set_next_window_pos(middle, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
     imgui.set_next_window_size(imgui.ImVec2(min(NO_LAMPS_EM * em, width), 0))
     imgui.begin("##no lamps", None, FLOATING & ~int(imgui.WindowFlags_.always_auto_resize))
-    widgets.wrapped(NO_LAMPS)
+    widgets.wrapped(f"{new_lamps.DARK}: add a lamp")
     new_lamps.buttons(view, state)
     imgui.end()
 
@@ -230,8 +230,10 @@ def loading_overlay(loading: BackgroundTask[Any] | None, state: State, *, coarse
     middle = imgui.ImVec2(left + width / 2, top + imgui.get_font_size())
     imgui.set_next_window_pos(middle, imgui.Cond_.always, imgui.ImVec2(0.5, 0.0))
     imgui.begin("##loading", None, FLOATING)
+    width = min(imgui.get_font_size() * LOADING_EM, width - 2 * imgui.get_style().window_padding.x)
+    imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)
     imgui.text_unformatted(loading.stage)
-    width = imgui.get_font_size() * LOADING_EM
+    imgui.pop_text_wrap_pos()
     share = f"{loading.fraction:.0%}" + (", coarse light until then" if coarse else "")
     imgui.progress_bar(min(max(loading.fraction, 0.0), 1.0), imgui.ImVec2(width, 0), share)
     if imgui.button("Cancel", imgui.ImVec2(width, 0)):

@@ -15,10 +15,9 @@ Curve = tuple[np.ndarray, np.ndarray, theme.RGBA]  # x, y, colour
 Ends = tuple[float, float]
 
 AXIS = int(implot.AxisFlags_.no_highlight)
-LEGEND = int(implot.LegendFlags_.no_menus | implot.LegendFlags_.horizontal)
-OUTSIDE = int(implot.LegendFlags_.outside)
+LEGEND = int(implot.LegendFlags_.no_menus | implot.LegendFlags_.horizontal | implot.LegendFlags_.outside)
 PLOT = int(implot.Flags_.no_mouse_text | implot.Flags_.no_menus | implot.Flags_.no_box_select)
-LOW_EM = 8.0  # height of a plot, below which its legend stands inside
+LOW_EM = 8.0  # height of a plot, below which its legend takes no more room than its words
 TICK_EM = 1.6  # between two ticks of an axis that has few, at least
 FEW_TICKS = (6, 3, 2)  # from 0 to 1
 
@@ -38,20 +37,24 @@ def begin(
     io, em = imgui.get_io(), imgui.get_font_size()
     if name in zooms.hovered and (io.mouse_wheel or imgui.is_mouse_dragging(0)):
         zooms.zoomed.add(name)
+    low, style = is_low(size.y), implot.get_style()
+    for variable, usual in (
+        (implot.StyleVar_.legend_padding, style.legend_padding),
+        (implot.StyleVar_.legend_inner_padding, style.legend_inner_padding),
+    ):
+        implot.push_style_var(variable, imgui.ImVec2(usual.x, 0 if low else usual.y))
     if not implot.begin_plot(f"##{name}", size, PLOT):
+        implot.pop_style_var(2)
         return False
     implot.setup_axis(implot.ImAxis_.x1, label, AXIS)
     implot.setup_axis(implot.ImAxis_.y1, None, AXIS)
-    low = is_low(size.y)
-    implot.setup_legend(
-        implot.Location_.north_east if low else implot.Location_.north, LEGEND if low else LEGEND | OUTSIDE
-    )
+    implot.setup_legend(implot.Location_.north, LEGEND)
     if logarithmic:
         implot.setup_axis_scale(implot.ImAxis_.y1, implot.Scale_.log10)
     if name not in zooms.zoomed:
         implot.setup_axis_limits(implot.ImAxis_.x1, *x, implot.Cond_.always)
         implot.setup_axis_limits(implot.ImAxis_.y1, *y, implot.Cond_.always)
-        room = size.y / em - (2.0 if low else 4.0)
+        room = size.y / em - (3.0 if low else 4.0)
         if not logarithmic:
             count = next((n for n in FEW_TICKS if (n - 1) * TICK_EM <= room), FEW_TICKS[-1])
             implot.setup_axis_ticks(implot.ImAxis_.y1, *y, count)
@@ -59,7 +62,7 @@ def begin(
 
 
 def is_low(height: float) -> bool:
-    """Whether a plot has no room for a legend above it."""
+    """Whether a plot has little room for a legend above it."""
     return height < LOW_EM * imgui.get_font_size()
 
 
@@ -76,6 +79,7 @@ def end(zooms: Zooms, name: str, unit: str, curves: Mapping[str, Curve], shown: 
             implot.plot_inf_lines("##at", np.array([at]), implot.Spec(line_color=imgui.ImVec4(*theme.DIM)))
             imgui.set_tooltip("\n".join(lines))
     implot.end_plot()
+    implot.pop_style_var(2)
 
 
 def read(curves: Mapping[str, Curve], at: float, unit: str, shown: Callable[[float], str]) -> tuple[list[str], float]:

@@ -9,6 +9,7 @@ from imgui_bundle import imgui, portable_file_dialogs
 
 from app.ui import widgets
 from app.ui.file_dialog import system_dialog
+from app.ui.path_field import PathField
 
 WIDTH_EM = 30.0
 
@@ -21,12 +22,12 @@ class SaveDialog:
         self._native = system_dialog(native)
         self._pending: Any = None
         self._opening = self._shown = False
-        self._text = ""
+        self._path = PathField(f"A folder to {title[:1].lower()}{title[1:]} into", native=native)
 
     def open(self, first: Path) -> None:
         """Ask; ``first`` is what is proposed."""
         if not self._native:
-            self._opening, self._text = True, str(first)
+            self._opening, self._path.text = True, str(first)
         elif self._pending is None:
             self._pending = portable_file_dialogs.save_file(self._title, str(first), [self._suffix, f"*{self._suffix}"])
 
@@ -58,19 +59,17 @@ class SaveDialog:
         self._shown = widgets.begin_modal(self._title)
         if not self._shown:
             return None
-        if self._opening:
-            imgui.set_keyboard_focus_here()
-            self._opening = False
-        imgui.set_next_item_width(WIDTH_EM * imgui.get_font_size())
-        entered, self._text = imgui.input_text("##name", self._text, imgui.InputTextFlags_.enter_returns_true)
-        path = Path(self._text.strip()).expanduser()
+        self._opening = False
+        entered = self._path.draw(WIDTH_EM * imgui.get_font_size())
+        path = Path(self._path.text.strip()).expanduser()
         trouble = self._trouble(path)
         widgets.dim(trouble or ("replaces the file that is there" if self._whole(path).is_file() else " "))
         imgui.begin_disabled(trouble is not None)
         saved = imgui.button("Save###save as") or (entered and trouble is None)
         imgui.end_disabled()
         imgui.same_line()
-        if imgui.button("Cancel###cancel save") or saved or imgui.is_key_pressed(imgui.Key.escape, False):
+        escaped = imgui.is_key_pressed(imgui.Key.escape, False) and not self._path.browsing
+        if imgui.button("Cancel###cancel save") or saved or escaped:
             imgui.close_current_popup()
             self._shown = False
         imgui.end_popup()
@@ -81,7 +80,7 @@ class SaveDialog:
 
     def _trouble(self, path: Path) -> str | None:
         """Why nothing can be saved there."""
-        if not self._text.strip() or path.is_dir():
+        if not self._path.text.strip() or path.is_dir():
             return "a name is missing"
         return None if path.absolute().parent.is_dir() else f"there is no folder {path.absolute().parent}"
 

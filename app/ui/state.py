@@ -18,6 +18,7 @@ from app.util.recent import Recent
 
 if TYPE_CHECKING:
     from app.atlas.options import AtlasOptions
+    from app.scene.area_lamps import AreaLamp
     from app.session.baking import Baking, Order
     from app.session.picking import Picked
     from app.session.stats import Stats
@@ -69,6 +70,15 @@ class PictureFile:
     size: tuple[int, int]
 
 
+@dataclass
+class Saving:
+    """A picture that is drawn for a file: the file's name, and the share that is done. stopped: by the user."""
+
+    name: str
+    share: float = 0.0
+    stopped: bool = False
+
+
 @dataclass(frozen=True)
 class Legend:
     """The false-colour scale: ``colours`` from ``minimum`` to ``maximum`` [unit]."""
@@ -103,20 +113,22 @@ class Flight:
 class State:
     """Everything that belongs to the interface and not to the session.
 
-    measured: whether numbers that depend on the machine's speed are shown (off for pictures that are compared). live: whether
-    frames follow each other, so that there is a rate of them. texture_id: makes a texture of the host drawable; legend: the
-    scale of what is shown now; stats: of the session, asked once per frame (None without a scene). atlas, adaptive: edited,
-    not yet applied. view_px: the 3-D view (left, top, width, height) [display units]. inspected: what the solver showed last,
-    and of which light. draw_rays: those of the picked texel, in the room. pointed: under the pointer, and where.
-    reveal_material: the list scrolls to the selected one. draw_lights: lamps without area, in the view. reference: of a solve
-    in the background; layer: to go back to from the error. edits: of the open scene; held: whether a hand was at a control in
-    the last frame. used: of which scene, the materials that are somewhere. version: of the open scene, that
-    edits are noted of. lamp_place: of a lamp with area, by name, as long as a hand moves it [m]. scale: of a material's
-    texel density, by index, the same. keeping: saves and opens
-    sessions; asides: what crashes have left, to be asked about; leaving: a wish that is to be answered;
-    after_saving: what waits for a session to be saved. order: of the next bake, as
-    far as it was edited; baking: the last. text_size: over what the screen asks for.
-    """
+        measured: whether numbers that depend on the machine's speed are shown (off for pictures that are compared). live: whether
+        frames follow each other, so that there is a rate of them. texture_id: makes a texture of the host drawable; legend: the
+        scale of what is shown now; stats: of the session, asked once per frame (None without a scene). atlas, adaptive: edited,
+        not yet applied. view_px: the 3-D view (left, top, width, height) [display units]. inspected: what the solver showed last,
+            and of which light. draw_rays: those of the picked texel, in the room. pointed: under the pointer, and where.
+        reveal_material: the list scrolls to the selected one. draw_lights: handles of lamps, in the view; lights_shown: whether the
+        Lights panel is. reference: of a solve in the background; layer: to go back to from the error. edits: of the open scene;
+        held: whether a hand was at a control in the last frame. Looked up once of a scene: used, the materials that are somewhere;
+        mean_factors, what multiplies their albedos on the mean; own_lamps, with area, as if they were copies of themselves; joined,
+        whether these are part of a larger piece. typed_colours: asked for by hand, by what albedos were held at. version: of the open
+        scene, that edits are noted of. held_lamp: one with area as a hand holds it, by its material; scale:
+        a texel density, the same. keeping: saves and opens
+        sessions; asides: what crashes have left, that is offered; recover: the one to be asked about; leaving: a wish that is to be
+        answered; after_saving: what waits for a session to be saved. order: of the next bake, as far as it was edited; baking: the
+        last. picture: that is to be saved; saving: the one that is drawn for it. text_size: over what the screen asks for.
+        """
 
     measured: bool = True
     live: bool = True
@@ -132,6 +144,7 @@ class State:
     ask_for_reference: bool = False
     ask_for_picture: bool = False
     picture: PictureFile | None = None
+    saving: Saving | None = None
     leaving: Leaving | None = None
     ask_for_session_name: bool = False
     ask_for_settings: bool = False
@@ -139,6 +152,7 @@ class State:
     after_saving: Callable[[], object] | None = None
     keeping: Keeping = field(default_factory=Keeping)
     asides: list[Aside] = field(default_factory=list)
+    recover: Aside | None = None
     recent: Recent = field(default_factory=Recent)
     edits: EditHistory = field(default_factory=EditHistory)
     held: bool = False
@@ -170,14 +184,19 @@ class State:
     used: tuple[object, tuple[int, ...]] = (None, ())
     version: object = None
     light_held: bool = False
-    lamp_place: tuple[str, RGB] | None = None
+    held_lamp: tuple[int, AreaLamp] | None = None
+    own_lamps: tuple[object, dict[int, AreaLamp]] = (None, {})
+    joined: tuple[object, dict[int, bool]] = (None, {})
     scale: tuple[int, float] | None = None
     area_held: bool = False
     draw_lights: bool = True
+    lights_shown: bool = False
     atlas: AtlasOptions | None = None
     adaptive: bool | None = None
     emitting_area: tuple[object, float] = (None, 0.0)
     emission_colours: dict[int, RGB] = field(default_factory=dict)
+    typed_colours: dict[RGB, RGB] = field(default_factory=dict)
+    mean_factors: tuple[object, dict[int, RGB]] = (None, {})
     plot: str = "work"
     plot_alone: str = "remaining"
     zooms: Zooms = field(default_factory=Zooms)

@@ -13,16 +13,18 @@ from imgui_bundle import imgui
 
 from app.options import Options, Spec, specs
 from app.ui import slider, theme
-from app.ui.words import meaning
+from app.ui.words import BY_HAND, meaning
 
 OptionsT = TypeVar("OptionsT", bound=Options)
 
 LABEL_SHARE = 0.44  # of the panel's width
 TOOLTIP_EM = 22.0
 COPIED_SECONDS = 1.0  # that it is said
+FEW = 1e4  # that four digits show
 ROUNDING = 1e-6  # of 32-bit numbers
 GROUPED = re.compile(r"(?<=\d),(?=\d{3})")
 AS_READ = "Right-click: as in the file"
+SLIDES = f"{BY_HAND}; right-click: as in the file"
 TOOLTIP = int(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)
 
 
@@ -113,7 +115,7 @@ def _optional(spec: Spec, value: Any, start: Any) -> Any:
     if value is not None or start is not None:
         imgui.same_line()
     if value is None and start is not None:
-        dim(f"{number(start, 4) if spec.type is float else f'{start:,}'} {spec.unit}")
+        dim(f"{short(start) if spec.type is float else f'{start:,}'} {spec.unit}")
     return value
 
 
@@ -140,7 +142,7 @@ def _number(spec: Spec, value: float, start: float | None) -> float:
         spec.minimum, spec.maximum, usual=spec.usual, logarithmic=spec.logarithmic, multiple=multiple, start=start
     )
     # Dear ImGui shows a format without a number as it stands
-    digits = f"{value:,}" if spec.type is int else "%.4g" if spec.logarithmic else f"%.{ends.decimals}f"
+    digits = f"{value:,}" if spec.type is int else _format(value) if spec.logarithmic else f"%.{ends.decimals}f"
     text = spec.zero if value == 0 and spec.zero else digits + unit
     edited = slider.slide("##value", value, ends, text)
     return spec.type(edited) if edited != value else value
@@ -270,6 +272,15 @@ def number(value: float, digits: int = 4) -> str:
         decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
         return f"{value:,.{decimals}f}"
     return f"{value:.{digits - 1}e}"
+
+
+def short(value: float) -> str:
+    """A value as the slider of an option shows it: four digits, but no zeros at the end of a fraction."""
+    return _format(value) % value
+
+
+def _format(value: float) -> str:
+    return "%.4g" if abs(value) < FEW else "%.0f"
 
 
 def percent(fraction: float) -> str:

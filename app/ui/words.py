@@ -18,6 +18,7 @@ PLACES = {
     "sky": "Sky in the Lights panel",
     "sun": "the sun's place in the Lights panel",
 }
+BY_HAND = "Drag, with Shift finely; double-click: type a number"  # of a slider
 LEAST, MOST = 1e-5, 1e8  # numbers beyond which a range has no end to speak of
 
 
@@ -26,6 +27,8 @@ def meaning(spec: Spec, off: str | None = None) -> str:
     effect now."""
     text = spec.tip or spec.help
     lines = [f"{text[:1].upper()}{text[1:]}.", _range(spec)]
+    if spec.type in (int, float) and not spec.choices and off is None:
+        lines.append(f"{BY_HAND}.")
     if spec.term:
         lines.append(f"In papers: {spec.term}.")
     if off is not None:
@@ -63,7 +66,7 @@ def _titles() -> dict[str, str]:
 
 def _range(spec: Spec) -> str:
     """Of legal values, and the default: ``0 to 4 (default 2)``."""
-    unit = f" {spec.unit.replace('1/', 'per ')}" if spec.unit else ""
+    unit = f" {spec.unit}" if spec.unit else ""
     if spec.type is bool:
         default = "on" if spec.default else "off"
     elif spec.default is None:
@@ -83,4 +86,4 @@ def _range(spec: Spec) -> str:
     return f"{bounds}{steps}; {default}."
 
 
-__all__ = ["meaning", "number", "plain", "title"]
+__all__ = ["BY_HAND", "meaning", "number", "plain", "title"]

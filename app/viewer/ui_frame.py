@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Generator
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from app.session.view import View
 from app.ui import theme
 from app.ui.app import Ui
 from app.ui.state import Legend, Request
+from app.util.parts import run_to_end
 
 LEGEND_COLOURS = 48
 SCALE_SHARE = 0.05  # of the time may go into finding the false-colour scale
@@ -62,13 +64,13 @@ class UiFrame:
         ratio: float = 1.0,
         seconds: float = STEP,
         look: bool = True,
-        samples: int = 1,
+        add: bool = False,
     ) -> list[Request]:
         """Build and draw one frame into ``target``, and do what it asked of the session; what is left for the host to do.
 
         size: of the window [display units]; ratio: pixels per unit, so that the target has size·ratio pixels;
-        seconds: since the last frame. look: draw the view anew, or show it as it was drawn last. samples: pictures that the view
-        is the mean of; all of them are drawn for a screenshot, too. Reloads shaders itself.
+        seconds: since the last frame. look: draw the view anew, or show it as it was drawn last. add: one more sample to those
+        of the view that were added before. For a screenshot all of them are drawn. Reloads shaders itself.
         """
         scale = self._false_colour(view)
         legend = None if scale is None else _legend(quantity(measured(view.shown), view.shown.quantities).name, scale)
@@ -85,7 +87,7 @@ class UiFrame:
         elif Request.SCREENSHOT in requests:
             view.draw(view_target, (width, height), scale=scale, samples=SAMPLES)
         elif self._whole and (look or known is not self._view):
-            view.draw(view_target, (width, height), scale=scale, samples=samples)
+            view.draw(view_target, (width, height), scale=scale, add=add)
         elif not self._whole:
             self._look(view, view_target, scale, fresh=known is not self._view, look=look)
         target.use()
@@ -102,6 +104,11 @@ class UiFrame:
             self._reload()
         return [r for r in (*requests, *self._ui.take_requests()) if r is not Request.RELOAD_SHADERS]
 
+    def add_sample(self, view: View) -> None:
+        """Add one sample to the picture of the view, for a ``draw`` that adds the last: the interface is built once."""
+        _, _, width, height = self._ui.view_rect
+        view.draw(self._view_of(width, height)[1], (width, height), scale=self._false_colour(view), add=True)
+
     def _look(self, view: View, target: Framebuffer, scale: Scale | None, *, fresh: bool, look: bool) -> None:
         """Draw the view within the time of a frame: where nothing moves, one more sample of it, until there are enough. fresh:
         nothing was drawn into ``target`` yet."""
@@ -110,7 +117,7 @@ class UiFrame:
         if now is None or now != self._still or fresh:
             if look or fresh:
                 view.draw(target, size, scale=scale, whole=fresh)
-        elif view.samples < SAMPLES and not view.session.coarse:
+        elif look and view.samples < SAMPLES and not view.session.coarse:
             view.draw(target, size, scale=scale, add=True)
         self._still, self.unfinished = now, now is not None and view.samples < SAMPLES
 
@@ -183,15 +190,26 @@ def ui_image(
     size: tuple[int, int],
     *,
     measured: bool = True,
-    panels: bool = True,
     click: tuple[float, float] | None = None,
 ) -> NDArray[np.uint8]:
     """The viewer's window as it would look, (height, width, 3) u8, top row first, for a ``size`` (width, height) [px].
 
     The session is not stepped. ``measured=False`` leaves out what depends on the machine's speed, so that pictures
-    can be compared; ``panels=False`` all but the picture and the legend of its false colour. click: a place in the window [px]
-    that is clicked once it is there.
+    can be compared. click: a place in the window [px] that is clicked once it is there.
     """
+    return run_to_end(parts_of_ui_image(view, size, measured=measured, click=click))
+
+
+def parts_of_ui_image(
+    view: View,
+    size: tuple[int, int],
+    *,
+    measured: bool = True,
+    panels: bool = True,
+    click: tuple[float, float] | None = None,
+) -> Generator[float, None, NDArray[np.uint8]]:
+    """The same in parts, one of the picture's samples after the other; yields the share that is drawn. ``panels=False`` leaves
+    out all but the picture and the legend of its false colour."""
     gpu = view.session.gpu
     check_size(gpu, size)
     texture = gpu.texture(size, 4, "f1")
@@ -209,7 +227,12 @@ def ui_image(
                 ui.io.add_mouse_button_event(0, down)
             for _ in range(WARM_UP):
                 frame.draw(view, target, size=size)
-        frame.draw(view, target, size=size, samples=SAMPLES)
+        view.forget_samples()
+        for drawn in range(1, SAMPLES):
+            frame.add_sample(view)
+            gpu.ctx.finish()
+            yield drawn / SAMPLES
+        frame.draw(view, target, size=size, add=True)
         return pixels(target, size)
     finally:
         frame.release()

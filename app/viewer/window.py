@@ -10,7 +10,6 @@ import os
 import string
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,9 +23,9 @@ from app.gpu import Gpu
 from app.session.pacing import Turns
 from app.session.view import View
 from app.ui.app import Ui
-from app.ui.state import Pace, PictureFile, Request
+from app.ui.state import Pace, Request
 from app.viewer.mouse import Mouse
-from app.viewer.picture import save_picture
+from app.viewer.saving import Pictures
 from app.viewer.ui_frame import UiFrame, save_screenshot
 
 GL_VERSION = (4, 1)
@@ -203,7 +202,7 @@ class ViewerWindow(WindowConfig):
         self._let_go: set[imgui.Key] = set()
         self._cursor: int | None = None
         self._caption = ""
-        self._turns = Turns()
+        self._turns, self._pictures = Turns(), Pictures(view, ui.state)
         self._awake_until, self._frames_due = 0.0, 0
         self.frames = 0  # drawn so far
         ui.use()
@@ -237,6 +236,7 @@ class ViewerWindow(WindowConfig):
             waiting = self._session.on_its_way is not None or self._session.compared.fetching is not None
             if waiting and not self._session.solving and not self._session.uploading:
                 self._wait(LOADING_PAUSE)
+        self._pictures.end()
 
     def _wait(self, seconds: float) -> None:
         """For an event, at most so long."""
@@ -251,25 +251,22 @@ class ViewerWindow(WindowConfig):
 
     def _at_rest(self) -> bool:
         """Whether another frame would look like the last one."""
-        changes = not self._session.at_rest or self._ui.moving or self._frame.unfinished
+        changes = not self._session.at_rest or self._ui.moving or self._frame.unfinished or self._pictures.busy
         if changes or self._frames_left is not None:
             self._wake()
         return time.perf_counter() > self._awake_until and self._frames_due <= 0
 
     def on_render(self, time: float, frame_time: float) -> None:
         """Collect what is ready, solve within the budget, draw, do what was asked for."""
-        session, state, look = self._session, self._ui.state, True
+        session, state, look = self._session, self._ui.state, False
+        self._pictures.step()
         try:
-            session.poll(interactive=self._ui.held)
-            self._view.tell_observer()
-            self._view.look_for_light()
-            held, fast = self._ui.held, session.opened and state.is_fast(session.run.seconds)
-            solve, look = self._turns.next(frame_time) if session.solving and (held or not fast) else (True, True)
-            if solve:
-                session.advance(fast=fast, interactive=held)
+            if not self._pictures.drawing:
+                look = self._solve(frame_time)
         except UserError as error:
             session.run.running = False
             state.notify(str(error), error=True)
+            look = True
         target, ratio = self.wnd.fbo, self.wnd.pixel_ratio
         requests = self._frame.draw(self._view, target, size=self.wnd.size, ratio=ratio, seconds=frame_time, look=look)
         session.run.drawn()
@@ -282,9 +279,9 @@ class ViewerWindow(WindowConfig):
         self._show_name()
         for request in requests:
             if request is Request.SCREENSHOT:
-                self._save(lambda: save_screenshot(self.wnd.fbo, self.wnd.buffer_size, Path.cwd()))
+                self._save_screenshot()
             elif request is Request.SAVE_PICTURE and state.picture is not None:
-                self._save(partial(self._save_picture, state.picture))
+                self._pictures.begin(state.picture)
             elif request is Request.QUIT:
                 self.wnd.is_closing = True
         self._frames_due -= 1
@@ -294,14 +291,22 @@ class ViewerWindow(WindowConfig):
             if self._frames_left <= 0:
                 self.wnd.is_closing = True
 
-    def _save_picture(self, file: PictureFile) -> Path:
-        save_picture(self._view, file.path, file.size)
-        return file.path
+    def _solve(self, frame_time: float) -> bool:
+        """Collect what is ready, and solve within the budget; whether the view is to be drawn. Raises UserError."""
+        session, look = self._session, True
+        session.poll(interactive=self._ui.held)
+        self._view.tell_observer()
+        self._view.look_for_light()
+        held, fast = self._ui.held, session.opened and self._ui.state.is_fast(session.run.seconds)
+        solve, look = self._turns.next(frame_time) if session.solving and (held or not fast) else (True, True)
+        if solve:
+            session.advance(fast=fast, interactive=held)
+        return look
 
-    def _save(self, save: Callable[[], Path]) -> None:
+    def _save_screenshot(self) -> None:
         """Do so, and say where it went or why not."""
         try:
-            path = save()
+            path = save_screenshot(self.wnd.fbo, self.wnd.buffer_size, Path.cwd())
         except UserError as error:
             self._ui.state.notify(str(error), error=True)
         else:

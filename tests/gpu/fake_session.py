@@ -41,8 +41,9 @@ class FakeSpace:
 
 
 class FakeScene(SimpleNamespace):
-    """What lights it follows from what is set."""
+    """What lights it follows from what is set. Two are never the same, as of scenes."""
 
+    __eq__, __hash__ = object.__eq__, object.__hash__
     lit_by_sky = property(lambda self: self.sky is not None and self.sky.emits)
     lit_by_lights = property(lambda self: any(light.emits for light in self.lights))
     emits = property(lambda self: self.lit_by_sky or self.lit_by_lights or any(m.emits for m in self.materials))
@@ -115,7 +116,7 @@ class FakeSession:
         cameras = (SimpleNamespace(name="front", world_from_camera=np.eye(4), yfov=0.7),)
         warnings = ("3 degenerate triangles dropped",)
         self.scene = FakeScene(materials=MATERIALS, warnings=warnings, cameras=cameras, sky=None, lights=())
-        self.scene.source = None
+        self.scene.source = self.scene.colours = None
         self.scene.corners = np.zeros((len(MATERIALS), 3, 3))
         self.scene.bounds, self.scene.material_ids = (np.zeros(3), np.ones(3)), np.arange(len(MATERIALS))
         self.scene.normals_areas = np.zeros((len(MATERIALS), 3)), np.ones(len(MATERIALS))
@@ -213,6 +214,7 @@ class FakeSession:
             "refining": False,
             "leaves": "",
             "note": None,
+            "doing": "",
             "uniform_texels": 40000,
             "figures": {},
             "counts": {},
@@ -239,6 +241,9 @@ class FakeSession:
     def draw(self, target, size, *, scale=None, samples=1, add=False, whole=True) -> bool:
         target.clear(0.2, 0.3, 0.4, 1.0)
         return True
+
+    def forget_samples(self) -> None:
+        pass
 
     def draw_flat(self, target, size) -> bool:
         return False

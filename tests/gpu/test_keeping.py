@@ -27,9 +27,8 @@ from app.session.baking import DONE, SOLVING, Baking, Order
 from app.session.keeping import Keeping, check_session, drop
 from app.session.session import Session
 from app.session.view import View
-from app.ui import new_lamps
+from app.ui import area_edits, new_lamps
 from app.ui import settings as ui_settings
-from app.ui.new_lamps import duplicate_surfaces, remove_surfaces
 from app.ui.state import State
 from app.util.state_file import read_state, write_state
 
@@ -192,11 +191,11 @@ def test_lamps_with_area_come_back_with_their_light(place: Callable[..., Place],
     """One that was copied and edited, and one under the ceiling, in the place of the scene's own."""
     one = place().open("cornell-box")
     own = emitters(one)[0]
-    duplicate_surfaces(one.view, own)
+    area_edits.duplicate(one.view, one.state, own)
     settle(one)
     new_lamps.KINDS[0].add(one.view, one.state)
     settle(one)
-    remove_surfaces(one.view, own)
+    area_edits.remove(one.view, own)
     settle(one)
     copy, ceiling = emitters(one)
     one.session.set_material(copy, dataclasses.replace(one.session.materials[copy], emission=(3.0, 2.0, 1.0)))
@@ -266,12 +265,31 @@ def test_texel_densities_come_back(place: Callable[..., Place], tmp_path: Path) 
     np.testing.assert_array_equal(two.session.lightmap.irradiance(), one.session.lightmap.irradiance())
 
 
+def test_a_lamp_of_the_scene_that_was_moved_comes_back_there(place: Callable[..., Place], tmp_path: Path) -> None:
+    """It is the same material with its edits, somewhere else; moved back, the scene is as it was read."""
+    one = place().open("cornell-box")
+    own = emitters(one)[0]
+    assert area_edits.why_not_moved(one.view, one.state, own) is None
+    lamp = area_edits.lamp_of(one.view, one.state, own)
+    x, y, z = lamp.position
+    area_edits.put(one.view, own, dataclasses.replace(lamp, position=(x + 0.05, y - 0.1, z)))
+    settle(one)
+    moved = area_edits.lamp_of(one.view, one.state, own)
+    assert emitters(one) == [own] and moved.position == pytest.approx((x + 0.05, y - 0.1, z))
+    two = place().open(one.save(tmp_path / "a.glow"))
+    assert two.notes == [] and two.session.surfaces == one.session.surfaces != Surfaces()
+    np.testing.assert_array_equal(two.session.scene.corners, one.session.scene.corners)
+    area_edits.put(two.view, own, lamp)
+    settle(two)
+    assert two.session.surfaces == Surfaces()
+
+
 def test_lamps_of_a_scene_that_has_changed_are_said(place: Callable[..., Place], tmp_path: Path) -> None:
     scene = copied(tmp_path)
     one = place().open(scene)
     lamp = emitters(one)[0]
     name = one.session.materials[lamp].name
-    duplicate_surfaces(one.view, lamp)
+    area_edits.duplicate(one.view, one.state, lamp)
     settle(one)
     one.save(tmp_path / "a.glow")
     scene.write_text(scene.read_text().replace(f'"{name}"', '"another"'))

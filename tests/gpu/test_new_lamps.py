@@ -21,7 +21,7 @@ from app.session.bake import take_light
 from app.session.baking import Baking, Order
 from app.session.session import Session
 from app.session.view import TRAPPED, View
-from app.ui import edits, new_lamps
+from app.ui import area_edits, edits, new_lamps
 from app.ui.new_lamps import KINDS, Kind
 from app.ui.state import State
 
@@ -95,11 +95,11 @@ def test_surfaces_come_and_go_and_edits_stay(dark: Dark, kind: Kind) -> None:
     lamp = len(session.materials) - 1
     assert session.materials[1] is red and session.materials[lamp].emits and session.unedited is not session.read
     session.set_material(lamp, dataclasses.replace(session.materials[lamp], emission=(3.0, 2.0, 1.0)))
-    new_lamps.duplicate_surfaces(dark.view, lamp)
+    area_edits.duplicate(dark.view, dark.state, lamp)
     dark.wait()
     assert [session.materials[i].emission for i in (-2, -1)] == [(3.0, 2.0, 1.0)] * 2
     session.set_material(lamp + 1, dataclasses.replace(session.materials[-1], emission=(1.0, 1.0, 1.0)))
-    new_lamps.remove_surfaces(dark.view, lamp)
+    area_edits.remove(dark.view, lamp)
     dark.wait()
     assert len(session.materials) == lamp + 1 and session.materials[1] is red
     assert session.materials[lamp].emission == (1.0, 1.0, 1.0), "the other one stays, as it was edited"
@@ -139,7 +139,7 @@ def test_an_added_lamp_is_undone_in_one_step_and_done_again(dark: Dark, kind: Ki
     lamp = len(session.materials) - 1
     session.set_material(lamp, dataclasses.replace(session.materials[lamp], emission=(3.0, 2.0, 1.0)))
     frame(dark)
-    new_lamps.remove_surfaces(dark.view, lamp)
+    area_edits.remove(dark.view, lamp)
     frame(dark)
     settle(dark)
     assert state.edits.undoable == "lamp removed" and not new_lamps.is_lit(dark.view, state)
@@ -208,7 +208,7 @@ def test_a_lamp_that_was_removed_again_comes_back(dark: Dark) -> None:
     frame(dark)
     settle(dark)
     added = dark.session.surfaces
-    new_lamps.remove_surfaces(dark.view, len(dark.session.materials) - 1)
+    area_edits.remove(dark.view, len(dark.session.materials) - 1)
     frame(dark)
     settle(dark)
     assert len(dark.session.surfaces.lamps) == 1
@@ -258,7 +258,7 @@ def test_surfaces_stay_while_they_are_baked(dark: Dark, tmp_path: Path) -> None:
 
 def test_a_lamp_is_not_added_while_another_comes(dark: Dark) -> None:
     SURFACES[0].add(dark.view, dark.state)
-    assert new_lamps.why_not(dark.view, SURFACES[1]) == new_lamps.LOADING
+    assert new_lamps.why_not(dark.view, SURFACES[1]) == area_edits.LOADING
     assert new_lamps.why_not(dark.view, OPEN[0]) is None
     OPEN[0].add(dark.view, dark.state)
     dark.wait()

@@ -18,7 +18,10 @@ from app.session.run import Stop
 from app.session.session import Session
 from app.session.view import View
 from app.solvers import ShootingOptions
+from app.ui.state import PictureFile, State
 from app.viewer.picture import picture, save_picture
+from app.viewer.saving import Pictures
+from app.viewer.ui_frame import SAMPLES
 
 SIZE = (96, 64)
 
@@ -80,4 +83,46 @@ def test_what_cannot_be_saved_is_one_line(view: View, gpu: Gpu, tmp_path: Path) 
     for name in ("a.png", "a.exr"):
         with pytest.raises(UserError, match="cannot be written"):
             save_picture(view, tmp_path / "nowhere" / name, SIZE)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_is_drawn_in_parts_beside_the_window(view: View, tmp_path: Path) -> None:
+    """What the window shows stays, whatever it draws in between; the file is that of the whole picture."""
+    whole, state = picture(view, SIZE), State()
+    saved = Pictures(view, state)
+    saved.begin(PictureFile(tmp_path / "a.png", SIZE))
+    texture = view.session.gpu.texture((32, 16), 4, "f1")
+    other = view.session.gpu.target(texture)
+    shares: list[float] = []
+    while saved.busy:
+        saved.step()
+        view.draw(other, (32, 16))
+        shares += [] if state.saving is None else [state.saving.share]
+        assert len(shares) < 100
+    assert len(shares) == SAMPLES and sorted(shares) == shares and shares[-1] == 1.0
+    assert (np.asarray(Image.open(tmp_path / "a.png")) == whole).all()
+    assert [toast.text for toast in state.toasts] == [f"saved {tmp_path / 'a.png'}"]
+    view.session.gpu.release_all(other, texture)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.exr"])
+def test_a_picture_that_is_stopped_leaves_nothing(view: View, tmp_path: Path, name: str) -> None:
+    state = State()
+    saved = Pictures(view, state)
+    saved.begin(PictureFile(tmp_path / name, SIZE))
+    saved.step()
+    assert state.saving is not None and 0 < state.saving.share < 1 and saved.drawing
+    state.saving.stopped = True
+    saved.step()
+    assert not saved.busy and state.saving is None and list(tmp_path.iterdir()) == [] and state.toasts == []
+
+
+def test_what_cannot_be_saved_is_said_in_the_window(view: View, tmp_path: Path) -> None:
+    for file in (PictureFile(tmp_path / "a.jpg", SIZE), PictureFile(tmp_path / "nowhere" / "a.png", SIZE)):
+        state = State()
+        saved = Pictures(view, state)
+        saved.begin(file)
+        while saved.busy:
+            saved.step()
+        assert [toast.error for toast in state.toasts] == [True] and state.saving is None
     assert list(tmp_path.iterdir()) == []

@@ -9,6 +9,7 @@ import pytest
 
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
+from app.render.camera import CameraView
 from app.render.frame import FrameRenderer
 from app.render.options import DisplayOptions
 from app.render.seen import ROWS, seen_texels
@@ -59,7 +60,10 @@ def test_what_is_seen_is_what_a_picture_shows(gpu: Gpu) -> None:
     view.session.release()
 
 
-def test_light_that_reaches_nothing_that_is_seen_is_said_to_be_trapped(gpu: Gpu) -> None:
+def test_light_that_reaches_nothing_that_is_seen_is_said_to_be_trapped(
+    gpu: Gpu, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And no longer where the camera has moved to where light is."""
     bulb, globe = box((0.1, 0.1, 0.1)), box((0.5, 0.5, 0.5))
     for scene, said in ((room_with((bulb, 1), (globe, 0)), TRAPPED), (room_with((bulb, 1)), None)):
         view = opened(gpu, scene)
@@ -67,5 +71,9 @@ def test_light_that_reaches_nothing_that_is_seen_is_said_to_be_trapped(gpu: Gpu)
         view.session.solve(Stop())
         assert view.look_for_light() == said == view.session.message
         assert view.look_for_light() is None, "and once only"
+        view.camera = CameraView(look_at((0.0, 0.0, 0.2), (0, 0, 0)), 1.2, 0.2)  # inside of the globe, at the bulb
+        assert view.look_for_light() is None and view.session.message == said, "not in every frame of a flight"
+        monkeypatch.setattr(view, "_look_due", 0.0)
+        assert view.look_for_light() is None and view.session.message is None
         view.release()
         view.session.release()

@@ -28,7 +28,7 @@ from app.ui.app import Ui
 from app.ui.file_list import readable
 from app.ui.keys import ANY_POPUP, SHORTCUTS
 from app.ui.picture_dialog import free_name
-from app.ui.state import WATCH_SECONDS, Legend, Pace, Request
+from app.ui.state import WATCH_SECONDS, Legend, Pace, Request, Saving
 from app.viewer.ui_frame import save_screenshot
 
 __all__ = ["desk", "session", "where"]
@@ -187,6 +187,57 @@ def test_a_picture_of_the_view_is_saved_where_one_says(
     path.write_bytes(b"")
     assert free_name(tmp_path, path.stem, ".png") == tmp_path / f"{path.stem}-2.png"
     assert free_name(tmp_path, path.stem, ".exr") == tmp_path / f"{path.stem}.exr"
+
+
+def test_how_far_a_picture_is_is_shown_and_it_can_be_stopped(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
+    desk.ui.state.saving = saving = Saving("a.png", 0.25)
+    desk.frames(3)
+    assert imgui.is_popup_open("", ANY_POPUP) and desk.ui.moving and not saving.stopped
+    desk.click(*where["Cancel"])
+    assert saving.stopped
+    desk.ui.state.saving = None
+    desk.frames(2)
+    assert not imgui.is_popup_open("", ANY_POPUP) and not desk.ui.moving
+
+
+@pytest.mark.parametrize("key", [imgui.Key.p, imgui.Key.s], ids=["picture", "session"])
+def test_the_folder_of_a_file_is_chosen_from_a_list(
+    desk: Desk, where: dict[str, tuple[float, float]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: imgui.Key
+) -> None:
+    """Over the dialog, which stays with the name; Esc closes one at a time."""
+    (tmp_path / "holidays").mkdir()
+    monkeypatch.chdir(tmp_path)
+    texts: list[str] = []
+    real = imgui.input_text
+    monkeypatch.setattr(imgui, "input_text", lambda label, text, *m: (texts.append(text), real(label, text, *m))[1])
+    desk.key(key, control=True)
+    desk.frames(2)
+    name = Path(texts[-1]).name
+    browse = next(place for label, place in where.items() if "\uf07c" in label)
+    desk.click(*browse)
+    desk.ui.io.add_input_characters_utf8("holi")
+    desk.frames(2)
+    desk.key(imgui.Key.enter)
+    desk.click(*where["folder"])
+    assert Path(texts[-1]) == tmp_path / "holidays" / name
+    desk.click(*browse)
+    desk.key(imgui.Key.escape)
+    assert imgui.is_popup_open("", ANY_POPUP), "only the list is closed"
+    desk.key(imgui.Key.escape)
+    assert not imgui.is_popup_open("", ANY_POPUP)
+
+
+@pytest.mark.parametrize("size", [(640, 480), (1280, 720)])
+def test_the_loading_bar_stays_within_the_view(
+    gpu: Gpu, monkeypatch: pytest.MonkeyPatch, size: tuple[int, int]
+) -> None:
+    session = FakeSession()
+    session.loading = SimpleNamespace(stage="unfolding charts and " * 5, fraction=0.4, cancel=lambda: None)
+    desk = Desk(gpu, session, size)
+    window = imgui.internal.find_window_by_name("##loading")
+    left, _, width, _ = desk.ui.state.view_px
+    assert left <= window.pos.x and window.pos.x + window.size.x <= left + width
+    desk.release()
 
 
 def test_the_pace_is_seen_and_changed(desk: Desk) -> None:

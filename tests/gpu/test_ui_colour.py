@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from desks import Desk, desk, session, where
+from fake_session import FakeScene
 from imgui_bundle import imgui
 
 from app.scene.lights import Light
-from app.ui import colour
+from app.scene.model import MOST_ALBEDO, Texture
+from app.ui import colour, slider, widgets
 
 __all__ = ["desk", "session", "where"]
 
@@ -109,3 +112,77 @@ def test_a_lamp_has_the_colour_that_was_picked_and_its_strength(desk: Desk, monk
     np.testing.assert_allclose(desk.session.scene.materials[3].emission, (17.0, 17.0, 0.0), rtol=1e-6)
     desk.front("Lights")
     np.testing.assert_allclose(told[-1][0].intensity, (4.0, 4.0, 0.0), rtol=1e-6)
+
+
+def test_every_code_comes_back_as_it_was_typed() -> None:
+    for step in range(256):
+        there = colour.linear_from_screen((step / 255,) * 3)
+        back = colour.screen_from_linear(there)
+        assert [int(c * 255 + 0.5) for c in back] == [step] * 3, "as Dear ImGui rounds"
+
+
+def test_what_is_more_than_a_surface_reflects_is_held_and_said(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The code stays as it was typed; a line says that the albedo is held."""
+    told: list[str] = []
+    codes: list[list[float]] = []
+    typed = shown("2040FF")
+    monkeypatch.setattr(widgets, "dim", told.append)
+    desk.front("Materials")
+    told.clear()
+    with monkeypatch.context() as hand:
+        hand.setattr(imgui, "color_edit3", lambda label, now, _: (label == "##albedo", list(typed)))
+        desk.frames(1)
+
+    def noting(label: str, now: list[float], _: int) -> tuple[bool, list[float]]:
+        codes.append(now)
+        return False, now
+
+    monkeypatch.setattr(imgui, "color_edit3", noting)
+    desk.frames(2)
+    assert desk.session.materials[0].albedo[2] == MOST_ALBEDO
+    assert codes[0] == pytest.approx(typed) and any("no surface reflects more" in text for text in told)
+
+
+def test_a_textured_material_shows_the_mean_of_its_picture(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    swatches: list[Any] = []
+    pixels = np.zeros((4, 4, 3), np.float32)
+    pixels[::2] = (0.4, 0.2, 0.0)
+    material = replace(desk.session.materials[0], albedo=(0.5, 0.5, 0.5), albedo_texture=Texture("wood", pixels))
+    session = desk.session
+    session.unedited = FakeScene(**vars(session.unedited) | {"materials": (material, *session.materials[1:])})
+    session.scene.materials = session.unedited.materials
+    monkeypatch.setattr(colour, "swatch", lambda label, linear, side: swatches.append(linear))
+    desk.front("Materials")
+    assert swatches[0] == pytest.approx((0.1, 0.05, 0.0))
+
+
+def test_materials_that_are_nowhere_are_not_listed(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As those of a lamp that was removed."""
+    rows: list[str] = []
+    real = imgui.selectable
+    monkeypatch.setattr(imgui, "selectable", lambda text, *more: (rows.append(text), real(text, *more))[1])
+    session = desk.session
+    session.unedited = FakeScene(**vars(session.unedited) | {"material_ids": np.array([0, 0, 2, 3])})
+    desk.ui.state.material = 1
+    desk.front("Materials")
+    assert "red wall" not in rows and {"white wall", "green wall", "lamp"} <= set(rows)
+    assert desk.ui.state.material == 0
+
+
+def test_what_gives_no_light_has_no_temperature(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: dict[str, str] = {}
+    told: list[str] = []
+    real = slider.slide
+
+    def slide(label: str, value: float, ends: Any, text: str) -> float:
+        shown[label] = text
+        return real(label, value, ends, text)
+
+    monkeypatch.setattr(slider, "slide", slide)
+    monkeypatch.setattr(widgets, "tooltip", told.append)
+    desk.front("Materials")
+    assert shown["##kelvin"] == "none" and any("it gives no light" in text for text in told)
+    told.clear()
+    desk.ui.state.material = 3
+    desk.frames(2)
+    assert shown["##kelvin"].endswith(" K") and not any("it gives no light" in text for text in told)

@@ -139,23 +139,63 @@ def test_files_are_opened_by_kind(desk: Desk, keeping: FakeKeeping) -> None:
 # -- after a crash -----------------------------------------------------------------------------------------------------
 
 
+@pytest.fixture
+def aside(desk: Desk, tmp_path: Path) -> Aside:
+    """What a crash has left, which is offered; its lock counts how often it is released."""
+    file, released = tmp_path / "1.glow", list[bool]()
+    file.touch()
+    lock = SimpleNamespace(release=lambda: released.append(True), lock_file=str(tmp_path / "1.lock"), released=released)
+    aside = Aside(file, "Cornell box", 200.0, 1.7e9, lock)  # type: ignore[arg-type]
+    desk.ui.state.asides = [aside]
+    return aside
+
+
+def test_what_a_crash_has_left_is_offered_beside_the_scene_that_was_asked_for(
+    desk: Desk, aside: Aside, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing stands over it: a line of the status bar asks where it is clicked."""
+    places: list[imgui.ImVec2] = []
+
+    def noting(colour: object, text: str) -> None:
+        write(colour, text)
+        if text.endswith(": go on?"):
+            places.append(imgui.get_item_rect_min())
+
+    write = imgui.text_colored
+    monkeypatch.setattr(imgui, "text_colored", noting)
+    desk.frames(3)
+    assert not asking() and places and places[-1].y > desk.size[1] - 40
+    desk.click(places[-1].x + 5, places[-1].y + 5)
+    assert asking()
+    desk.key(imgui.Key.escape)
+    assert not asking() and desk.ui.state.asides == [aside]
+
+
 @pytest.mark.parametrize("answer", ["Go on", "Drop it", "Later"])
 def test_after_a_crash_one_is_asked(
-    desk: Desk, keeping: FakeKeeping, where: dict[str, tuple[float, float]], tmp_path: Path, answer: str
+    desk: Desk, keeping: FakeKeeping, aside: Aside, where: dict[str, tuple[float, float]], answer: str
 ) -> None:
-    file = tmp_path / "1.glow"
-    file.touch()
-    released: list[bool] = []
-    lock = SimpleNamespace(release=lambda: released.append(True), lock_file=str(tmp_path / "1.lock"))
-    aside = Aside(file, "Cornell box", 200.0, 1.7e9, lock)  # type: ignore[arg-type]
     assert "Cornell box, solved for 3 min 20 s, of " in recovery.in_words(aside)
-    desk.ui.state.asides = [aside]
+    desk.ui.state.recover = aside
     desk.frames(3)
     assert asking()
     desk.click(*where[answer.split(" ")[-1]])
-    assert not asking() and desk.ui.state.asides == []
+    assert not asking() and desk.ui.state.recover is None
     assert keeping.calls == ([("go on", aside)] if answer == "Go on" else [])
-    assert file.exists() == (answer != "Drop it") and bool(released) == (answer != "Go on")
+    assert desk.ui.state.asides == ([aside] if answer == "Later" else [])
+    assert aside.file.exists() == (answer != "Drop it")
+
+
+def test_going_on_asks_where_what_is_open_would_be_lost(
+    desk: Desk, keeping: FakeKeeping, aside: Aside, where: dict[str, tuple[float, float]]
+) -> None:
+    keeping.worth, desk.ui.state.recover = True, aside
+    desk.frames(3)
+    desk.click(*where["on"])
+    desk.frames(2)
+    assert asking() and keeping.calls == []
+    desk.click(*where["Cancel"])
+    assert desk.ui.state.asides == [aside], "it is still offered"
 
 
 # -- settings and recent files -----------------------------------------------------------------------------------------

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from desks import VIEW, Desk, desk, session, where
 from fake_session import FakeScene
-from imgui_bundle import imgui
+from imgui_bundle import imgui, implot
 
 from app.scene.area_lamps import AreaLamp, Surfaces
 from app.scene.lights import Light
+from app.ui import area_edits, slider, widgets
 from app.ui.new_lamps import KINDS
 from app.ui.on_screen import on_screen
 
@@ -117,7 +118,7 @@ def test_an_added_lamp_is_moved_by_its_handle(panel: Desk) -> None:
     panel.press(0, True)
     panel.point(at.x + 20, at.y)
     panel.point(at.x + 40, at.y)
-    assert session.surfaces.lamps[0] == PANEL and state.lamp_place is not None
+    assert session.surfaces.lamps[0] == PANEL and state.held_lamp is not None
     assert state.area_lamp == len(session.materials) - 1, "it is selected"
     panel.press(0, False)
     panel.frames(2)
@@ -147,4 +148,92 @@ def test_handles_are_not_there_while_a_bake_runs(panel: Desk) -> None:
     panel.frames(2)
     at = on_screen(session, panel.ui.state, np.array(PANEL.position))
     panel.drag((at.x, at.y), (at.x + 40, at.y))
-    assert session.surfaces.lamps[0] == PANEL and panel.ui.state.lamp_place is None
+    assert session.surfaces.lamps[0] == PANEL and panel.ui.state.held_lamp is None
+
+
+def test_an_added_lamp_has_a_size_and_is_turned(panel: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And nothing is cut while a hand still moves a slider."""
+    state, session = panel.ui.state, panel.session
+    panel.front("Lights")
+    state.area_lamp = len(session.materials) - 1
+    edited = {"##Width": 0.8, "##Turned": 30.0}
+    with monkeypatch.context() as hand:
+        hand.setattr(slider, "slide", lambda label, now, *_: edited.get(label, now))
+        hand.setattr(imgui, "drag_float3", lambda label, now, *_: (label == "##Direction", [0.0, -2.0, 0.0]))
+        hand.setattr(imgui, "is_any_item_active", lambda: True)
+        panel.frames(3)
+        assert session.surfaces.lamps == (PANEL,), "it is held"
+    panel.frames(2)
+    (lamp,) = session.surfaces.lamps
+    assert lamp.size == (0.8, 0.4) and lamp.direction == (0.0, -1.0, 0.0) and lamp.turn == pytest.approx(30.0)
+    assert [call[0] for call in session.calls].count("change_surfaces") == 1
+
+
+def test_a_lamp_of_the_scene_is_moved_unless_it_is_part_of_a_larger_piece(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(widgets, "tooltip", told.append)
+    session, state = desk.session, desk.ui.state
+    desk.front("Lights")
+    assert any(area_edits.JOINED in text for text in told), "all corners of a fake scene are in one place"
+    session.read = FakeScene(**vars(session.read))
+    session.read.corners = np.arange(len(session.read.material_ids) * 9.0).reshape(-1, 3, 3)
+    desk.frames(2)
+    moved = {"##Position [m]": [1.0, 2.0, 3.0]}
+    with monkeypatch.context() as hand:
+        hand.setattr(imgui, "drag_float3", lambda label, now, *_: (label in moved, moved.get(label, now)))
+        desk.frames(1)
+    desk.frames(2)
+    (there,) = session.surfaces.moved
+    assert there.key == ("lamp", 0) and state.edits.undoable == "lamp moved"
+    np.testing.assert_allclose(there.shift, np.array([1.0, 2.0, 3.0]) - session.read.corners[3].mean(0))
+    desk.key(imgui.Key.z, control=True)
+    assert session.surfaces == Surfaces()
+
+
+def test_lamps_of_the_scene_have_handles_while_the_lights_panel_is_there(desk: Desk) -> None:
+    session, state = desk.session, desk.ui.state
+    session.read = session.unedited = FakeScene(**vars(session.read))
+    session.read.corners = np.arange(len(session.read.material_ids) * 9.0).reshape(-1, 3, 3)
+    session.read.corners[3] = (0.0, 0.0, -2.0)
+    at = on_screen(session, state, np.array((0.0, 0.0, -2.0)))
+    desk.front("Scene")
+    desk.point(at.x, at.y)
+    desk.press(0, True)
+    assert state.held_lamp is None
+    desk.press(0, False)
+    desk.front("Lights")
+    desk.drag((at.x, at.y), (at.x + 40, at.y))
+    desk.frames(2)
+    assert len(session.surfaces.moved) == 1 and session.surfaces.moved[0].shift[0] > 0.05
+
+
+def test_a_dark_scene_has_neither_converged_nor_a_plot(
+    desk: Desk, where: dict[str, tuple[float, float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It says what is missing, with a button that leads to lamps."""
+    bars: list[float] = []
+    plots: list[str] = []
+    small: dict[str, tuple[float, float]] = {}
+    bar, plot, button = imgui.progress_bar, implot.begin_plot, imgui.small_button
+
+    def noting(label: str) -> bool:
+        result = button(label)
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        small[label.split("###")[0]] = ((low.x + high.x) / 2, (low.y + high.y) / 2)
+        return bool(result)
+
+    monkeypatch.setattr(imgui, "progress_bar", lambda share, *more: (bars.append(share), bar(share, *more)))
+    monkeypatch.setattr(implot, "begin_plot", lambda name, *more: (plots.append(name), plot(name, *more))[1])
+    monkeypatch.setattr(imgui, "small_button", noting)
+    put_out(desk)
+    for kept in (bars, plots):
+        kept.clear()
+    where.clear()
+    desk.frames(2)
+    assert set(bars) == {0.0} and plots == [] and "Converged" not in where and "light" in where
+    desk.click(*small["Add a lamp"])
+    where.clear()
+    desk.frames(2)
+    assert desk.ui.state.lights_shown

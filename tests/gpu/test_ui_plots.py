@@ -124,6 +124,32 @@ def test_in_a_small_window_there_is_one_plot(
     desk.release()
 
 
+@pytest.mark.parametrize("size", [(640, 480), (900, 600), (1280, 720), (1280, 1000)], ids=str)
+def test_a_legend_lies_beside_its_curves(gpu: Gpu, monkeypatch: pytest.MonkeyPatch, size: tuple[int, int]) -> None:
+    """However low the plot is, and the plot still has most of its height."""
+    found: list[tuple[float, float, float]] = []
+    real = implot.end_plot
+
+    def ended() -> None:
+        plot, legend = (
+            implot.internal.get_current_plot().plot_rect,
+            implot.internal.get_current_plot().items.legend.rect,
+        )
+        found.append((legend.max.y, plot.min.y, plot.max.y - plot.min.y))
+        real()
+
+    monkeypatch.setattr(implot, "end_plot", ended)
+    desk = Desk(gpu, FakeSession(), size)
+    for compared in (False, True):
+        if compared:
+            desk.session.compare()
+        desk.front("Convergence")
+        found.clear()
+        desk.frames(2)
+        assert found and all(legend <= plot + 1 and height > 40 for legend, plot, height in found)
+    desk.release()
+
+
 @pytest.mark.parametrize(("size", "share"), [((900, 600), 0.6), ((640, 480), 0.55), ((1280, 720), 0.5)], ids=str)
 def test_the_view_has_most_of_a_small_window(gpu: Gpu, size: tuple[int, int], share: float) -> None:
     """Its width; below, all panels are in one column beside it, and each can be reached."""

@@ -8,20 +8,31 @@ import pytest
 from desks import Desk, desk, session, where
 
 from app.atlas.options import AtlasOptions
+from app.bake.options import BakeOptions
 from app.compare.options import ReferenceOptions
 from app.lightmap.options import LightmapOptions
 from app.options import Options, specs
 from app.render.options import DisplayOptions
+from app.session.baking import Goal
+from app.session.checkpoint import CheckpointOptions
 from app.solvers import SOLVERS, ShootingOptions
 from app.solvers.pairs.options import PairsOptions
-from app.ui import widgets
+from app.ui import slider, widgets
 from app.ui.panels.display import COMPARED
 from app.ui.state import Pace
 from app.ui.words import meaning, number, plain
 
 __all__ = ["desk", "session", "where"]
 
-SHOWN = (AtlasOptions, LightmapOptions, DisplayOptions, ReferenceOptions, *(f.options for f in SOLVERS.values()))
+BAKED = (BakeOptions, CheckpointOptions, Goal)  # of the Bake panel
+SHOWN = (
+    AtlasOptions,
+    LightmapOptions,
+    DisplayOptions,
+    ReferenceOptions,
+    *BAKED,
+    *(f.options for f in SOLVERS.values()),
+)
 MACHINE = re.compile(r"--|\\d e[+-]?\\d|e[+-]\\d|true or false|whole number|unset")
 
 
@@ -133,3 +144,36 @@ def test_the_display_shows_what_has_an_effect(
     desk.session.display = DisplayOptions(**display)  # type: ignore[arg-type]
     desk.frames()
     assert found.keys() == grey and all(found.values())
+
+
+def test_tooltips_of_numbers_say_how_they_are_moved_typed_and_put_back() -> None:
+    for options in (*SHOWN, Pace):
+        for spec in specs(options):
+            slides = spec.type in (int, float) and not spec.choices
+            assert ("double-click: type" in meaning(spec)) == slides, spec.name
+            assert "right-click: back to it" in meaning(spec)
+    assert "type" not in meaning(specs(ShootingOptions)[3], "a reason"), "what is grey cannot be typed"
+
+
+@pytest.mark.parametrize("density", [128.4, 40.0, 0.0512, 12345.6])
+def test_density_is_one_number_in_one_format(desk: Desk, monkeypatch: pytest.MonkeyPatch, density: float) -> None:
+    """In the Scene panel, beside the box that gives another, and once that is given."""
+    shown: dict[str, list[str]] = {"dim": [], "wrapped": [], "slide": []}
+    monkeypatch.setattr(widgets, "dim", shown["dim"].append)
+    monkeypatch.setattr(widgets, "wrapped", lambda text, *_: shown["wrapped"].append(text))
+
+    def slide(label: str, value: float, ends: object, text: str) -> float:
+        shown["slide"].append(text % value if "%" in text else text)
+        return value
+
+    monkeypatch.setattr(slider, "slide", slide)
+    desk.session.charts.density = density
+    desk.front("Scene")
+    desk.front("Solver")
+    desk.ui.state.atlas = AtlasOptions(density=density)
+    desk.frames(2)
+    found = {name: {text for text in texts if text.endswith("texels/m")} for name, texts in shown.items()}
+    assert found["dim"] == found["wrapped"] == found["slide"] and len(found["dim"]) == 1
+    assert not any(
+        "/m" in text.replace("texels/m", "").replace("/m²", "") for texts in shown.values() for text in texts
+    )

@@ -126,8 +126,10 @@ def test_a_patch_shoots_for_its_family_and_is_paid_back_evenly(gpu: Gpu, monkeyp
     alone.settle()
     box = begin(gpu, scene, **options)
     patches = np.count_nonzero(box.solver.batch.marks.levels)
-    received, owed = [], 0.0
-    while not box.solver.poll().converged:
+    received, owed, said = [], 0.0, [set[str](), set[str](), []]
+    while not (progress := box.solver.poll()).converged:
+        words = said[box.solver.batch.phases.index]
+        words.append(progress.doing) if isinstance(words, list) else words.add(progress.doing)
         box.step(8)
         box.solver.poll(wait=True)
         received.append((box.solver.batch.phases.index, np.average(box.H.mean(1), weights=box.area)))
@@ -140,6 +142,9 @@ def test_a_patch_shoots_for_its_family_and_is_paid_back_evenly(gpu: Gpu, monkeyp
             assert patches
     paid = [light for phase, light in received if phase == 1]
     fine = [light for phase, light in received if phase == 2]
+    assert said[0] == {""} and any("settle" in text for text in said[1])
+    uneven = [float(text.split()[-2]) for text in said[2] if "even out" in text]
+    assert uneven[-1] < 0.2 * uneven[0], "what is left for finer patches is said, and goes down"
     assert owed > 2 * MOST  # one patch holds no more
     assert len(paid) > 3
     for light in (*paid, *fine):

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from app.scene.area_lamps import AreaLamp, Surfaces, keys_of, middle_of, with_surfaces
-from app.scene.lamp_surfaces import new_name, with_copy, with_rectangle, without_surfaces
+from app.scene.area_lamps import AreaLamp, Moved, Surfaces, keys_of, middle_of, turned, with_surfaces
+from app.scene.lamp_surfaces import hangs_together, new_name, with_copy, with_rectangle, without_surfaces
 from app.scene.load import load_scene
 from app.scene.model import Scene
 from app.session.versions import edits_of, with_edits
@@ -96,6 +96,36 @@ def test_a_lamp_is_copied_and_its_original_removed(scene: Scene) -> None:
     consistent(moved)
     assert area(moved, lamp) == 0 and area(moved, len(scene.materials)) == pytest.approx(area(scene, lamp))
     assert np.allclose(middle_of(moved, len(scene.materials)), PANEL.position)
+
+
+def test_a_lamp_of_the_scene_is_moved_and_nothing_else(scene: Scene) -> None:
+    lamp = next(index for index, material in enumerate(scene.materials) if material.emits)
+    key, shift = keys_of(scene.materials)[lamp], (0.1, -0.2, 0.05)
+    moved = with_surfaces(scene, Surfaces(moved=(Moved(key, shift), Moved(("no such", 0), shift))))
+    consistent(moved)
+    assert moved.materials == scene.materials and np.array_equal(moved.material_ids, scene.material_ids)
+    off = moved.corners - scene.corners
+    np.testing.assert_allclose(off[scene.material_ids == lamp], np.broadcast_to(shift, (2, 3, 3)), atol=1e-12)
+    assert not off[scene.material_ids != lamp].any()
+
+
+def test_what_shares_a_corner_hangs_together(scene: Scene) -> None:
+    """The lamp of the box hangs free; its walls meet."""
+    lamp = next(index for index, material in enumerate(scene.materials) if material.emits)
+    assert not hangs_together(scene, lamp)
+    assert all(hangs_together(scene, index) for index in set(scene.material_ids.tolist()) - {lamp} if index < 3)
+    assert not hangs_together(scene, len(scene.materials)), "what is not there"
+
+
+@pytest.mark.parametrize("direction", [(0.0, -2.0, 0.0), (0.0, 3.0, 0.0), (1.0, 0.5, -0.2), (0.0, 0.0, 1e-3)])
+@pytest.mark.parametrize("angle", [0.0, 30.0, -179.0])
+def test_a_rectangle_is_turned_and_says_how(direction: tuple[float, float, float], angle: float) -> None:
+    lamp = turned(PANEL, direction, angle)
+    assert np.allclose(lamp.direction, np.array(direction) / np.linalg.norm(direction)) and lamp.size == PANEL.size
+    assert abs(np.dot(lamp.direction, lamp.across)) < 1e-12 and np.linalg.norm(lamp.across) == pytest.approx(1)
+    assert lamp.turn == pytest.approx(angle)
+    assert angle or lamp.across[1] == pytest.approx(0), "its width is level"
+    assert turned(lamp, (0.0, 0.0, 0.0), 5.0) is lamp
 
 
 def test_what_a_scene_has_not_is_left_out(scene: Scene) -> None:

@@ -75,6 +75,14 @@ class Phases:
         self.even = is_last and to_shoot <= FINE_ENOUGH * residual
         return not is_last
 
+    def say(self, to_shoot: float) -> str:
+        """What is being done once large patches have shot, which leaves the sum of what is unshot about as it is. to_shoot: as of
+        ``follow``."""
+        if self.now.settles:
+            return "lamps settle: all of their patches shoot"
+        fine = self.now is self.finest and len(self.choices) > 1
+        return f"finer patches even out {to_shoot:.2%}" if fine else ""
+
     # -- how large patches are, as patch_level.glsl has it -------------------------------------------------------------
 
     def coarser(self, slots: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -66,6 +66,7 @@ class Shooting:
         self.issued = 0
         self.last_shot: Shot | None = None
         self._strongest = 0.0  # power of the strongest patch, as far as it is known [W]
+        self._uneven = 1.0  # share of the emitted power that patches hold, as far as it is known
         self.reset()
 
     # -- work ----------------------------------------------------------------------------------------------------------
@@ -177,7 +178,9 @@ class Shooting:
         refining, note = (False, None) if refinement is None else (self._refining, refinement.note)
         converged = bool(self._all_shot) and not refining
         leaves = self._leaves.say() if self._leaves is not None and refining else ""
-        return replace(self._progress, converged=converged, refining=refining, leaves=leaves, note=note)
+        doing = "" if converged else self.batch.phases.say(self._uneven)
+        now = replace(self._progress, converged=converged, refining=refining)
+        return replace(now, leaves=leaves, note=note, doing=doing)
 
     def _follow_report(self, report: Report) -> None:
         """Take in what became of a batch."""
@@ -190,7 +193,7 @@ class Shooting:
             if choice.settles:
                 finer = float(values["strongest"]) <= batch.groups.settled
             else:
-                to_shoot = ledger.share(float(values["to_shoot"])) + to_come
+                to_shoot = self._uneven = ledger.share(float(values["to_shoot"])) + to_come
                 finer = batch.phases.follow(unshot, to_shoot, self.options.residual)
             if finer:
                 batch.shoot_finer()

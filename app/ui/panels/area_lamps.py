@@ -1,4 +1,4 @@
-"""Lamps with area, a section of the Lights panel: materials that emit, how bright they are, once more or away."""
+"""Lamps with area, a section of the Lights panel: materials that emit, how bright they are, where, once more or away."""
 
 from __future__ import annotations
 
@@ -8,21 +8,25 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.ui import new_lamps, theme, widgets
+from app.scene.area_lamps import AreaLamp, turned
+from app.ui import area_edits, new_lamps, slider, theme, widgets
 from app.ui.panels import materials
 from app.ui.state import State
 from app.ui.vector import STEP, edit_vector
+from app.ui.words import BY_HAND
 
 if TYPE_CHECKING:
     from app.session.view import View
 
 ROWS_SHOWN = 4  # of the list before it scrolls
 ALONE = "nothing else would be left"
+SMALLEST, LARGEST = 1e-3, 1.0  # edges of a rectangle, of the scene's diagonal
+CUT = "Surfaces are cut anew once it is let go"
 
 
 def draw(view: View, state: State) -> None:
     """The section, for a scene that has any."""
-    indices = lamps(view, state)
+    indices = area_edits.lamps(view, state)
     if not indices or not widgets.fold("Lamps with area"):
         return
     if state.area_lamp not in indices:
@@ -38,36 +42,59 @@ def draw(view: View, state: State) -> None:
     edited = dataclasses.replace(
         material, emission=materials.emission(view, state, material, session.unedited.materials[index], index)
     )
-    _place(view, state, index)
+    _shape(view, state, index)
     duplicate, remove = new_lamps.pair_of_buttons(_why_not(view, index))
     imgui.pop_id()
     if duplicate:
-        state.act(lambda: new_lamps.duplicate_surfaces(view, index))
+        state.act(lambda: area_edits.duplicate(view, state, index))
     if remove:
-        state.act(lambda: new_lamps.remove_surfaces(view, index))
+        state.act(lambda: area_edits.remove(view, index))
     if edited.emission != material.emission:
         state.act(lambda: session.set_material(index, edited))
 
 
-def _place(view: View, state: State, index: int) -> None:
-    """Where an added lamp is: surfaces are cut once it is let go."""
-    lamp = new_lamps.added_lamp(view, index)
-    if lamp is None:
-        return
-    held = state.lamp_place is not None and state.lamp_place[0] == lamp.name
-    shown = state.lamp_place[1] if held and state.lamp_place is not None else lamp.position
+def _shape(view: View, state: State, index: int) -> None:
+    """Where the lamp is, and of a rectangle that was added how large and which way: surfaces are cut once it is let go."""
+    lamp = area_edits.lamp_of(view, state, index)
+    held = state.held_lamp
+    shown = held[1] if held is not None and held[0] == index else lamp
     low, high = view.session.scene.bounds
-    imgui.begin_disabled(new_lamps.why_fixed(view) is not None)
-    place = edit_vector("Position [m]", shown, lamp.position, STEP * math.dist(low, high), "%.2f")
+    size = float(math.dist(low, high))
+    off = area_edits.why_not_moved(view, state, index)
+    imgui.begin_disabled(off is not None)
+    came = area_edits.came_from(view, state, index)
+    place = edit_vector("Position [m]", shown.position, came, STEP * size, "%.2f", off=off or "", more=CUT)
+    edited = dataclasses.replace(shown, position=place)
+    if lamp.of is None:
+        edited = _rectangle(edited, lamp, size)
     imgui.end_disabled()
-    if place != shown:
-        state.lamp_place = lamp.name, place
+    if edited != shown:
+        state.held_lamp = index, edited
 
 
-def lamps(view: View, state: State) -> list[int]:
-    """Materials that are somewhere and emit, or came so, or were dimmed to nothing here."""
-    came, now = view.session.unedited.materials, view.session.materials
-    return [index for index in new_lamps.used_materials(view, state) if now[index].emits or came[index].emits]
+def _rectangle(shown: AreaLamp, lamp: AreaLamp, size: float) -> AreaLamp:
+    """Its edges, where it shines to, and how it is turned around that. lamp: as it is; size: diagonal of the scene [m]."""
+    width, height = (
+        _slider(label, edge, now, slider.Range(SMALLEST * size, LARGEST * size, logarithmic=True), "%.3g m", help)
+        for label, edge, now, help in (
+            ("Width", shown.size[0], lamp.size[0], "Of the rectangle"),
+            ("Height", shown.size[1], lamp.size[1], "Of the rectangle"),
+        )
+    )
+    aim = edit_vector("Direction", shown.direction, lamp.direction, STEP, "%.3f", more=f"Where its front shines. {CUT}")
+    help = "By which the rectangle is turned around the direction that it shines in"
+    angle = _slider("Turned", shown.turn, lamp.turn, slider.Range(-180.0, 180.0), "%.1f°", help)
+    if (aim, angle) != (shown.direction, shown.turn):
+        shown = turned(shown, aim, angle)
+    return dataclasses.replace(shown, size=(width, height))
+
+
+def _slider(label: str, value: float, now: float, ends: slider.Range, text: str, help: str) -> float:
+    widgets.labelled(label, changed=value != now)
+    imgui.set_next_item_width(-1)
+    moved = slider.slide(f"##{label}", value, ends, text)
+    widgets.tooltip(f"{help}. {CUT}. {BY_HAND}")
+    return float(moved)
 
 
 def _row(view: View, state: State, index: int) -> None:
@@ -84,7 +111,7 @@ def _row(view: View, state: State, index: int) -> None:
 def _why_not(view: View, index: int) -> str | None:
     """Why its surfaces cannot be changed now."""
     session = view.session
-    why = new_lamps.why_fixed(view)
+    why = area_edits.why_fixed(view)
     if why is not None:
         return why
     return ALONE if (session.unedited.material_ids == index).all() else None

@@ -18,6 +18,7 @@ from app.ui.state import State
 from app.util.desktop import show_folder
 
 if TYPE_CHECKING:
+    from app.session.stats import Stats
     from app.session.view import View
 
 ICONS = theme.ICONS
@@ -60,7 +61,7 @@ def follow(state: State, baking: Baking) -> None:
 def roughly(seconds: float) -> str:
     """In one unit: what is foreseen is not known to the second."""
     if seconds < 90:
-        return f"{seconds:.0f} s"
+        return f"{max(seconds, 1):.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
@@ -111,15 +112,23 @@ def _estimate(view: View, state: State) -> None:
     if hasattr(session.options, "ray_memory"):
         memory += f", rays up to {session.options.ray_memory:,} MiB"
     rows.append(("Memory", memory))
-    if state.measured:
-        left = seconds_left(session.family, threshold(view), stats, session.run.history)
-        if left is not None and times != 1:
-            left = (left + stats.seconds) * times
-        rows.append(("Time", "not known yet" if left is None else f"about {roughly(left)}"))
+    if state.measured and session.edited_scene.emits:
+        rows.append(("Time", _time(view, stats, times)))
     widgets.facts("estimate", rows)
     widgets.tooltip("Estimates: of texels as the surfaces' area has it, of time from the solve so far")
     if (note := view.texel_note) is not None:
         widgets.one_line(f"{note[:1].upper()}{note[1:]}", theme.AMBER)
+
+
+def _time(view: View, stats: Stats, times: float) -> str:
+    """What solving will still take. times: as many texels as there are now."""
+    session = view.session
+    left = seconds_left(session.family, threshold(view), stats, session.run.history)
+    if left is None:
+        return "not known yet"
+    if times != 1:
+        left = (left + stats.seconds) * times
+    return f"about {roughly(left)}" if left > 0 else "all is solved; files are written"
 
 
 def _begin(view: View, state: State) -> None:
@@ -170,7 +179,7 @@ def _under_way(view: View, state: State, baking: Baking) -> None:
     remains = f"{widgets.percent(stats.remaining)}, to {widgets.percent(threshold(view))}"
     rows = [(words.title(stats.remains), remains)]
     if state.measured and baking.stage == SOLVING:
-        rows.append(("Time left", "not known yet" if left is None else f"about {roughly(left)}"))
+        rows.append(("Time left", "not known yet" if left is None else f"about {roughly(left)}" if left else "none"))
     widgets.facts("baking", rows)
     if baking.stage == SOLVING and not session.run.running:
         widgets.wrapped("Solving is paused: Space", theme.AMBER)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from imgui_bundle import imgui, implot
 
-from app.ui import plots, theme, widgets
+from app.ui import new_lamps, plots, theme, widgets
 from app.ui.state import State
 
 if TYPE_CHECKING:
@@ -17,7 +17,10 @@ MOST_POINTS = 400  # per curve: more cannot be told apart in a panel
 LEAST_WORK, LEAST_SECONDS = 10.0, 1.0  # ends of an axis, while there is hardly anything yet
 SMALLEST = 1e-6  # of the power emitted, for the logarithmic axis
 PLOT_EM = 20.0  # width of a plot with its legend
-LEAST_EM = 18.0, 22.0  # width of one beside another: its legend just fits above it, or inside where it is low
+LEAST_EM = (
+    18.0,
+    22.0,
+)  # width of one beside another: its legend just fits above it, and where it is low ticks are legible
 TIMINGS_EM = 19.0  # width of the table of passes: the longest name and its bar
 AXES = ("work", "seconds")  # columns of the history
 PLOTS, BOTH = ("remaining", "energy"), "both"
@@ -25,6 +28,9 @@ PLOTS, BOTH = ("remaining", "energy"), "both"
 
 def draw(view: View, state: State) -> None:
     """The whole panel: what is shown, two plots side by side or one, and where there is room the passes to the right."""
+    if not new_lamps.is_lit(view, state):
+        widgets.dim(f"{new_lamps.DARK}: there is nothing to plot")
+        return
     em, gap = imgui.get_font_size(), imgui.get_style().item_spacing.x
     passes = bool(view.session.timings) and state.measured
     beside = passes and imgui.get_content_region_avail().x > (2 * PLOT_EM + TIMINGS_EM) * em

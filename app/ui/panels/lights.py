@@ -24,6 +24,7 @@ WIDEST = 10.0  # degrees across a directional light
 
 def draw(view: View, state: State) -> None:
     """The whole panel."""
+    state.lights_shown = True
     widgets.section("Add a lamp")
     new_lamps.buttons(view, state)
     area_lamps.draw(view, state)
@@ -130,7 +131,7 @@ def _slider(label: str, value: float, came: float, most: float, text: str, help:
     widgets.labelled(label, changed=value != came)
     imgui.set_next_item_width(-1)
     moved = slider.slide(f"##{label}", value, slider.Range(0.0, most), text)
-    widgets.tooltip(f"{help}. {widgets.AS_READ}")
+    widgets.tooltip(f"{help}. {widgets.SLIDES}")
     return float(widgets.put_back(moved, came))
 
 

@@ -1,4 +1,4 @@
-"""Materials: a list, and the albedo and emission of the one that is selected, which can be edited while light moves."""
+"""Materials: a list of those on surfaces, and albedo and emission of the one that is selected, edited while light moves."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 from imgui_bundle import imgui
 
 from app.scene.area_lamps import keys_of
+from app.scene.mean_colour import mean_factor
 from app.scene.model import MOST_ALBEDO, SCALES, Material
-from app.ui import colour, lamp, new_lamps, slider, theme, widgets
+from app.ui import area_edits, colour, lamp, slider, theme, widgets
 from app.ui.state import RGB, State
 
 if TYPE_CHECKING:
@@ -27,30 +28,33 @@ SCALED = (
 
 def draw(view: View, state: State) -> None:
     """The whole panel."""
-    _list(view, state)
-    if state.material < len(view.session.materials):
-        _editor(view, state, view.session.materials[state.material])
+    used = area_edits.used_materials(view, state)
+    if state.material not in used:
+        state.material = used[0]
+    _list(view, state, used)
+    _editor(view, state, view.session.materials[state.material])
 
 
-def _list(view: View, state: State) -> None:
-    materials = view.session.materials
-    height = min(len(materials), ROWS_SHOWN) * imgui.get_text_line_height_with_spacing()
+def _list(view: View, state: State, used: tuple[int, ...]) -> None:
+    height = min(len(used), ROWS_SHOWN) * imgui.get_text_line_height_with_spacing()
     imgui.begin_child("materials", imgui.ImVec2(0, height))
     if state.reveal_material:
         state.reveal_material = False
-        imgui.set_scroll_y((state.material + 0.5) * imgui.get_text_line_height_with_spacing() - height / 2)
+        row = used.index(state.material)
+        imgui.set_scroll_y((row + 0.5) * imgui.get_text_line_height_with_spacing() - height / 2)
     clipper = imgui.ListClipper()
-    clipper.begin(len(materials))
+    clipper.begin(len(used))
     while clipper.step():
-        for index in range(clipper.display_start, clipper.display_end):
-            _row(state, index, materials[index])
+        for row in range(clipper.display_start, clipper.display_end):
+            _row(view, state, used[row])
     imgui.end_child()
 
 
-def _row(state: State, index: int, material: Material) -> None:
+def _row(view: View, state: State, index: int) -> None:
+    material, side = view.session.materials[index], imgui.get_text_line_height()
     imgui.push_id(index)
-    side = imgui.get_text_line_height()
-    colour.swatch("##albedo", material.albedo, side)
+    factor = _mean_factor(view, state, index)
+    colour.swatch("##albedo", colour.rgb(a * f for a, f in zip(material.albedo, factor, strict=True)), side)
     imgui.same_line()
     if imgui.selectable(material.name or f"material {index}", state.material == index)[0]:
         state.material = index
@@ -65,7 +69,7 @@ def _editor(view: View, state: State, material: Material) -> None:
     index = state.material
     came = view.session.unedited.materials[index]
     imgui.push_id("material")
-    albedo, light = _albedo(material, came), emission(view, state, material, came, index)
+    albedo, light = _albedo(state, material, came), emission(view, state, material, came, index)
     edited = dataclasses.replace(material, albedo=albedo, emission=light)
     _density(view, state, index)
     imgui.pop_id()
@@ -74,6 +78,8 @@ def _editor(view: View, state: State, material: Material) -> None:
     notes = [f"{word} texture" for word in ("albedo", "emission") if getattr(material, f"{word}_texture") is not None]
     if material.double_sided:
         notes.append("both sides")
+    if max(material.albedo) >= MOST_ALBEDO:
+        notes.append(f"held at {MOST_ALBEDO:.0%}: no surface reflects more")
     if notes:
         widgets.dim(", ".join(notes))
 
@@ -100,20 +106,21 @@ def _density(view: View, state: State, index: int) -> None:
 
 def _came(view: View, index: int) -> float:
     """The texel density of a material in the file; of the copy of a lamp, that of the lamp."""
-    read, added = view.session.read.materials, new_lamps.added_lamp(view, index)
+    read, added = view.session.read.materials, area_edits.added_lamp(view, index)
     if added is None:
         return read[index].lightmap_scale
     return 1.0 if added.of is None else read[keys_of(read).index(added.of)].lightmap_scale
 
 
-def _albedo(material: Material, came: Material) -> RGB:
+def _albedo(state: State, material: Material, came: Material) -> RGB:
     """came: the material as it was read."""
     widgets.labelled("Albedo ρ", changed=material.albedo != came.albedo)
     imgui.set_next_item_width(-1)
-    edited = colour.edit_colour("##albedo", material.albedo, code=True, most=MOST_ALBEDO)
+    edited = colour.edit_colour("##albedo", material.albedo, code=True, most=MOST_ALBEDO, typed=state.typed_colours)
+    pictured = " It multiplies the picture: the list shows the mean of both." if material.albedo_texture else ""
     widgets.tooltip(
         f"The share of light that it reflects: ρ {widgets.triple(material.albedo, 3)} of red, green, blue. The code is of what "
-        f"the screen shows (sRGB), as everywhere. {widgets.AS_READ}"
+        f"the screen shows (sRGB), as everywhere.{pictured} {widgets.AS_READ}"
     )
     return widgets.put_back(edited, came.albedo)
 
@@ -130,6 +137,17 @@ def emission(view: View, state: State, material: Material, came: Material, index
         spread=None if material.emission_texture is not None else np.pi * _emitting_area(view, state, index),
     )
     return edited
+
+
+def _mean_factor(view: View, state: State, index: int) -> RGB:
+    """The mean of what multiplies its albedo, looked up once."""
+    scene = view.session.unedited
+    if state.mean_factors[0] is not scene:
+        state.mean_factors = scene, {}
+    known = state.mean_factors[1]
+    if index not in known:
+        known[index] = mean_factor(scene, index)
+    return known[index]
 
 
 def _emitting_area(view: View, state: State, index: int) -> float:

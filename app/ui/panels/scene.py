@@ -8,7 +8,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from app.scene.load import NO_LIGHT
-from app.ui import theme, widgets
+from app.ui import area_edits, theme, widgets
 from app.ui.state import State
 from app.ui.words import plain
 
@@ -38,11 +38,11 @@ def _counts(view: View, state: State) -> None:
         ("Name", session.name, "as the file has it"),
         ("Size [m]", size, "of the box around all surfaces: x, y, z, with y up"),
         ("Triangles", f"{stats.triangles:,}", "after repair, and cut where surfaces meet"),
-        ("Materials", f"{len(session.materials):,}", "of the file"),
+        ("Materials", f"{len(area_edits.used_materials(view, state)):,}", "that are on a surface"),
         ("Charts", f"{stats.charts:,}", "pieces of surface that are unfolded into the plane as a whole"),
         ("Texels", f"{stats.texels:,}", "that cover a surface: each holds its own light"),
         ("Tiles", f"{stats.tiles:,}", f"squares of {tile}×{tile} texels, which quadtrees split"),
-        ("Density", f"{widgets.number(session.charts.density, 3)}/m", "texels along a metre of surface, aimed at"),
+        ("Density", f"{widgets.short(session.charts.density)} texels/m", "texels along a metre of surface, aimed at"),
         ("Memory", f"{widgets.number(stats.memory_mib, 3)} MiB", "of the texels on the GPU"),
     )
     if not imgui.begin_table("counts", 2, imgui.TableFlags_.sizing_stretch_prop):

@@ -64,7 +64,7 @@ def _colour(sky: Sky, came: Sky) -> Sky:
     imgui.same_line()
     imgui.set_next_item_width(-1)
     strength = slider.slide("##sky strength", sky.strength, STRENGTH, "× %.3g")
-    widgets.tooltip(f"Multiplies all light of the sky, and of its sun. {widgets.AS_READ}")
+    widgets.tooltip(f"Multiplies all light of the sky, and of its sun. {widgets.SLIDES}")
     strength = widgets.put_back(strength, came.strength)
     same = (tint, strength) == (sky.colour, sky.strength)
     return sky if same else dataclasses.replace(sky, colour=tint, strength=strength)
@@ -93,7 +93,7 @@ def _slider(label: str, help: str, value: float, came: float, ends: tuple[float,
     widgets.labelled(label, changed=value != came)
     imgui.set_next_item_width(-1)
     moved = slider.slide(f"##{label}", value, slider.Range(*ends), text)
-    widgets.tooltip(f"{help[:1].upper() + help[1:]}. {widgets.AS_READ}")
+    widgets.tooltip(f"{help[:1].upper() + help[1:]}. {widgets.SLIDES}")
     return float(widgets.put_back(moved, came))
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 
 from app.solvers import SOLVERS
-from app.ui import theme, widgets
+from app.ui import new_lamps, theme, widgets
 from app.ui.panels import detail, energy
 from app.ui.state import State
 from app.ui.words import plain, title
@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 
 ICONS = theme.ICONS
 BAR_EM = 0.5  # height of the bars
+EVENING = (
+    "Large patches have shot their mean. What their parts have above and below it is shot by finer patches now, more light here "
+    "and less there: shadows become true, while the sum of unshot light stands about still until all is even"
+)
 
 
 def draw(view: View, state: State) -> None:
@@ -24,8 +28,9 @@ def draw(view: View, state: State) -> None:
     session, stats = view.session, state.stats
     assert stats is not None
     _choice(view, state)
-    _buttons(view, state, done=stats.converged)
-    _progress(view, state)
+    lit = new_lamps.is_lit(view, state)
+    _buttons(view, state, done=stats.converged, lit=lit)
+    _progress(view, state, lit=lit)
     _figures(state)
     detail.draw(view, state)
     state.pace = widgets.edit_options(state.pace)
@@ -48,17 +53,18 @@ def _choice(view: View, state: State) -> None:
         state.act(lambda: view.session.set_solver(names[chosen]))
 
 
-def _buttons(view: View, state: State, *, done: bool) -> None:
+def _buttons(view: View, state: State, *, done: bool, lit: bool) -> None:
     session = view.session
     spacing = imgui.get_style().item_spacing.x
     width = (imgui.get_content_region_avail().x - 2 * spacing) / 3
     size = imgui.ImVec2(width, 0)
     text = f"{ICONS.ICON_FA_PAUSE} Pause" if session.run.running else f"{ICONS.ICON_FA_PLAY} Run"
-    imgui.begin_disabled(done)
-    if imgui.button("Converged###run" if done else f"{text}###run", size):
+    imgui.begin_disabled(done or not lit)
+    if imgui.button(f"{'No light' if not lit else 'Converged' if done else text}###run", size):
         toggle(view)
     imgui.end_disabled()
-    widgets.tooltip(f"As little remains as {title(session.family.threshold)} asks for, below" if done else "Space")
+    over = f"As little remains as {title(session.family.threshold)} asks for, below" if done else "Space"
+    widgets.tooltip(over if lit else new_lamps.DARK)
     imgui.same_line()
     if imgui.button("One step", size):
         session.run.running = False
@@ -75,15 +81,18 @@ def toggle(view: View) -> None:
     view.session.run.running = not view.session.run.running
 
 
-def _progress(view: View, state: State) -> None:
+def _progress(view: View, state: State, *, lit: bool) -> None:
+    """How far it is; of a scene that nothing lights, what to do."""
     stats = state.stats
     assert stats is not None
+    if not lit:
+        _dark()
+        return
     imgui.progress_bar(stats.progress, imgui.ImVec2(-1, imgui.get_font_size() * BAR_EM), "")
     left = f"{widgets.percent(stats.remaining)} {stats.remains}"
     least = widgets.percent(float(getattr(view.session.options, view.session.family.threshold)))
     widgets.tooltip(f"How far it is on the way, in powers of ten, down to the {least} {stats.remains} that may remain")
-    dark = stats.emitted <= 0 and stats.remaining <= 0
-    imgui.text_unformatted("nothing shines" if dark else f"converged, {left}" if stats.converged else left)
+    imgui.text_unformatted(f"converged, {left}" if stats.converged else left)
     rate = f", {widgets.number(stats.per_second, 3)}/s" if state.measured and not stats.converged else ""
     imgui.same_line()
     widgets.right(f"{stats.done:,} {stats.unit}{rate}", theme.DIM)
@@ -93,8 +102,22 @@ def _progress(view: View, state: State) -> None:
         fresh = "" if stats.fresh_work is None else f", from nothing {stats.fresh_work:,}"
         widgets.one_line(f"the edit: {stats.edit_work:,} {stats.unit}{fresh}", theme.DIM)
         widgets.tooltip("Only the difference that an edit makes is solved for, negative where light goes")
+    elif stats.doing and not view.session.light.adaptive:
+        widgets.one_line(stats.doing, theme.DIM)
+        widgets.tooltip(EVENING)
     else:
         imgui.text_unformatted("")  # as high as with something to say
+
+
+def _dark() -> None:
+    """Nothing is under way, and a button leads to where lamps are added; as high as ``_progress``."""
+    imgui.progress_bar(0.0, imgui.ImVec2(-1, imgui.get_font_size() * BAR_EM), "")
+    imgui.text_colored(imgui.ImVec4(*theme.AMBER), new_lamps.DARK)
+    imgui.same_line()
+    if imgui.small_button("Add a lamp###to lamps"):
+        imgui.set_window_focus("Lights")
+    widgets.tooltip("Shows the Lights panel, which has a button for each kind of lamp")
+    imgui.text_unformatted("")
 
 
 def _figures(state: State) -> None:
