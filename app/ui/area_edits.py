@@ -109,8 +109,19 @@ def came_from(view: View, state: State, index: int) -> RGB:
     """Where the lamp of material ``index`` is in the file; of one that was added, where it is."""
     if index >= len(view.session.read.materials):
         return lamp_of(view, state, index).position
-    x, y, z = middle_of(view.session.read, index).tolist()
-    return x, y, z
+    return _home(view, state, index)[0]
+
+
+def _home(view: View, state: State, index: int) -> tuple[RGB, bool]:
+    """Where a lamp of the scene's own is in the file, and whether it is part of a larger piece there; looked up once."""
+    read = view.session.read
+    if state.homes[0] is not read:
+        state.homes = read, {}
+    known = state.homes[1]
+    if index not in known:
+        x, y, z = middle_of(read, index).tolist()
+        known[index] = (x, y, z), hangs_together(read, index)
+    return known[index]
 
 
 def why_fixed(view: View) -> str | None:
@@ -120,15 +131,8 @@ def why_fixed(view: View) -> str | None:
 
 def why_not_moved(view: View, state: State, index: int) -> str | None:
     """Why the lamp of material ``index`` cannot be moved."""
-    read = view.session.read
-    if index < len(read.materials):
-        if state.joined[0] is not read:
-            state.joined = read, {}
-        known = state.joined[1]
-        if index not in known:
-            known[index] = hangs_together(read, index)
-        if known[index]:
-            return JOINED
+    if index < len(view.session.read.materials) and _home(view, state, index)[1]:
+        return JOINED
     return why_fixed(view)
 
 

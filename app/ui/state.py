@@ -113,22 +113,22 @@ class Flight:
 class State:
     """Everything that belongs to the interface and not to the session.
 
-        measured: whether numbers that depend on the machine's speed are shown (off for pictures that are compared). live: whether
-        frames follow each other, so that there is a rate of them. texture_id: makes a texture of the host drawable; legend: the
-        scale of what is shown now; stats: of the session, asked once per frame (None without a scene). atlas, adaptive: edited,
-        not yet applied. view_px: the 3-D view (left, top, width, height) [display units]. inspected: what the solver showed last,
-            and of which light. draw_rays: those of the picked texel, in the room. pointed: under the pointer, and where.
-        reveal_material: the list scrolls to the selected one. draw_lights: handles of lamps, in the view; lights_shown: whether the
-        Lights panel is. reference: of a solve in the background; layer: to go back to from the error. edits: of the open scene;
-        held: whether a hand was at a control in the last frame. Looked up once of a scene: used, the materials that are somewhere;
-        mean_factors, what multiplies their albedos on the mean; own_lamps, with area, as if they were copies of themselves; joined,
-        whether these are part of a larger piece. typed_colours: asked for by hand, by what albedos were held at. version: of the open
-        scene, that edits are noted of. held_lamp: one with area as a hand holds it, by its material; scale:
-        a texel density, the same. keeping: saves and opens
-        sessions; asides: what crashes have left, that is offered; recover: the one to be asked about; leaving: a wish that is to be
-        answered; after_saving: what waits for a session to be saved. order: of the next bake, as far as it was edited; baking: the
-        last. picture: that is to be saved; saving: the one that is drawn for it. text_size: over what the screen asks for.
-        """
+    measured: whether numbers that depend on the machine's speed are shown (off for pictures that are compared). live: whether
+    frames follow each other, so that there is a rate of them. texture_id: makes a texture of the host drawable; legend: the
+    scale of what is shown now; stats: of the session, asked once per frame (None without a scene). atlas, adaptive: edited,
+    not yet applied. view_px: the 3-D view (left, top, width, height) [display units]. inspected: what the solver showed last,
+    and of which light. draw_rays: those of the picked texel, in the room. pointed: under the pointer, and where.
+    reveal_material: the list scrolls to the selected one. draw_lights: handles of lamps, in the view; lights_shown: whether the
+    Lights panel is. reference: of a solve in the background; layer: to go back to from the error. edits: of the open scene;
+    held: whether a hand was at a control in the last frame. Looked up once of a scene: used, the materials that are somewhere;
+    mean_factors, what multiplies their albedos on the mean; own_lamps, with area, as if they were copies of themselves; homes,
+    where these are in the file, and whether they are part of a larger piece. typed_colours: asked for by hand, by what albedos
+    were held at. version: of the open scene, that edits are noted of. held_lamp: one with area as a hand holds it, by its
+    material; scale: a texel density, the same. keeping: saves and opens
+    sessions; asides: what crashes have left, that is offered; recover: the one to be asked about; leaving: a wish that is to be
+    answered; after_saving: what waits for a session to be saved. order: of the next bake, as far as it was edited; baking: the
+    last. picture: that is to be saved; saving: the one that is drawn for it. text_size: over what the screen asks for.
+    """
 
     measured: bool = True
     live: bool = True
@@ -186,7 +186,7 @@ class State:
     light_held: bool = False
     held_lamp: tuple[int, AreaLamp] | None = None
     own_lamps: tuple[object, dict[int, AreaLamp]] = (None, {})
-    joined: tuple[object, dict[int, bool]] = (None, {})
+    homes: tuple[object, dict[int, tuple[RGB, bool]]] = (None, {})
     scale: tuple[int, float] | None = None
     area_held: bool = False
     draw_lights: bool = True
