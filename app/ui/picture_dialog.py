@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 TITLE, SAVING = "Save picture", "Saving the picture"
 SIZES = ((1280, 720), (1920, 1080), (3840, 2160))
 FORMATS = {".png": "PNG, as it is shown", ".exr": "EXR, linear radiance [W/(sr m²)]"}
-WIDTH_EM, BUTTON_EM = 26.0, 7.0
+WIDTH_EM, BUTTON_EM = 29.0, 7.0
 MOST_PX = 1 << 16  # along a side, that can be typed; the GPU allows less
 
 

@@ -108,7 +108,7 @@ def _estimate(view: View, state: State) -> None:
     if density is not None:
         times = (density / session.charts.density) ** 2
     rows = [("Texels", f"{'about ' if times != 1 else ''}{stats.texels * times:,.0f}")]
-    memory = f"about {stats.memory_mib * times:,.0f} MiB"
+    memory = f"about {max(stats.memory_mib * times, 1.0):,.0f} MiB"
     if hasattr(session.options, "ray_memory"):
         memory += f", rays up to {session.options.ray_memory:,} MiB"
     rows.append(("Memory", memory))
