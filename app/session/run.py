@@ -212,6 +212,10 @@ class Run:
         self.seconds += self._pace.lap()
         return made
 
+    def hold(self) -> None:
+        """Something else has the time until the next ``advance``: it is none of solving."""
+        self._pace.pause()
+
     def drawn(self) -> None:
         """The frame is drawn, see ``Pacer.drawn``."""
         self._pace.drawn()

@@ -52,6 +52,7 @@ class Pictures:
     def _draw(self, drawing: _Drawing) -> None:
         said = self._state.saving
         assert said is not None
+        self._view.session.run.hold()
         try:
             if not said.stopped:
                 said.share = next(drawing.parts)

@@ -88,7 +88,11 @@ def test_what_cannot_be_saved_is_one_line(view: View, gpu: Gpu, tmp_path: Path) 
 
 def test_a_picture_is_drawn_in_parts_beside_the_window(view: View, tmp_path: Path) -> None:
     """What the window shows stays, whatever it draws in between; the file is that of the whole picture."""
-    whole, state = picture(view, SIZE), State()
+    state, run = State(), view.session.run
+    for _ in range(2):
+        run.advance(fast=False, interactive=False)
+    assert run._pace._last
+    whole = picture(view, SIZE)
     saved = Pictures(view, state)
     saved.begin(PictureFile(tmp_path / "a.png", SIZE))
     texture = view.session.gpu.texture((32, 16), 4, "f1")
@@ -99,6 +103,7 @@ def test_a_picture_is_drawn_in_parts_beside_the_window(view: View, tmp_path: Pat
         view.draw(other, (32, 16))
         shares += [] if state.saving is None else [state.saving.share]
         assert len(shares) < 100
+    assert not run._pace._last, "no time of solving"
     assert len(shares) == SAMPLES and sorted(shares) == shares and shares[-1] == 1.0
     assert (np.asarray(Image.open(tmp_path / "a.png")) == whole).all()
     assert [toast.text for toast in state.toasts] == [f"saved {tmp_path / 'a.png'}"]
