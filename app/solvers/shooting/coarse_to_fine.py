@@ -81,7 +81,7 @@ class Phases:
         if self.now.settles:
             return "lamps settle: all of their patches shoot"
         fine = self.now is self.finest and len(self.choices) > 1
-        return f"finer patches even out {to_shoot:.2%}" if fine else ""
+        return f"finer patches even out {100 * to_shoot:.2f} %" if fine else ""
 
     # -- how large patches are, as patch_level.glsl has it -------------------------------------------------------------
 
