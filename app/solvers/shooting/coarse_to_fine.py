@@ -75,13 +75,13 @@ class Phases:
         self.even = is_last and to_shoot <= FINE_ENOUGH * residual
         return not is_last
 
-    def say(self, to_shoot: float) -> str:
+    def say(self, to_shoot: float | None) -> str:
         """What is being done once large patches have shot, which leaves the sum of what is unshot about as it is. to_shoot: as of
-        ``follow``."""
+        ``follow``, once it is known."""
         if self.now.settles:
             return "lamps settle: all of their patches shoot"
         fine = self.now is self.finest and len(self.choices) > 1
-        return f"finer patches even out {100 * to_shoot:.2f} %" if fine else ""
+        return f"finer patches even out {100 * to_shoot:.2f} %" if fine and to_shoot is not None else ""
 
     # -- how large patches are, as patch_level.glsl has it -------------------------------------------------------------
 

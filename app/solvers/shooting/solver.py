@@ -66,7 +66,7 @@ class Shooting:
         self.issued = 0
         self.last_shot: Shot | None = None
         self._strongest = 0.0  # power of the strongest patch, as far as it is known [W]
-        self._uneven = 1.0  # share of the emitted power that patches hold, as far as it is known
+        self._uneven: float | None = None  # share of the emitted power that patches hold, once it is known
         self.reset()
 
     # -- work ----------------------------------------------------------------------------------------------------------
@@ -197,6 +197,7 @@ class Shooting:
                 finer = batch.phases.follow(unshot, to_shoot, self.options.residual)
             if finer:
                 batch.shoot_finer()
+                self._uneven = None
         self._strongest = float(values["strongest"]) * ledger.watt
         remaining = min(unshot, 1.0) if outside.left else unshot  # an edit takes back light, and gives as much
         self._progress = Progress(int(values["shots"]), remaining, values["escaped"].astype(np.float64) * ledger.watt)
