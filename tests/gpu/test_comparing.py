@@ -7,7 +7,6 @@ import dataclasses
 import os
 import pickle
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -20,6 +19,7 @@ from boxes import PLAIN, SIZE, STEP, box, cornell, even, picture, put, put_ambie
 from forests import Forest, forest
 from gl_objects import forgotten, held
 from numpy.typing import NDArray
+from processes import started
 from solver_scenes import table_room
 
 from app.atlas.options import AtlasOptions
@@ -142,6 +142,7 @@ def frames(session: Session, until: Callable[[], bool], *, fast: bool = True) ->
         assert time.monotonic() < end
         session.poll()
         session.advance(fast=fast)
+        time.sleep(0.001)
 
 
 def test_the_error_against_a_bake_is_that_of_its_light(session: Session, tmp_path: Path) -> None:
@@ -459,9 +460,9 @@ def test_an_interrupted_solve_is_no_answer(cornell: Scene, tmp_path: Path) -> No
     source.write_bytes(pickle.dumps({"scene": cornell, "atlas": AtlasOptions(texels=900), "residual": 1e-9}))
     command = [sys.executable, "-m", "app.session.comparison_worker", str(source), str(target)]
     env = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    with subprocess.Popen(command, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as worker:
+    with started(command, env) as worker:
         assert worker.stdout is not None
-        assert any(b" shots" in line for line in worker.stdout)
+        assert any(" shots" in line for line in worker.stdout)
         worker.send_signal(signal.SIGINT)
         assert worker.wait(30) == INTERRUPTED
     assert not target.exists()

@@ -25,6 +25,7 @@ from app.viewer.ui_frame import UiFrame
 
 SMALL = AtlasOptions(texels=4000)
 PATIENCE = 60.0  # s
+pytestmark = pytest.mark.usefixtures("few_points")  # which a session at rest has worked out
 
 
 @pytest.fixture
@@ -49,6 +50,7 @@ def frames(session: Session, until: Callable[[], bool]) -> int:
         session.poll()
         session.advance()
         count += 1
+        time.sleep(0.001)
     return count
 
 
