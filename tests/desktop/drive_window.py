@@ -21,6 +21,7 @@ import moderngl_window
 import pyglet
 from imgui_bundle import imgui
 
+from app.estimate import error
 from app.gpu import Gpu
 from app.session import keeping
 from app.session.session import Session
@@ -125,6 +126,8 @@ def pass_on_events(folder: Path) -> None:
 
 def main() -> None:
     folder = Path(sys.argv[1])
+    for name in ("SURVEYED", "POINTS", "HELPERS"):  # of the error estimate, which takes some in each frame
+        setattr(error, name, 64)
     if len(sys.argv) > 2:
         keeping.WORTH_SECONDS = float(sys.argv[2])
 
