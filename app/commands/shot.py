@@ -52,7 +52,6 @@ def shot(flags: argparse.Namespace, note: str | None = None) -> int:
         if stop_of(flags).by_error and session.run.converged:
             estimate(session, flags, console)
         session.compare(wait=True)
-        session.lightmap.refresh_ambient(wait=True)
         trapped = view.look_for_light()
         if trapped is not None:
             console.warn(trapped)

@@ -99,6 +99,11 @@ class View:
 
     # -- pictures ------------------------------------------------------------------------------------------------------
 
+    def wait_for_light(self) -> None:
+        """Have all of the light that is to be shown, also what frames do without until it is made in the background."""
+        if self.session.opened:
+            self.session.lightmap.refresh_ambient(wait=True)
+
     def draw(self, target: Framebuffer, size: tuple[int, int], **look: Unpack[Look]) -> bool:
         """The picture of the solution as it is now; whether it was drawn, see ``FrameRenderer.render``."""
         self._size, whole = size, look.get("whole", True)

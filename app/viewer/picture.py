@@ -76,7 +76,8 @@ def write_picture(path: Path, image: np.ndarray) -> None:
 
 
 def picture(view: View, size: tuple[int, int]) -> np.ndarray:
-    """The whole, as ``parts_of_picture``."""
+    """The whole, as ``parts_of_picture``, with all of the light."""
+    view.wait_for_light()
     return run_to_end(parts_of_picture(view, size))
 
 

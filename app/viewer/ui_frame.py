@@ -197,6 +197,7 @@ def ui_image(
     The session is not stepped. ``measured=False`` leaves out what depends on the machine's speed, so that pictures
     can be compared. click: a place in the window [px] that is clicked once it is there.
     """
+    view.wait_for_light()
     return run_to_end(parts_of_ui_image(view, size, measured=measured, click=click))
 
 
