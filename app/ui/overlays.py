@@ -154,7 +154,7 @@ def _status(view: View, state: State) -> list[tuple[str, theme.RGBA]]:
 
 def _pace(view: View, state: State) -> None:
     """Which pace is on; a click changes it."""
-    fast = state.is_fast(view.session.run.seconds)
+    fast = state.is_fast(view.session.run.seconds if state.measured else 0.0)
     imgui.text_colored(
         imgui.ImVec4(*theme.DIM), f"{ICONS.ICON_FA_FORWARD}  fast" if fast else f"{ICONS.ICON_FA_EYE}  watch"
     )
