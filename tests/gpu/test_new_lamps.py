@@ -278,20 +278,11 @@ def test_sides_that_faced_nothing_are_lit_by_a_sky(dark: Dark) -> None:
     assert not new_lamps.is_lit(dark.view, dark.state)
 
 
-@pytest.mark.parametrize(
-    ("solver", "adaptive", "known"),
-    [
-        ("shooting", True, {"Point", "Spot", "Sun", "Sky"}),
-        ("pairs", False, set()),
-        ("gathering", True, {"Point", "Spot", "Sun", "Sky"}),
-    ],
-)
-def test_what_a_solver_does_not_know_is_not_offered(gpu: Gpu, solver: str, adaptive: bool, known: set[str]) -> None:
-    """And what is offered is taken."""
+@pytest.mark.parametrize(("solver", "adaptive"), [("shooting", True), ("pairs", False), ("gathering", True)])
+def test_what_is_offered_is_taken(gpu: Gpu, solver: str, adaptive: bool) -> None:
     dark = Dark(gpu, solver, adaptive=adaptive)
-    offered = [kind for kind in OPEN if new_lamps.why_not(dark.view, kind) is None]
-    assert {kind.label for kind in offered} == known
-    for kind in offered:
+    for kind in OPEN:
+        assert new_lamps.why_not(dark.view, kind) is None
         dark.add(kind)
     dark.release()
 
