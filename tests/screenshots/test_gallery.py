@@ -123,13 +123,13 @@ REELS = (
         SQUARE,
         solver="gathering",
     ),
-    Reel("museum", 40_000, GATHERING, (Picture("museum-gathering", 512),), solver="gathering"),
+    Reel("museum", 40_000, GATHERING, (Picture("museum-gathering", 320),), solver="gathering"),
     Reel("textured-room", 60_000, GATHERING, (Picture("textured-room-gathering", 128),), solver="gathering"),
     Reel("living-room", 40_000, GATHERING, (Picture("living-room", 64),), solver="gathering"),
     Reel(
         "village",
         0,
-        SOLVERS["local"].options(shadow_rays=32),
+        SOLVERS["local"].options(patches=512, shadow_rays=16),
         (
             Picture("village", camera=3, exposure=NIGHT_EV),
             Picture("layer-local", camera=0, display={"layer": "local"}, exposure=NIGHT_EV),
