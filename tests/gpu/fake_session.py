@@ -242,6 +242,9 @@ class FakeSession:
         target.clear(0.2, 0.3, 0.4, 1.0)
         return True
 
+    def wait_for_light(self) -> None:
+        pass
+
     def forget_samples(self) -> None:
         pass
 

@@ -18,6 +18,7 @@ from PIL import Image
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 SIZE = (320, 240)  # px, of a picture
 ROOM = 200  # px more that the window is large, with what surrounds the page
+TRIES = 3  # virtual time can pass while a slow machine still reads a page's files: it is blank then
 FLAGS = (
     *("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars"),
     *("--force-device-scale-factor=1", "--force-color-profile=srgb", "--virtual-time-budget=30000"),
@@ -55,10 +56,14 @@ def pictures_of_pages(addresses: Sequence[str], folder: Path) -> list[np.ndarray
     shot = folder / "pages.png"
     options = [f"--window-size={width * count + ROOM},{height + ROOM}", f"--user-data-dir={folder / 'profile'}"]
     line = [CHROMIUM, *FLAGS, *options, f"--screenshot={shot}", (folder / "frames.html").as_uri()]
-    run = subprocess.run(line, capture_output=True, text=True, timeout=200)
-    assert shot.is_file(), run.stderr[-2000:]
-    image = np.asarray(Image.open(shot).convert("RGB"))
-    return [image[:height, width * k : width * (k + 1)] for k in range(count)]
+    for _ in range(TRIES):
+        run = subprocess.run(line, capture_output=True, text=True, timeout=200)
+        assert shot.is_file(), run.stderr[-2000:]
+        image = np.asarray(Image.open(shot).convert("RGB"))
+        pictures = [image[:height, width * k : width * (k + 1)] for k in range(count)]
+        if all(np.ptp(picture) > 0 for picture in pictures):
+            break
+    return pictures
 
 
 def apart(one: np.ndarray, other: np.ndarray) -> float:
