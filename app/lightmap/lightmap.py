@@ -11,12 +11,11 @@ from app.atlas.charts import Charts
 from app.gpu import Gpu, Texture, keep, take_over
 from app.lightmap.options import STORAGE, LightmapOptions
 from app.lightmap.refinement import Refinement
-from app.lightmap.textures import LightTextures
+from app.lightmap.textures import LIGHT, LightTextures
 from app.lightmap.tile_pool import TilePool
 from app.scene.model import F32, F64, Material, Scene
 from app.util.state import State, StateError
 
-KEPT = ("t_irradiance", "t_residual", "t_ambient")  # of the textures, what is light
 DEFAULT = LightmapOptions()
 _DTYPES = {"f4": np.float32, "f2": np.float16, "f1": np.uint8}
 
@@ -93,7 +92,7 @@ class Lightmap(LightTextures):
     def state(self) -> State:
         """Light and leaves as they are. Waits for the GPU."""
         state = State({"storage": self.storage, "unit": self.unit, "version": self.version})
-        keep(state, **{name: self._textures[name] for name in KEPT})
+        keep(state, **{name: self._textures[name] for name in LIGHT})
         if self.refinement is not None:
             state.put("leaves", self.refinement.state())
         return state
@@ -104,7 +103,7 @@ class Lightmap(LightTextures):
             raise StateError(f"light is held as {state.values['storage']}")
         if self.refinement is not None:
             self.refinement.restore(state.part("leaves"))
-        take_over(state, **{name: self._textures[name] for name in KEPT})
+        take_over(state, **{name: self._textures[name] for name in LIGHT})
         self.unit, self.version = float(state.values["unit"]), int(state.values["version"])
 
     # -- read-back -----------------------------------------------------------------------------------------------------

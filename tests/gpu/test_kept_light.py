@@ -82,6 +82,7 @@ def stopped_and_resumed(gpu: Gpu, scene: Scene, solver: str, stops: list[int], p
         state, done = kept(session), stop
         session.release()
         session = opened(gpu, scene, solver, **how)
+        session.lightmap.refresh_ambient(wait=True)  # as in a window that has drawn: kept light knows none
         restore_light(session, state)
     work(session, pieces - done)
     light = session.lightmap.irradiance()

@@ -273,7 +273,7 @@ class Batch:
         self.marks.levels[:] = state.array("marks", np.float32, *self.marks.levels.shape)
         self.marks.upload()
         take_over(state, overshoot=self.ambient.overshoot)
-        self.ambient.changed()
+        self.ambient.leaves_changed()
         self.outside.restore(state.part("outside"))
         self.ledger.restore(state.part("ledger"))
         if self.replay is not None:
