@@ -248,7 +248,8 @@ class State:
             self.picked = self.pointed = self.atlas = self.adaptive = None
         if scene is not self._known[0]:
             self.flight, self.material, self.light, self.area_lamp = None, 0, 0, 0
-            self.scale = None
+            self.scale = self.held_lamp = None
+            self.area_held = False
             self.order = None
             self.emission_colours.clear()
             self.edits = EditHistory()

@@ -1,14 +1,21 @@
-"""Pictures that are saved from the window: drawn a part in each frame, then written in a thread, so that the window goes on."""
+"""Pictures that are saved from the window: of the view, drawn a part in each frame and then written in a thread, so that the
+window goes on; and of the window itself, as it is."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from PIL import Image
+
 from app.errors import UserError
+from app.gpu import Framebuffer
 from app.session.view import View
 from app.ui.state import PictureFile, Saving, State
 from app.util.background import BackgroundTask
 from app.viewer.picture import check_suffix, is_linear, parts_of_picture, write_picture
+from app.viewer.ui_frame import pixels
+
+SCREENSHOT = "glowtree-{:04d}.png"
 
 
 class Pictures:
@@ -99,4 +106,18 @@ class _Drawing:
         self._twin.release()
 
 
-__all__ = ["Pictures"]
+def save_screenshot(target: Framebuffer, size: tuple[int, int], folder: Path, state: State) -> None:
+    """Write what ``target`` shows, of ``size`` (width, height) [px], into ``folder`` under the next free number, and say where it
+    went or why not."""
+    number = 1
+    while (path := folder / SCREENSHOT.format(number)).exists():
+        number += 1
+    try:
+        Image.fromarray(pixels(target, size)).save(path)
+    except OSError as error:
+        state.notify(f"{path}: cannot be written: {error.strerror or error}", error=True)
+    else:
+        state.notify(f"saved {path}")
+
+
+__all__ = ["Pictures", "save_screenshot"]

@@ -8,11 +8,9 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Generator
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, ShaderError, Texture
@@ -32,7 +30,6 @@ WARM_UP = 4  # frames until docked windows, their contents' heights and scroll b
 SAMPLES = 16  # pictures that one at rest, or one that is kept, is the mean of: smooth edges
 LEGEND_SIZE = 900  # px: the shorter side of a picture beyond which its legend grows with it
 STEP = 1.0 / 60.0  # s: a headless frame's time, whatever the clock says
-SCREENSHOT = "glowtree-{:04d}.png"
 
 
 class UiFrame:
@@ -259,15 +256,3 @@ def pixels(target: Framebuffer, size: tuple[int, int]) -> NDArray[np.uint8]:
     """
     image = np.frombuffer(target.read(viewport=(0, 0, *size), components=3, alignment=1), np.uint8)
     return np.ascontiguousarray(image.reshape(size[1], size[0], 3)[::-1])
-
-
-def save_screenshot(target: Framebuffer, size: tuple[int, int], folder: Path) -> Path:
-    """Write what ``target`` shows into ``folder`` under the next free number; where it went. Raises UserError."""
-    number = 1
-    while (path := folder / SCREENSHOT.format(number)).exists():
-        number += 1
-    try:
-        Image.fromarray(pixels(target, size)).save(path)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written: {error.strerror or error}") from None
-    return path

@@ -25,8 +25,8 @@ from app.session.view import View
 from app.ui.app import Ui
 from app.ui.state import Pace, Request
 from app.viewer.mouse import Mouse
-from app.viewer.saving import Pictures
-from app.viewer.ui_frame import UiFrame, save_screenshot
+from app.viewer.saving import Pictures, save_screenshot
+from app.viewer.ui_frame import UiFrame
 
 GL_VERSION = (4, 1)
 TITLE = "Glowtree"
@@ -224,19 +224,24 @@ class ViewerWindow(WindowConfig):
     def main_loop(self) -> None:
         """Frame after frame until the window is closed; where nothing changes, wait for an event instead."""
         self.timer.start()
-        while not self.wnd.is_closing:
-            if self._at_rest():
-                self._wait(REST_SECONDS)
-                continue
-            now, elapsed = self.timer.next_frame()
-            self.wnd.use()
-            self.wnd.render(now, min(elapsed, REST_SECONDS))
-            if not self.wnd.is_closing:
-                self.wnd.swap_buffers()
-            waiting = self._session.on_its_way is not None or self._session.compared.fetching is not None
-            if waiting and not self._session.solving and not self._session.uploading:
-                self._wait(LOADING_PAUSE)
-        self._pictures.end()
+        try:
+            while not self.wnd.is_closing:
+                if self._at_rest():
+                    self._wait(REST_SECONDS)
+                else:
+                    self._next_frame()
+        finally:
+            self._pictures.end()
+
+    def _next_frame(self) -> None:
+        now, elapsed = self.timer.next_frame()
+        self.wnd.use()
+        self.wnd.render(now, min(elapsed, REST_SECONDS))
+        if not self.wnd.is_closing:
+            self.wnd.swap_buffers()
+        waiting = self._session.on_its_way is not None or self._session.compared.fetching is not None
+        if waiting and not self._session.solving and not self._session.uploading:
+            self._wait(LOADING_PAUSE)
 
     def _wait(self, seconds: float) -> None:
         """For an event, at most so long."""
@@ -279,7 +284,7 @@ class ViewerWindow(WindowConfig):
         self._show_name()
         for request in requests:
             if request is Request.SCREENSHOT:
-                self._save_screenshot()
+                save_screenshot(self.wnd.fbo, self.wnd.buffer_size, Path.cwd(), state)
             elif request is Request.SAVE_PICTURE and state.picture is not None:
                 self._pictures.begin(state.picture)
             elif request is Request.QUIT:
@@ -302,15 +307,6 @@ class ViewerWindow(WindowConfig):
         if solve:
             session.advance(fast=fast, interactive=held)
         return look
-
-    def _save_screenshot(self) -> None:
-        """Do so, and say where it went or why not."""
-        try:
-            path = save_screenshot(self.wnd.fbo, self.wnd.buffer_size, Path.cwd())
-        except UserError as error:
-            self._ui.state.notify(str(error), error=True)
-        else:
-            self._ui.state.notify(f"saved {path}")
 
     def _show_cursor(self) -> None:
         wanted = imgui.get_mouse_cursor()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import OpenEXR
@@ -22,6 +23,7 @@ from app.ui.state import PictureFile, State
 from app.viewer.picture import picture, save_picture
 from app.viewer.saving import Pictures
 from app.viewer.ui_frame import SAMPLES
+from app.viewer.window import ViewerWindow
 
 SIZE = (96, 64)
 
@@ -108,6 +110,18 @@ def test_a_picture_is_drawn_in_parts_beside_the_window(view: View, tmp_path: Pat
     assert (np.asarray(Image.open(tmp_path / "a.png")) == whole).all()
     assert [toast.text for toast in state.toasts] == [f"saved {tmp_path / 'a.png'}"]
     view.session.gpu.release_all(other, texture)
+
+
+def test_a_picture_is_written_to_its_end_where_the_window_fails(view: View, tmp_path: Path) -> None:
+    pictures = Pictures(view, State())
+    pictures.begin(PictureFile(tmp_path / "a.png", SIZE))
+    while pictures.drawing:
+        pictures.step()
+    fail = Mock(side_effect=RuntimeError("in a frame"))
+    window = Mock(_pictures=pictures, _at_rest=lambda: False, _next_frame=fail, wnd=Mock(is_closing=False))
+    with pytest.raises(RuntimeError, match="in a frame"):
+        ViewerWindow.main_loop(window)
+    assert not pictures.busy and Image.open(tmp_path / "a.png").size == SIZE
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.exr"])

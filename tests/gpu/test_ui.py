@@ -29,7 +29,7 @@ from app.ui.file_list import readable
 from app.ui.keys import ANY_POPUP, SHORTCUTS
 from app.ui.picture_dialog import free_name
 from app.ui.state import WATCH_SECONDS, Legend, Pace, Request, Saving
-from app.viewer.ui_frame import save_screenshot
+from app.viewer.saving import save_screenshot
 
 __all__ = ["desk", "session", "where"]
 
@@ -437,10 +437,14 @@ def test_lamps_flicker_where_the_solver_can_follow(desk: Desk, monkeypatch: pyte
 
 
 def test_screenshots_are_numbered(desk: Desk, tmp_path: Path) -> None:
-    paths = [save_screenshot(desk.target, SIZE, tmp_path) for _ in range(2)]
-    assert [p.name for p in paths] == ["glowtree-0001.png", "glowtree-0002.png"]
-    with pytest.raises(UserError, match="nowhere"):
-        save_screenshot(desk.target, SIZE, tmp_path / "nowhere")
+    state = desk.ui.state
+    for folder in (tmp_path, tmp_path, tmp_path / "nowhere"):
+        save_screenshot(desk.target, SIZE, folder, state)
+    names = ["glowtree-0001.png", "glowtree-0002.png"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == names
+    *saved, failed = state.toasts
+    assert [toast.text for toast in saved] == [f"saved {tmp_path / name}" for name in names]
+    assert failed.error and "nowhere" in failed.text and "cannot be written" in failed.text
 
 
 def test_a_broken_shader_is_reported_and_nothing_else(desk: Desk, gpu: Gpu, monkeypatch: Any) -> None:

@@ -142,6 +142,24 @@ def test_an_added_lamp_is_moved_in_the_panel(panel: Desk, monkeypatch: pytest.Mo
     assert panel.session.surfaces.lamps[0].position == (1.0, 2.0, 3.0)
 
 
+def test_a_lamp_that_is_held_stays_behind_with_its_scene(panel: Desk) -> None:
+    """Its number is that of a material in that scene: none of another one is moved once it is let go."""
+    state, session = panel.ui.state, panel.session
+    panel.frames(2)
+    at = on_screen(session, state, np.array(PANEL.position))
+    panel.point(at.x, at.y)
+    panel.press(0, True)
+    panel.point(at.x + 20, at.y)
+    assert state.held_lamp is not None
+    session.read = session.unedited = FakeScene(**vars(session.unedited))
+    session.surfaces = Surfaces()
+    panel.frames(1)
+    assert state.held_lamp is None and not state.area_held
+    panel.press(0, False)
+    panel.frames(2)
+    assert "change_surfaces" not in [call[0] for call in session.calls]
+
+
 def test_handles_are_not_there_while_a_bake_runs(panel: Desk) -> None:
     session = panel.session
     session.fixed = "they are being baked"

@@ -58,7 +58,7 @@ def split(scene: Scene, *, apart: bool) -> Scene:
 
 MOVE = transform((30.0, -7.0, 12.0), (31.0, 47.0, 13.0), 1.0)
 IDENTITY = np.eye(4)
-# name: (the changed scene, world matrix, texels per metre)
+# name: (the changed scene, world matrix, texels per metre). Larger scenes: "size-1e+06" of the hard cases, see test_hard.py.
 CHANGES: dict[str, tuple[Callable[[Scene], Scene], F64, float]] = {
     "moved and turned": (lambda s: moved(s, MOVE), MOVE, DENSITY),
     "a thousandth": (

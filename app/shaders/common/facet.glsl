@@ -10,3 +10,5 @@ vec4 facet_entry(uint facet, int which) {
     int width = textureSize(t_facets, 0).x;
     return texelFetch(t_facets, ivec2(entry % width, entry / width), 0);
 }
+
+float chart_of(uint facet) { return facet_entry(facet, 0).w; }

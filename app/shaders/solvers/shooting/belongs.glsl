@@ -4,8 +4,6 @@
 
 const float COS_TOGETHER = 0.94;  // 20°: cosines of one polygon are then right within 6 %
 
-float chart_of(uint facet) { return facet_entry(facet, 0).w; }
-
 bool belongs(Texel texel, vec3 normal, float chart) {
     return texel.area > 0.0 && dot(texel.normal, normal) > COS_TOGETHER && chart_of(texel.facet) == chart;
 }

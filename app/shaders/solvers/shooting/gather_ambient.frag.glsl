@@ -28,5 +28,5 @@ void main() {
         out_ambient.rgb += albedo_of(t_materials, material, px) * ambient_at(px);
         if (E == vec3(0.0)) out_ambient.rgb += texelFetch(t_residual, px, 0).rgb;
     }
-    out_ambient = vec4(out_ambient.rgb / float(RAY_EDGE * RAY_EDGE), 1.0 + chart_of(texel));
+    out_ambient = vec4(out_ambient.rgb / float(RAY_EDGE * RAY_EDGE), 1.0 + chart_of(texel.facet));
 }

@@ -18,5 +18,3 @@ Texel gather_point(ivec2 block) {
     }
     return load_texel(t_position_area, t_normal_ids, px);
 }
-
-float chart_of(Texel texel) { return facet_entry(texel.facet, 0).w; }

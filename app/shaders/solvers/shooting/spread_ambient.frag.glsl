@@ -24,7 +24,7 @@ void main() {
     if (texel.area <= 0.0) return;
     vec3 H = texelFetch(t_irradiance, px, 0).rgb;
     vec2 at = (vec2(px - slot * TILE) + 0.5) / float(BLOCK) - 0.5, low = floor(at), share = at - low;
-    float chart = 1.0 + chart_of(texel);
+    float chart = 1.0 + chart_of(texel.facet);
     vec4 sum = vec4(0.0);
     for (int i = 0; i < 4; ++i) {
         ivec2 corner = ivec2(i & 1, i >> 1), block = block_at(ivec2(low) + corner, slot);
