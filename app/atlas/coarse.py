@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
-from app.atlas.layout import density_for, measured, place
+from app.atlas.layout import density_for, measured, place, scaled
 from app.atlas.sides import distinct_rows, groups_of, lit_sides
 from app.scene.model import F64, I32, Scene
 from app.util.background import Report
@@ -31,7 +31,7 @@ def coarse_charts(scene: Scene, tile: int, texels: int, report: Report) -> Chart
     report(0.5)
     if count > MOST_PIECES:
         return None
-    layout = measured(piece, _seen_along(scene.corners, way), np.empty((0, 2)), lit)
+    layout = scaled(measured(piece, _seen_along(scene.corners, way), np.empty((0, 2)), lit), scene)
     density = density_for(layout, texels)
     facet = np.arange(len(piece), dtype=np.int32)
     report(0.8)

@@ -50,6 +50,17 @@ def test_all_lit_surface_has_texels_of_its_own(name: str) -> None:
         assert inside.min() > -1e-9 and (inside < (width + 1e-9, height + 1e-9)).all()
 
 
+def test_materials_have_the_density_they_ask_for() -> None:
+    def texels(scale: float) -> float:
+        materials = [Material("a"), Material("b", lightmap_scale=scale)]
+        charts = charts_of(scene_of([box_room(), shapes.icosphere(0.8, 3)], materials))
+        a, b = charts.face_uv[:, 1] - charts.face_uv[:, 0], charts.face_uv[:, 2] - charts.face_uv[:, 0]
+        of_ball = charts.face_triangle >= len(box_room().triangles)
+        return float(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])[of_ball].sum() / 2 / charts.density**2)
+
+    assert texels(3.0) == pytest.approx(9 * texels(1.0))
+
+
 def test_a_soup_of_loose_triangles_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(coarse, "MOST_PIECES", 5)
     assert coarse_charts(scene_of([box_room()]), 16, 1000, unheard) is None
