@@ -15,6 +15,7 @@ from app.atlas.coarse import coarse_charts
 from app.atlas.options import MAX_TEXELS, AtlasOptions
 from app.atlas.parametrize import check, default_texels
 from app.atlas.visible_mesh import visible_mesh
+from app.errors import UserError
 from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import Array, SolverSpace, TilePool
@@ -177,16 +178,20 @@ def _show_coarse(
     alive: Report,
     show: Callable[[Loaded], None],
 ) -> Loaded | None:
-    """Show a scene in coarse texels, unless it has too many small pieces for that. alive: raises to end the work."""
+    """Show a scene in coarse texels, unless it has too many small pieces for that, or they cannot be had: better ones come all
+    the same. alive: raises to end the work."""
     start = time.perf_counter()
     texels = min(atlas.texels or MAX_TEXELS, default_texels(len(scene.triangles), True))
-    charts = coarse_charts(scene, atlas.tile, texels, alive)
-    if charts is None:
+    try:
+        charts = coarse_charts(scene, atlas.tile, texels, alive)
+        if charts is None:
+            return None
+        alive(0.0)
+        pool, arrays, exposure = _in_texels(scene, charts, options, alive, expose=expose)
+        if rays:
+            tree_of(pool, alive)
+    except (UserError, MemoryError):
         return None
-    alive(0.0)
-    pool, arrays, exposure = _in_texels(scene, charts, options, alive, expose=expose)
-    if rays:
-        tree_of(pool, alive)
     loaded = Loaded(read, pool, arrays, atlas, options, exposure, {"coarse": time.perf_counter() - start})
     show(loaded)
     return loaded

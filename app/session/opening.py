@@ -85,7 +85,7 @@ class Opening:
 
     def part(self, options: Mapping[str, Options]) -> Ready | None:
         """The next part of what was loaded, with the options of its solver; all of it after the last. Of coarse texels, which may
-        come first, ``loading`` goes on. Raises UserError, and ends then."""
+        come first, ``loading`` goes on, also where they do not fit. Raises UserError, and ends then."""
         loading = self.loading
         assert loading is not None
         try:
@@ -105,8 +105,10 @@ class Opening:
             ready: Ready = last.value
             return ready
         except UserError:
-            self.loading = self._parts = None
-            raise
+            self._parts = None
+            if not self._coarse:
+                self.loading = None
+                raise
         return None
 
     def at_once(self, loaded: Loaded, solver_name: str, options: Mapping[str, Options]) -> Ready:

@@ -94,7 +94,7 @@ class Session(EditableScene):
         self.edited: object = None
         self._then_reference: Path | None = None
         self._coarse: Loading | None = None  # of what is open in coarse texels, until it is there in better ones
-        self._remained = math.inf  # of the light to be distributed, when better texels took the place of coarse ones
+        self._remained = math.inf  # of the light to be distributed, in coarse texels, until better ones have caught up
         self.reading = self._reading = Reading()
 
     def follow(self, prepare: Prepare, opened: Opened) -> None:
@@ -147,16 +147,15 @@ class Session(EditableScene):
         try:
             ready = self._opening.part(self._choice.options)
             if ready is not None:
-                self._take_over(ready, loading.version, refined=loading is self._coarse)
-                self._coarse = self.loading
-                if self._coarse is not None:  # what comes is of the same scene
-                    self._coarse.version = Version(self.surfaces, lambda scene: scene, self.read)
+                self._take_over(ready, loading)
         except UserError as error:
             self.message = str(error)
 
-    def _take_over(self, ready: Ready, version: Version | None = None, *, refined: bool = False) -> None:
-        """Put what was opened, or a version of what is open, in its place. refined: whether that is the same, in coarse texels.
+    def _take_over(self, ready: Ready, loading: Loading | None = None) -> None:
+        """Put what was opened, or a version of what is open, in its place. loading: where it was loaded in the background.
         Raises UserError, also where it is open but the solver that has been chosen since cannot be had."""
+        version = None if loading is None else loading.version
+        refined = loading is not None and loading is self._coarse
         loaded, lightmap, solver = ready.loaded, ready.lightmap, ready.solver
         scene, chosen = loaded.pool.scene, self.chosen_solver
         try:
@@ -188,6 +187,9 @@ class Session(EditableScene):
         self.source = self.scene.source or self.scene.name
         self.message = None
         self._opened = True
+        self._coarse = None if loading is None else self.loading
+        if self._coarse is not None:  # what comes is of the same scene
+            self._coarse.version = Version(self.surfaces, lambda scene: scene, self.read)
         reference_gone = self.compared.begin(lightmap, scene)
         self._begin()
         if self._on_open is not None:
@@ -231,8 +233,11 @@ class Session(EditableScene):
     def advance(self, *, fast: bool = False, interactive: bool = False) -> int:
         """As of any solved scene; always fast in coarse texels, for they are not there for long, and in those that take their
         place until as little remains as before."""
-        fast |= self.coarse or self.run.progress.remaining > self._remained
-        return super().advance(fast=fast, interactive=interactive)
+        fast |= self.coarse or self._remained < math.inf
+        issued = super().advance(fast=fast, interactive=interactive)
+        if self.run.converged or self.run.progress.remaining <= self._remained:
+            self._remained = math.inf  # caught up: what follows has the pace that was chosen
+        return issued
 
     @property
     def coarse(self) -> bool:
@@ -296,8 +301,12 @@ class Session(EditableScene):
         light begins again. Raises UserError where its surfaces are ``fixed``, and as ``cut_anew``."""
         if self.fixed is not None:
             raise UserError(f"the surfaces of {self.name} stay as they are: {self.fixed}")
+        self._cut_as_asked(surfaces)
+
+    def _cut_as_asked(self, surfaces: Surfaces, *, afresh: bool = False) -> None:
+        """``_cut`` as finely as it was asked for last."""
         atlas, adaptive = self.asked_cut
-        self._cut(atlas, self.light.replace(adaptive=adaptive), surfaces)
+        self._cut(atlas, self.light.replace(adaptive=adaptive), surfaces, afresh=afresh)
 
     @property
     def asked_surfaces(self) -> Surfaces:
@@ -311,20 +320,21 @@ class Session(EditableScene):
         opens = self._opens(sky, self.edited_scene.lights)
         super().set_sky(sky)
         if opens:
-            self._cut(self.atlas, self.light, self.surfaces, afresh=True)
+            self._cut_as_asked(self.asked_surfaces, afresh=True)
 
     def set_lights(self, lights: tuple[Light, ...]) -> None:
         """Other lamps without area; as another sky, they may have the scene cut anew. Raises UserError as ``set_sky``."""
         opens = self._opens(self.edited_scene.sky, lights)
         super().set_lights(lights)
         if opens:
-            self._cut(self.atlas, self.light, self.surfaces, afresh=True)
+            self._cut_as_asked(self.asked_surfaces, afresh=True)
 
     def _opens(self, sky: Sky | None, lights: tuple[Light, ...]) -> bool:
         """Whether sides that face nothing may be lit by these alone, and were not cut for that. Raises UserError where they
         cannot be now."""
-        closed = not self.edited_scene.open_to_lights and self.charts.dark_faces > 0 and self.loading is None
-        opens = closed and (sky is not None or bool(lights))
+        closed = not self.edited_scene.open_to_lights and self.charts.dark_faces > 0
+        free = self.loading is None or self._next is not None
+        opens = closed and free and (sky is not None or bool(lights))
         if opens and self.fixed is not None:
             raise UserError(f"sides that only it lights would have to be cut: {self.fixed}")
         return opens

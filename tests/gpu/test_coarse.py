@@ -14,10 +14,12 @@ from gl_objects import forgotten, held
 
 from app.atlas import charts_cache
 from app.atlas.options import AtlasOptions
+from app.errors import UserError
 from app.gpu import Gpu
 from app.lightmap.options import LightmapOptions
 from app.scene.load import load_scene
-from app.session import loading
+from app.scene.sky import Sky
+from app.session import loading, opening
 from app.session import session as session_module
 from app.session.session import Session
 from app.session.view import View
@@ -107,6 +109,10 @@ def test_coarse_light_appears_and_gives_way_to_better(view: View, better: thread
     session.set_material_edits({})
     if not adaptive:
         frames(session, lambda: session.run.converged)
+        session.restart()
+        session.poll()
+        assert session.advance() == 1  # no longer, also from the beginning
+        frames(session, lambda: session.run.converged)
         # 10 % of light is not yet shot in either, and 200 texels follow the shadows roughly
         assert mean_irradiance(session) == pytest.approx(coarse, rel=0.1)
 
@@ -166,6 +172,67 @@ def test_stopped_it_stays_in_coarse_texels_and_goes_on(view: View) -> None:
     session.poll()
     assert session.loading is None and not session.coarse and "coarse texels" in str(session.message)
     frames(session, lambda: session.run.converged)
+
+
+def test_coarse_texels_that_do_not_fit_leave_it_to_better_ones(
+    view: View, better: threading.Event, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither where they cannot be made, nor uploaded, nor where the solver chosen meanwhile cannot be had."""
+    session, tried = view.session, []
+
+    def fail(*args: Any, **more: Any) -> Any:
+        tried.append(args)
+        raise UserError("no room")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(loading, "coarse_charts", fail)
+        session.open("furnace")
+        frames(session, lambda: bool(tried))
+        better.set()
+        frames(session, lambda: session.loading is None)
+    assert session.name == "Furnace" and session.message is None
+    better.clear()
+    with monkeypatch.context() as broken:
+        broken.setattr(opening, "Lightmap", fail)
+        session.open("cornell-box")
+        frames(session, lambda: len(tried) == 2)
+        assert session.loading is not None and session.name == "Furnace"
+    better.set()
+    frames(session, lambda: session.loading is None)
+    assert session.name == "Cornell box" and session.message is None
+
+
+def test_edits_stay_where_the_chosen_solver_cannot_be_had(
+    view: View, better: threading.Event, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = view.session
+
+    def fail(name: str) -> None:
+        raise UserError("no room")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(session, "set_solver", fail)
+        session.open("cornell-box")
+        frames(session, lambda: session.opened)
+        assert session.coarse and session.message == "no room"
+    material = dataclasses.replace(session.materials[1], albedo=(0.1, 0.2, 0.7))
+    session.set_material(1, material)
+    better.set()
+    frames(session, lambda: session.loading is None)
+    assert session.materials[1] == material and session.message is None
+
+
+def test_a_sky_over_coarse_texels_has_dark_sides_cut(view: View, better: threading.Event) -> None:
+    session, read = view.session, load_scene("cornell-box")
+    materials = tuple(dataclasses.replace(material, double_sided=True) for material in read.materials)
+    session.open(dataclasses.replace(read, materials=materials))  # type: ignore[arg-type]  # a scene that is read goes, too
+    frames(session, lambda: session.coarse)
+    dark, sky = session.charts.dark_faces, Sky("uniform")
+    session.set_sky(sky)
+    assert dark > 0 and not session.coarse and session.loading is not None
+    better.set()
+    frames(session, lambda: session.loading is None)
+    assert session.charts.dark_faces < dark and session.scene.sky is sky
 
 
 def test_another_scene_may_be_opened_meanwhile(view: View, better: threading.Event) -> None:
