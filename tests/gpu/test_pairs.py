@@ -275,6 +275,12 @@ def test_light_from_outside_is_a_part_of_each_bounce(gpu: Gpu) -> None:
         expected = sum(one.irradiance(at, up) for one in lights) + np.pi * strength * np.array([0.1, 0.2, 0.3])
         np.testing.assert_allclose(floor.bounce(2), expected, rtol=0.02)  # rays start anywhere on texels of 1/8 m
         assert abs(floor.solver.energy().imbalance_share) < 1e-4
+    books = floor.solver.energy()
+    for fewer in (lights[:1], ()):  # the books are those of the last bounce until the next, also where that is restored
+        floor.solver.set_lights(fewer)
+        floor.solver.restore(floor.solver.state())
+        np.testing.assert_array_equal(floor.solver.energy().emitted, books.emitted)
+        np.testing.assert_array_equal(floor.solver.energy().escaped, books.escaped)
     floor.release()
     closed = Solved(gpu, quads_scene(room(), [grey(0.5)]).with_lights((lamp,)), 6.0, senders="all", change=1e-3)
     received = (closed.bounce(12) * closed.area).sum(0)

@@ -21,7 +21,8 @@ Light = F32  # (height, width, 4) of the tile pool: H [stored units], Σ_j F V
 
 
 class Books:
-    """Of one lightmap. received, before: by texels in the last bounce and the one before it, (tiles, t, t, 4)."""
+    """Of one lightmap. received, before: by texels in the last bounce and the one before it, (tiles, t, t, 4). outside: of the
+    last bounce, see Outside.sent: other lamps come into the books with the light that they give."""
 
     def __init__(self, lightmap: Lightmap) -> None:
         self._lightmap = lightmap
@@ -31,10 +32,12 @@ class Books:
         """Nothing has been received."""
         shape = (*self._lightmap.pool.surfaces.face.shape, 4)
         self.received = self.before = np.zeros(shape, np.float32)
+        self.outside = np.zeros((2, 3))
 
-    def enter(self, image: Light) -> None:
-        """What a bounce has come to."""
+    def enter(self, image: Light, outside: F64) -> None:
+        """What a bounce has come to, with this light from outside."""
         self.before, self.received = self.received, self._lightmap.pool.tiles_from_image(image)
+        self.outside = outside
 
     @property
     def _area(self) -> F64:
@@ -64,8 +67,9 @@ class Books:
         lightmap = self._lightmap
         return lightmap.emission() + lightmap.albedo() * light[..., :3].astype(np.float64) * lightmap.unit
 
-    def balance(self, sent: F64, arrived: F64, *, begun: bool) -> EnergyBalance:
-        """Where all light is, RGB [W]. sent, arrived: from outside, and of that on texels; begun: whether there was a bounce."""
+    def balance(self, *, begun: bool) -> EnergyBalance:
+        """Where all light is, RGB [W]. begun: whether there was a bounce."""
+        sent, arrived = self.outside
         lightmap, area = self._lightmap, self._area
         rho = lightmap.albedo().astype(np.float64)
         H, change = (

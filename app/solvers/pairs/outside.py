@@ -14,7 +14,6 @@ import numpy as np
 from app.direct_light.shadow_rays import DirectLight
 from app.gpu import Framebuffer, Gpu, Pass
 from app.lightmap.lightmap import Lightmap
-from app.scene.model import F64
 from app.solvers.pairs.occlusion import Scenes
 from app.util.state import State
 from app.visibility.origins import Origins
@@ -23,7 +22,11 @@ SHADOW_RAYS = 64  # of each texel to each light, or to the sky
 
 
 class Outside:
-    """Of one lightmap. Whoever makes it releases it."""
+    """Of one lightmap. Whoever makes it releases it.
+
+    sent: (2, 3) power that what ``find`` looked at sends out, and that of it which texels receive, RGB [W]; of directions both
+    are what these receive.
+    """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, scenes: Scenes) -> None:
         self._gpu, self._lightmap, self._scenes = gpu, lightmap, scenes
@@ -31,6 +34,7 @@ class Outside:
         self._origins: Origins | None = None
         self._direct: DirectLight | None = None
         self._known = False
+        self.sent = np.zeros((2, 3))
 
     @property
     def _there(self) -> bool:
@@ -43,15 +47,24 @@ class Outside:
 
     def find(self) -> Iterator[None]:
         """Look at what is not known yet, in parts. Raises UserError where there are too many triangles."""
-        if self._known or not self._there:
+        if self._known:
+            return
+        if not self._there:
+            self.sent = np.zeros((2, 3))
             return
         direct, scene = self._made(), self._lightmap.scene
         direct.follow(scene)
         for _ in direct.catch_up(SHADOW_RAYS):
             self._gpu.ctx.finish()
             yield
-        direct.sum(scene)
+        self._sum(direct)
         self._known = True
+
+    def _sum(self, direct: DirectLight) -> None:
+        """Add up what is known. Waits for the GPU."""
+        direct.sum(self._lightmap.scene)
+        afar = direct.from_outside()
+        self.sent = np.stack([afar + self._lightmap.sent_by_points, afar + direct.from_points()])
 
     def _made(self) -> DirectLight:
         if self._direct is None:
@@ -67,15 +80,6 @@ class Outside:
             self._copy.draw(target, textures={"t_source": self._direct.light}, uniforms={"u_offset_px": (0, 0)})
             target.color_mask = (True, True, True, True)
 
-    @property
-    def sent(self) -> tuple[F64, F64]:
-        """Power that is sent out, and that of it which texels receive, RGB [W]: of directions both are what these receive. Waits
-        for the GPU."""
-        if self._direct is None or not self._there:
-            return np.zeros(3), np.zeros(3)
-        afar = self._direct.from_outside()
-        return afar + self._lightmap.sent_by_points, afar + self._direct.from_points()
-
     def state(self) -> State:
         """What shadow rays have found."""
         return State() if self._direct is None or not self._known else self._direct.state()
@@ -86,7 +90,7 @@ class Outside:
         if self._known:
             direct = self._made()
             direct.restore(state, self._lightmap.scene)
-            direct.sum(self._lightmap.scene)
+            self._sum(direct)
 
     def release(self) -> None:
         for part in (self._direct, self._origins):

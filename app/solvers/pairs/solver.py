@@ -96,7 +96,9 @@ class Pairs:
         self._light.reverse()
         self._targets.reverse()
         width, height = self._lightmap.size
-        self._books.enter(np.frombuffer(self._light[0].read(), np.float32).reshape(height, width, 4))
+        self._books.enter(
+            np.frombuffer(self._light[0].read(), np.float32).reshape(height, width, 4), self._outside.sent
+        )
         self.issued += 1
         self._measure()
 
@@ -168,7 +170,7 @@ class Pairs:
     def energy(self) -> EnergyBalance:
         """Where all light is after the last whole bounce, RGB [W]; see books.py."""
         self._finish()
-        return self._books.balance(*self._outside.sent, begun=self.issued > 0)
+        return self._books.balance(begun=self.issued > 0)
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
 
@@ -251,6 +253,7 @@ class Pairs:
         keep(state, received=self._light[0], under_way=self._light[1])
         state.put("outside", self._outside.state())
         state.arrays |= {"before": self._books.before, "books": self._books.received}
+        state.arrays["books_outside"] = self._books.outside
         if self._bounce is not None:
             state.put("bounce", self._bounce.state())
         return state
@@ -260,6 +263,7 @@ class Pairs:
         take_over(state, received=self._light[0], under_way=self._light[1])
         shape = self._books.received.shape
         self._books.before, self._books.received = (state.array(n, np.float32, *shape) for n in ("before", "books"))
+        self._books.outside = state.array("books_outside", np.float64, 2, 3)
         self.issued = int(state.values["issued"])
         self._progress = Progress.of(state.values["progress"])
         self._progress = self._judged(self._progress.remaining)
