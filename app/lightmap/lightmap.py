@@ -108,15 +108,15 @@ class Lightmap(LightTextures):
 
     # -- read-back -----------------------------------------------------------------------------------------------------
 
-    def irradiance(self, *, ambient: bool = False) -> F32:
+    def irradiance(self, *, ambient: bool = False, whole: bool = True) -> F32:
         """H of every tile (tiles, t, t, 3) f32 [W/m²]; ``ambient``: H + a, with what is still to come, see common/ambient.glsl.
-        Waits for the GPU."""
+        whole: see ``refresh_ambient``. Waits for the GPU."""
         H = self.light_of(self._textures["t_irradiance"])
-        return H + self.ambient() if ambient else H
+        return H + self.ambient(whole=whole) if ambient else H
 
-    def ambient(self) -> F32:
+    def ambient(self, *, whole: bool = True) -> F32:
         """a of every tile (tiles, t, t, 3) f32 [W/m²], or of all (3,). Waits for the GPU."""
-        self.refresh_ambient()
+        self.refresh_ambient(whole=whole)
         texture = self._textures["t_ambient"]
         if texture.size != self.size:
             return np.frombuffer(texture.read(), np.float32)[:3] * np.float32(self.unit)

@@ -84,12 +84,13 @@ class LightTextures:
             self.ambient_of(whole, wait)
 
     def hold_ambient(self) -> None:
-        """Have an ambient term of each texel from now on, none yet."""
+        """Have an ambient term of each texel from now on, none yet. Raises GpuError; that of before stays then."""
         if self._textures["t_ambient"].size != self.size:
+            texture = self.gpu.texture(self.size, 4, "f4")
+            target = self.gpu.target(texture)
             self.gpu.release_all(self.ambient_target, self._textures["t_ambient"])
-            self._textures["t_ambient"] = self.gpu.texture(self.size, 4, "f4")
-            self.ambient_target = self.gpu.target(self._textures["t_ambient"])
-            self.ambient_target.clear()
+            self._textures["t_ambient"], self.ambient_target = texture, target
+            target.clear()
 
     @property
     def light_target(self) -> Framebuffer:

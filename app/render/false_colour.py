@@ -75,12 +75,12 @@ def quantity(kind: str, units: str) -> Quantity:
 
 
 def false_colour_scale(
-    display: DisplayOptions, lightmap: Lightmap, offered: Mapping[str, Texture] | None = None
+    display: DisplayOptions, lightmap: Lightmap, offered: Mapping[str, Texture] | None = None, *, whole: bool = True
 ) -> Scale:
     """The scale of the display's false colour, found from the light on what does not emit and rounded to short numbers; only its
     lower end where ``false_colour_max`` gives the upper one. Waits for the GPU. Of errors it is always the same; of counts it
     reaches from 0 to the highest of those that are ``offered``; of texel density it is logarithmic around those that most of the
-    area has."""
+    area has. whole: see ``LightTextures.refresh_ambient``."""
     kind, high, low = measured(display), display.false_colour_max, 0.0
     unit = quantity(kind, display.quantities).unit
     if unit == "%":
@@ -91,7 +91,7 @@ def false_colour_scale(
     if kind == "texel density":
         return _density_scale(lightmap.pool)
     if not high or display.false_colour_log:
-        darkest, brightest = _ends(kind, lightmap, display.quantities)
+        darkest, brightest = _ends(kind, lightmap, display.quantities, whole=whole)
         high = high or _nice_above(brightest)
         if display.false_colour_log:
             fewest, most = DECADES
@@ -106,13 +106,13 @@ def colour_map(count: int) -> F64:
     return np.asarray(np.clip(powers @ VIRIDIS, 0.0, 1.0))
 
 
-def _ends(kind: str, lightmap: Lightmap, units: str) -> tuple[float, float]:
+def _ends(kind: str, lightmap: Lightmap, units: str, *, whole: bool) -> tuple[float, float]:
     """Between which the illuminance or luminance of nearly all that does not emit lies, from an even sample of the
     tiles; unlit texels are left out."""
     pool, sample = lightmap.pool, sampled_tiles(lightmap.pool)
     materials, area = lightmap.scene.materials, pool.surfaces.area[sample]
     emission = sampled_colours(pool, [m.emission for m in materials], pool.emission_tiles, sample)
-    light: F32 = sampled_irradiance(lightmap) * np.float32(value_per_radiance(kind, units) / np.pi)
+    light: F32 = sampled_irradiance(lightmap, whole=whole) * np.float32(value_per_radiance(kind, units) / np.pi)
     if kind == "luminance":
         light = light * sampled_colours(pool, [m.albedo for m in materials], pool.albedo_tiles, sample)
     values = light @ LUMINANCE

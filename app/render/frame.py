@@ -93,7 +93,11 @@ class FrameRenderer:
         kind = measured(display)
         layer = LAYER.get(kind, display.layer)
         scale, samples, add = look.get("scale"), look.get("samples", 1), look.get("add", False)
-        scale = None if kind == "off" or self._linear else scale or false_colour_scale(display, lightmap, offered)
+        whole = look.get("whole", True)
+        if kind == "off" or self._linear:
+            scale = None
+        elif scale is None:
+            scale = false_colour_scale(display, lightmap, offered, whole=whole)
         surfaces = self._surfaces_of(lightmap, display.interpolation)
         if not add:
             self._mean.clear()
@@ -104,7 +108,7 @@ class FrameRenderer:
             scale=scale,
             reference=reference,
             offered=offered,
-            whole=look.get("whole", True),
+            whole=whole,
         ):
             return False
         sky = lightmap.scene.sky if layer == "combined" else None

@@ -29,9 +29,10 @@ def sampled_colours(pool: TilePool, factors: list[RGB], colours: F32 | None, sam
     return out if colours is None else out * colours[sample]
 
 
-def sampled_irradiance(lightmap: Lightmap) -> F32:
-    """H + a of the sampled tiles (tiles, t, t, 3) [W/m²], with what is still to come."""
-    return lightmap.irradiance(ambient=True)[sampled_tiles(lightmap.pool)]
+def sampled_irradiance(lightmap: Lightmap, *, whole: bool) -> F32:
+    """H + a of the sampled tiles (tiles, t, t, 3) [W/m²], with what is still to come. whole: see
+    ``LightTextures.refresh_ambient``."""
+    return lightmap.irradiance(ambient=True, whole=whole)[sampled_tiles(lightmap.pool)]
 
 
 def irradiance_at(lightmap: Lightmap, texels: Texels) -> F32:

@@ -74,6 +74,7 @@ def take_light(session: Session, *, parts: bool = False, look: Mapping[str, Any]
     clock = time.perf_counter()
     lightmap = session.lightmap
     lightmap.refresh_ambient(wait=True)
+    session.run.progress = session.solver.poll()  # which tells where there can be no ambient term
     light = [lightmap.irradiance(ambient=True)]
     if parts:
         light.append(np.clip(lightmap.light_of(session.solver.layers["direct"]), 0, light[0]))

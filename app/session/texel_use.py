@@ -51,14 +51,15 @@ class TexelUse:
     small: float
 
 
-def texel_use(session: Session, irradiance: F32 | None = None) -> tuple[TexelUse, ...]:
+def texel_use(session: Session, irradiance: F32 | None = None, *, whole: bool = True) -> tuple[TexelUse, ...]:
     """Of each material of the open scene, seen from its first camera; of quadtrees, which follow the light, nothing. irradiance:
-    (slots, t, t, 3) [W/m²], where it has been read back already; else it waits for the GPU."""
+    (slots, t, t, 3) [W/m²], where it has been read back already; else it waits for the GPU, see ``Lightmap.irradiance`` for
+    ``whole``."""
     if session.light.adaptive:
         return ()
     pool, camera = session.lightmap.pool, session.scene.cameras[0]
     world_from_camera, yfov = camera.world_from_camera, camera.yfov
-    irradiance = session.lightmap.irradiance(ambient=True) if irradiance is None else irradiance
+    irradiance = session.lightmap.irradiance(ambient=True, whole=whole) if irradiance is None else irradiance
     scene, charts = pool.scene, pool.charts
     face = pool.surfaces.face
     covered = face >= 0

@@ -171,7 +171,7 @@ class View:
 
     def false_colour_scale(self) -> Scale:
         """Of what is shown, which is in false colour. Waits for the GPU."""
-        return false_colour_scale(self.shown, self.session.lightmap, self._offered(whole=False))
+        return false_colour_scale(self.shown, self.session.lightmap, self._offered(whole=False), whole=False)
 
     def _offered(self, *, whole: bool) -> Mapping[str, Texture]:
         """What the layer that is shown needs of the solver, or of seams."""
@@ -238,7 +238,7 @@ class View:
         session = self.session
         still = not session.run.running or session.run.converged
         if still and session.solver.issued > 0 and self._texel_note[0] != session.state:
-            self._texel_note = session.state, texel_note(texel_use(session))
+            self._texel_note = session.state, texel_note(texel_use(session, whole=False))
         return self._texel_note[1] if self._texel_note[0] == session.state else None
 
     # -- what the solver shows of itself -------------------------------------------------------------------------------

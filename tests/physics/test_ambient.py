@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import itertools
+import time
+from dataclasses import replace
 
 import numpy as np
+import pytest
 from solver_scenes import EVERY_LIGHTMAP, Solution, begin, grey, quads_scene, room
 
+from app.errors import UserError
 from app.gpu import Gpu
 from app.scene.model import F64, Scene
 
@@ -47,4 +51,48 @@ def test_all_walls_show_their_light_from_the_first_batch_on(gpu: Gpu, adaptive: 
         np.testing.assert_allclose(now[LIT], late[LIT], rtol=0.4)
         assert now[DARK].max() <= 1e-4 * late[LIT].mean(), "maps leak less through corners"
     np.testing.assert_allclose(pictures[-1][0][LIT], late[LIT], rtol=0.1)  # 3 % are unshot, and those unevenly
+    rooms.release()
+
+
+def test_points_have_fewer_rays_where_a_texture_holds_no_more(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four along an edge, which is where the lightmap itself is as large as a texture may be."""
+    rooms = begin(gpu, two_closed_rooms(), texels=2000)
+    rooms.step(8)
+    rooms.lightmap.refresh_ambient(wait=True)
+    pictures = [shown(rooms)[LIT]]
+    monkeypatch.setattr(gpu, "limits", replace(gpu.limits, max_texture=max(rooms.lightmap.size)))
+    rooms.solver.batch.ambient.resize()
+    rooms.solver.batch.ambient.changed()
+    pictures.append(shown(rooms)[LIT])
+    assert rooms.solver.poll().note is None
+    assert (pictures[1] != pictures[0]).any(), "of other rays"
+    rooms.release()
+    # what 16 rays find is off by 1/4 of how uneven the light is that they see; the mean of many points by less
+    np.testing.assert_allclose(pictures[1], pictures[0], rtol=0.4)
+
+
+def test_a_scene_that_rays_cannot_be_traced_in_shows_what_has_arrived(
+    gpu: Gpu, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.visibility.rays.MAX_FACETS", 3)
+    rooms = begin(gpu, two_closed_rooms(), texels=400)
+    rooms.step(8)
+    assert rooms.solver.poll(wait=True).note is None
+    np.testing.assert_array_equal(shown(rooms), rooms.means(rooms.H))
+    assert "no ambient term is shown: 26 triangles" in (rooms.solver.poll().note or "")
+    rooms.release()
+
+
+def test_a_tree_that_cannot_be_built_in_the_background_is_told(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: object) -> None:
+        raise UserError("not enough memory")
+
+    monkeypatch.setattr("app.solvers.shooting.ambient.tree_is_near", lambda pool: False)
+    monkeypatch.setattr("app.solvers.shooting.ambient.tree_of", none)
+    rooms = begin(gpu, two_closed_rooms(), texels=400)
+    rooms.step(8)
+    end = time.monotonic() + 20
+    while rooms.solver.poll().note is None and time.monotonic() < end:
+        rooms.lightmap.refresh_ambient(whole=False)
+    assert rooms.solver.poll().note == "no ambient term is shown: not enough memory"
     rooms.release()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import write_table
@@ -51,6 +52,7 @@ class Ambient:
         self._points: GatherPoints | None = None  # once it is shown
         self._tree: BackgroundTask[Bvh] | None = None
         self.shown, self.held = shown, False
+        self.note: str | None = None
         self._sweeps, self._next_row = SWEEPS, 0
         lightmap.ambient_of = self.refresh
 
@@ -76,9 +78,13 @@ class Ambient:
     def refresh(self, whole: bool, wait: bool) -> None:
         """Give the lightmap the ambient term of the light as it is; if not ``whole``, RAYS_A_LOOK towards it. wait: for the tree
         that rays walk, without which there is none."""
-        if not self.shown or not self._sweeps or (self.held and not whole):
+        if not self.shown or self.note is not None or not self._sweeps or (self.held and not whole):
             return
-        points = self._points_now(wait)
+        try:
+            points = self._points_now(wait)
+        except UserError as error:
+            self._do_without(error)
+            return
         if points is None:
             return
         self._see_to_come()
@@ -93,14 +99,30 @@ class Ambient:
             self._sweeps -= self._next_row == 0
 
     def _points_now(self, wait: bool) -> GatherPoints | None:
-        """The points; unless ``wait``, none while their tree is built in the background."""
+        """The points; unless ``wait``, none while their tree is built in the background. Raises UserError where there can be
+        none."""
         pool = self._lightmap.pool
         if self._points is None and (wait or tree_is_near(pool)):
-            self._points = GatherPoints(self._gpu, self._lightmap)
             self._lightmap.hold_ambient()
+            self._points = GatherPoints(self._gpu, self._lightmap)
         elif self._points is None and self._tree is None:
             self._tree = BackgroundTask("rays in this scene", lambda tell: tree_of(pool, lambda share: tell("", share)))
+        elif self._points is None and self._tree is not None and self._tree.ended:
+            _ = self._tree.result  # raises why there is none
         return self._points
+
+    def _do_without(self, error: UserError) -> None:
+        """Show none: there cannot be points."""
+        self.note = f"no ambient term is shown: {error}"
+        if self._points is not None:
+            self._points.release()
+            self._points = None
+        self._lightmap.ambient_target.clear()
+
+    @property
+    def memory(self) -> int:
+        """Bytes on the GPU of what gathers it."""
+        return 0 if self._points is None else self._points.memory
 
     def _see_to_come(self) -> None:
         """What lamps and sources outside have yet to give."""
@@ -151,12 +173,15 @@ class Ambient:
         """For a lightmap that has got another number of slots."""
         self.find_lamps()
         if self._points is not None:
-            self._points.resize()
             self._next_row = 0
+            try:
+                self._points.resize()
+            except UserError as error:
+                self._do_without(error)
 
     def show(self, shown: bool) -> None:
         """Show it from now on, or none."""
-        self.shown = shown
+        self.shown, self.note = shown, None
         self.changed()
         if not shown:
             self._lightmap.ambient_target.clear()

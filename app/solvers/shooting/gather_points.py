@@ -8,38 +8,58 @@ from __future__ import annotations
 
 import numpy as np
 
+from app.errors import UserError
 from app.gpu import Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
 from app.solvers.shooting.records import BLOCK_LEVEL
 from app.visibility.rays import RayScene
 
-RAY_EDGE = 12  # squared: rays of a point
+RAY_EDGE = 12  # squared: rays of a point, where a texture holds what they hit of all
 PLACES = "t_position_area", "t_normal_ids"  # of the lightmap
 
 
 class GatherPoints:
-    """Of one lightmap. Whoever makes it releases it."""
+    """Of one lightmap. Whoever makes it releases it. Raises UserError where rays cannot be traced, or memory does not do, as
+    ``resize`` does, too."""
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
         self._gpu, self._lightmap = gpu, lightmap
         self._rays = RayScene(gpu, lightmap.pool)
-        bits, tile, own = (lightmap.defines(name) for name in ("MATERIAL_BITS", "TILE", "ALBEDO_TEXTURE"))
-        block, rays = {"BLOCK_LEVEL": BLOCK_LEVEL}, {"RAY_EDGE": RAY_EDGE}
-        self._trace = Pass(
-            gpu, "solvers/shooting/gather_hits", defines=bits | tile | block | rays | dict(self._rays.defines)
+        self._spread = Pass(
+            gpu,
+            "solvers/shooting/spread_ambient",
+            defines=lightmap.defines("MATERIAL_BITS", "TILE") | {"BLOCK_LEVEL": BLOCK_LEVEL},
         )
-        self._gather = Pass(gpu, "solvers/shooting/gather_ambient", defines=bits | own | block | rays)
-        self._spread = Pass(gpu, "solvers/shooting/spread_ambient", defines=bits | tile | block)
-        self._fit()
+        try:
+            self._fit()
+        except UserError:
+            self._rays.release()
+            raise
 
     def _fit(self) -> None:
         width, height = (edge >> BLOCK_LEVEL for edge in self._lightmap.size)
-        self._hits = self._gpu.texture((width * RAY_EDGE, height * RAY_EDGE), 1, "u4")
+        self._ray_edge = min(RAY_EDGE, self._gpu.limits.max_texture // max(width, height))
+        self._make_passes()
+        self._hits = self._gpu.texture((width * self._ray_edge, height * self._ray_edge), 1, "u4")
         self._hits_target = self._gpu.target(self._hits)
         self._gathered = self._gpu.texture((width, height), 4, "f4")
         self._gathered_target = self._gpu.target(self._gathered)
         self.rows = height
         self.leaves_changed()
+
+    def _make_passes(self) -> None:
+        """Those that know how many rays a point has."""
+        bits, tile, own = (self._lightmap.defines(name) for name in ("MATERIAL_BITS", "TILE", "ALBEDO_TEXTURE"))
+        points = {"BLOCK_LEVEL": BLOCK_LEVEL, "RAY_EDGE": self._ray_edge}
+        traced = bits | tile | points | dict(self._rays.defines)
+        self._trace = Pass(self._gpu, "solvers/shooting/gather_hits", defines=traced)
+        self._gather = Pass(self._gpu, "solvers/shooting/gather_ambient", defines=bits | own | points)
+
+    @property
+    def memory(self) -> int:
+        """Bytes on the GPU."""
+        points = self._gathered.width * self._gathered.height
+        return points * (4 * self._ray_edge**2 + 16) + self._rays.memory
 
     def leaves_changed(self) -> None:
         """Points are elsewhere, and what rays hit is."""
@@ -52,7 +72,7 @@ class GatherPoints:
     def rows_of(self, rays: int) -> int:
         """Rows of points that have about so many rays: whole tiles, one at least."""
         across = self._lightmap.pool.tile >> BLOCK_LEVEL
-        return max(rays // (self._hits.width * RAY_EDGE * across), 1) * across
+        return max(rays // (self._hits.width * self._ray_edge * across), 1) * across
 
     def look(self, to_come: Texture, first: int, rows: int) -> None:
         """Let points in so many rows look around, and the texels there have the ambient light that they find now. to_come: see
@@ -64,7 +84,7 @@ class GatherPoints:
                 self._hits_target,
                 textures=self._rays.textures | lightmap.textures("t_pages", "t_leaves", *PLACES),
                 uniforms=self._rows | self._pages,
-                scissor=_scissor(band, width, RAY_EDGE),
+                scissor=_scissor(band, width, self._ray_edge),
             )
             self._traced[slice(*band)] = True
         self._gather.draw(

@@ -176,6 +176,7 @@ class Shooting:
             self.issued = self._progress.done
         refinement = self.lightmap.refinement
         refining, note = (False, None) if refinement is None else (self._refining, refinement.note)
+        note = note or self.batch.ambient.note
         converged = bool(self._all_shot) and not refining
         leaves = self._leaves.say() if self._leaves is not None and refining else ""
         doing = "" if converged else self.batch.phases.say(self._uneven)
@@ -336,6 +337,8 @@ class Shooting:
             pictures[SIGHT] = self._picture.draw(seen["items"], seen["depth"], self.batch.see.map_size)
             if count := self.vanished():
                 facts["Smaller than a sample"] = f"{count:,} triangles, each drawn as one sample"
+        if memory := self.batch.ambient.memory:
+            facts["Gather points"] = f"{memory / 2**20:.1f} MiB"
         if texel is not None:
             edge = self.patch_edge(texel)
             of_texel["Patch"] = f"{texel[0] // edge}, {texel[1] // edge} of {edge}×{edge} texels"
