@@ -107,7 +107,7 @@ def test_light_that_breaks_is_one_line_and_what_is_there_is_kept(
     line = [kind, "cornell-box", "-o", str(output), "--texels", "2000", "--residual", "1e-9", "--shots", str(shots)]
     assert run([*line, *size]) == 2
     out, err = capsys.readouterr()
-    (said,) = err.splitlines()
+    (said,) = (one for one in err.splitlines() if "note: texels: too few" not in one)
     assert out == "" and "the light is not finite after" in said and str(output) in said
     if kind == "shot":
         assert Image.open(output).size == (64, 48)
