@@ -71,6 +71,14 @@ def test_a_logarithmic_scale_spans_what_is_lit(box: Lightmap) -> None:
     assert 8 <= low <= 12 and 900 <= high <= 1200  # 1 % and 99 % of two decades, rounded outwards to short numbers
 
 
+def test_a_frame_waits_for_no_whole_ambient_term(box: Lightmap, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[bool] = []
+    monkeypatch.setattr(box, "ambient_of", lambda whole, wait: asked.append(whole))
+    for whole in (False, True):
+        false_colour_scale(DisplayOptions(false_colour="illuminance"), box, whole=whole)
+    assert asked == [False, True]
+
+
 def test_scale_and_exposure_come_from_the_light(box: Lightmap) -> None:
     H = (1.0, 2.0, 0.5)
     put(box, "t_irradiance", even(box, H))
