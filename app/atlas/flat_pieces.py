@@ -1,7 +1,8 @@
 """Flat pieces of a scene, and what parts them: where something stands on one that it does not cover.
 
 A foot that ends inside of a piece is drawn on to whatever is next, since a chart would reach around its end. What a body hides by
-standing on a piece (see contacts.py) needs no cut, nor what only touches its rim. Lengths are over the scene's size.
+standing on a piece (see contacts.py) needs no cut, nor what only touches its rim; but a door is thinner than texels may be, which
+would lie on both of its sides, and parts the floor along its middle. Lengths are over the scene's size.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from app.scene.model import F64, I32, Scene
 from app.util.background import Report
 
 MOST_PIECES = 4096  # that are parted, beyond which none is: each takes a millisecond
+THIN, LONG = 0.01, 4  # width of a body that parts what it stands on, as texels of 100,000 in a room; its length over that
 MOST_ENDS = 64  # of feet in one flat piece, that are drawn on: those of grass are not
 
 I64 = NDArray[np.int64]
@@ -66,16 +68,18 @@ def parted_pieces(
         report(0.5 + 0.5 * nth / len(pieces))
         flat = there.ends @ piece.axes
         lines = shapely.linestrings(flat)
-        kept = np.zeros(len(flat), bool)
+        kept, middles = np.zeros(len(flat), bool), [np.empty((0, 2, 2))]
         for back, outside in enumerate((there.front.copy(), there.back & two_sided[nth])):
             if nth in hidden[back]:
+                middles.append(_middles_of_thin(hidden[back][nth], piece.flat))
                 cover = shapely.STRtree(shapely.get_parts(shapely.buffer(hidden[back][nth], NEAR)))
                 outside[cover.query(lines, predicate="covered_by")[0]] = False
             kept |= outside
-        parts, loose = _drawn_on(flat[kept], piece.border)
+        stands = np.concatenate([flat[kept], *middles])
+        parts, loose = _drawn_on(stands, piece.border)
         left += loose
         if len(parts):
-            out.append(dataclasses.replace(piece, stands=flat[kept], parts=parts))
+            out.append(dataclasses.replace(piece, stands=stands, parts=parts))
     return out, left
 
 
@@ -99,6 +103,23 @@ def _piece(corners: F64, members: I64) -> Piece:
     polygons = shapely.polygons(_on_grid(flat))
     whole = polygons[0] if len(polygons) == 1 else shapely.union_all(polygons, grid_size=FLAT)
     return Piece(members, flat, axes, shapely.boundary(whole), *np.empty((2, 0, 2, 2)))
+
+
+def _middles_of_thin(hidden: shapely.Geometry, flat: F64) -> F64:
+    """Segments (n, 2, 2) along the middle of what is thin and long of what bodies hide of triangles (t, 3, 2)."""
+    thick = shapely.buffer(shapely.buffer(hidden, -0.5 * THIN), 0.5 * THIN + NEAR, join_style="mitre")
+    boxes = shapely.oriented_envelope(shapely.get_parts(shapely.difference(hidden, thick)))
+    boxes = boxes[shapely.area(boxes) > 0]
+    rings = shapely.get_coordinates(shapely.get_exterior_ring(boxes)).reshape(-1, 5, 2)
+    sides = np.linalg.norm(np.diff(rings[:, :3], axis=1), axis=2)  # (n, 2)
+    rings = np.where((sides[:, 0] < sides[:, 1])[:, None, None], rings[:, :4], rings[:, 1:])  # a short side first
+    long = (sides.min(1) < THIN) & (sides.max(1) > LONG * sides.min(1))
+    if not long.any():
+        return np.empty((0, 2, 2))
+    middles = np.stack([rings[:, :2].mean(1), rings[:, 2:4].mean(1)], axis=1)[long]
+    whole = shapely.union_all(shapely.polygons(_on_grid(flat)), grid_size=FLAT)
+    lines = shapely.get_parts(shapely.intersection(shapely.linestrings(middles), whole))
+    return shapely.get_coordinates(lines[shapely.length(lines) > NEAR]).reshape(-1, 2, 2)
 
 
 def axes_of(corners: F64) -> F64:

@@ -120,6 +120,19 @@ def test_a_foot_that_ends_in_the_middle_is_drawn_on() -> None:
     assert on_one_side(spans(*charts_of(scene_of(screen)), 0)[:2], 1.0)
 
 
+def test_a_thin_door_parts_the_floor_along_its_middle() -> None:
+    """Which it hides: a texel wider than the door would have both of its sides."""
+    door = box((0.99, 0.0, 0.3), (1.01, 0.8, 0.8))
+    scene = scene_of(*door)
+    cut, charts = charts_of(scene)
+    assert cut.normals_areas[1].sum() == pytest.approx(scene.normals_areas[1].sum(), rel=1e-9)
+    floor = (cut.corners[charts.face_triangle, :, 1] < 1e-9).all(1) & (charts.face_chart >= 0)
+    beside = cut.corners[charts.face_triangle, :, 0]
+    for chart in np.unique(charts.face_chart[floor]):
+        mine = beside[(charts.face_chart == chart) & floor]
+        assert mine.max() <= 1.0 + 1e-5 or mine.min() >= 1.0 - 1e-5
+
+
 def test_grass_does_not_shred_a_floor(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(flat_pieces, "MOST_ENDS", 5)
     blades = [[(x, 0, 0.3), (x, 0.2, 0.3), (x, 0.2, 0.4), (x, 0, 0.4)] for x in (0.5, 1.0, 1.5)]
