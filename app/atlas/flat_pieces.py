@@ -21,7 +21,8 @@ from app.scene.model import F64, I32, Scene
 from app.util.background import Report
 
 MOST_PIECES = 4096  # that are parted, beyond which none is: each takes a millisecond
-THIN, LONG = 0.01, 4  # width of a body that parts what it stands on, as texels of 100,000 in a room; its length over that
+THIN = 0.01  # width of a body that parts what it stands on along its middle: a texel's, of some 50,000 in a room
+LONG = 4  # its length, over that
 MOST_ENDS = 64  # of feet in one flat piece, that are drawn on: those of grass are not
 
 I64 = NDArray[np.int64]
@@ -119,7 +120,7 @@ def _middles_of_thin(hidden: shapely.Geometry, flat: F64) -> F64:
     middles = np.stack([rings[:, :2].mean(1), rings[:, 2:4].mean(1)], axis=1)[long]
     whole = shapely.union_all(shapely.polygons(_on_grid(flat)), grid_size=FLAT)
     lines = shapely.get_parts(shapely.intersection(shapely.linestrings(middles), whole))
-    return shapely.get_coordinates(lines[shapely.length(lines) > NEAR]).reshape(-1, 2, 2)
+    return np.reshape(shapely.get_coordinates(lines[shapely.length(lines) > NEAR]), (-1, 2, 2))
 
 
 def axes_of(corners: F64) -> F64:

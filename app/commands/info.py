@@ -32,6 +32,7 @@ from app.util.background import Progress, Report
 from app.util.console import Console
 
 SURFACE_BYTES = 24  # per texel: position and area, normal and ids
+AMBIENT_BYTES = 16  # per texel, of what is shown beside H while it is shot
 TEXTURE_BYTES = 8  # per texel, for albedo and for emission
 FACET_ENTRY_BYTES = 16  # two of them per facet
 PAGE_BYTES = 4  # per cell of tile×tile texels of the atlas
@@ -164,7 +165,7 @@ def _memory(charts: Charts, slots: int, depth: int, storage: str, textures: int)
 
 def _texel_bytes(storage: str, textures: int) -> int:
     light = 2 * 4 * int(STORAGE[storage][1:])  # H and r, four channels of f4, f2 or f1
-    return SURFACE_BYTES + light + TEXTURE_BYTES * textures
+    return SURFACE_BYTES + light + AMBIENT_BYTES + TEXTURE_BYTES * textures
 
 
 def _whole_rows(entry_bytes: int, entries: int) -> int:
