@@ -24,7 +24,7 @@ from app.visibility.bvh import Bvh
 from app.visibility.rays import tree_is_near, tree_of
 
 SWEEPS = 6  # looks of each point until nothing changes: as many reflections
-RAYS_A_LOOK = 1 << 16  # of one frame, where not all must be
+RAYS_A_LOOK = 1 << 15  # of one frame, where not all must be
 TRACING = 4  # times as long as to look up what a ray hit
 
 
