@@ -79,3 +79,13 @@ class Charts:
     @property
     def facet_count(self) -> int:
         return int(self.face_facet.max(initial=-1)) + 1
+
+
+def corner_places(charts: Charts, count: int) -> NDArray[np.float64]:
+    """(count, 3, 4): of each corner of the scene's triangles the place in the virtual atlas [texels of level 0] on the front
+    (u, v) and on the back (u, v), -1 where a side has no texels."""
+    places = np.full((count, 3, 4), -1.0)
+    for back in (False, True):
+        mine = charts.face_back == back
+        places[charts.face_triangle[mine], :, 2 * back : 2 * back + 2] = charts.face_uv[mine]
+    return places

@@ -1,4 +1,5 @@
-"""The triangles of a scene as they are drawn: corners shared, and where there are many, cut by place into clusters.
+"""The triangles of a scene as they are drawn: divided at T-junctions, corners shared, and where there are many, cut by place into
+clusters.
 
 Clusters that a view does not see are left out, and the others come from near to far, so that what is hidden costs no shading.
 Where two faces lie in one plane, a depth test shows the one that was drawn first: triangles that overlap another one of their
@@ -12,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import Charts
+from app.atlas.charts import Charts, corner_places
 from app.atlas.sides import least, middle, most
-from app.scene.model import F64, Scene
+from app.atlas.t_junctions import Divided, Floats, at_corners, without_t_junctions
+from app.scene.model import F32, F64, Scene
 
 Array = NDArray[np.generic]
 Ints = NDArray[np.int64]
@@ -66,22 +68,37 @@ class Clusters:
 
 @dataclass(frozen=True, eq=False)
 class VisibleMesh:
-    """vertices: (v,) VERTEX; corners: (n, 3) u32, its rows the triangles in drawing order; triangle: (n,) of the scene, of each
-    row; clusters: None where there are few triangles."""
+    """vertices: (v,) VERTEX; corners: (n, 3) u32, its rows the triangles in drawing order; triangle: (n,) of the scene, of which
+    each row is one or a part; weights (n, 3, 3): of that one's corners at each corner of the row, None where none was divided;
+    clusters: None where there are few triangles."""
 
     vertices: Array
     corners: NDArray[np.uint32]
     triangle: Ints
+    weights: F64 | None
     clusters: Clusters | None
+
+    def rows_of(self, triangles: Ints) -> tuple[Ints, Ints]:
+        """The rows of some triangles of the scene, in their order; and the place of the triangle of each among these."""
+        order = np.argsort(self.triangle, kind="stable")
+        begin, end = (np.searchsorted(self.triangle[order], triangles, side) for side in ("left", "right"))
+        which = np.repeat(np.arange(len(triangles)), end - begin)
+        nth = np.arange(len(which)) - np.repeat(np.cumsum(end - begin) - (end - begin), end - begin)
+        return order[begin[which] + nth], which
+
+    def at_corners(self, rows: Ints, values: Floats) -> Floats:
+        """(k, 3, c) of values (triangles, 3, c) at corners of the scene's triangles, at those of rows (k,)."""
+        return at_corners(values[self.triangle[rows]], None if self.weights is None else self.weights[rows])
 
 
 def visible_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
     """local (positions, 3): of the scene, solver space."""
-    vertices, corners = _shared_vertices(scene, charts, local)
-    count = len(corners)
+    divided, places = _divided(local[scene.triangles])
+    vertices, corners = _shared_vertices(scene, charts, places, divided)
+    count, weights = len(corners), divided.weights
     if count < CLUSTERED:
-        return VisibleMesh(vertices, corners, np.arange(count), None)
-    points = local[scene.triangles]
+        return VisibleMesh(vertices, corners, divided.parent, weights, None)
+    points = places[divided.corners].astype(np.float64)
     fixed = _overlaps_in_plane(points)
     cluster = np.empty(count, np.int64)
     for mine, order in ((fixed, np.arange(fixed.sum())), (~fixed, _morton_order(middle(points[~fixed])))):
@@ -95,28 +112,40 @@ def visible_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
         first=np.r_[first, count],
         fixed=int(is_fixed[first].sum()),
     )
-    return VisibleMesh(vertices, corners[order], order, clusters)
+    return VisibleMesh(
+        vertices, corners[order], divided.parent[order], None if weights is None else weights[order], clusters
+    )
 
 
-def _shared_vertices(scene: Scene, charts: Charts, local: F64) -> tuple[Array, NDArray[np.uint32]]:
+def _divided(places: F64) -> tuple[Divided, F32]:
+    """Triangles (m, 3, 3) divided at T-junctions; where the points are that their corners are, as the GPU holds them."""
+    rounded = places.astype(np.float32) + np.float32(0)  # no -0, which is another word than 0
+    number = _told_apart(np.zeros(3 * len(places), np.uint64), rounded.reshape(-1, 3).view(np.uint32))
+    _, example = np.unique(number, return_index=True)
+    points = rounded.reshape(-1, 3)[example]
+    return without_t_junctions(points.astype(np.float64), number.astype(np.int64).reshape(-1, 3)), points
+
+
+def _shared_vertices(scene: Scene, charts: Charts, points: F32, divided: Divided) -> tuple[Array, NDArray[np.uint32]]:
     """One vertex for all corners that are alike: position, atlas texel of front and back, -1 without a chart, material."""
-    count = len(scene.triangles)
-    data = np.zeros((count, 3), VERTEX)
-    data["in_position"] = local[scene.triangles]
-    data["in_uv_front"] = data["in_uv_back"] = -1.0
-    for side, uv in enumerate(("in_uv_front", "in_uv_back")):
-        faces = np.flatnonzero(charts.face_back == bool(side))
-        data[uv][charts.face_triangle[faces]] = charts.face_uv[faces]
-    data["in_material"] = scene.material_ids[:, None]
+    data = np.zeros((len(divided.parent), 3), VERTEX)
+    data["in_position"] = points[divided.corners]
+    places = at_corners(corner_places(charts, len(scene.triangles))[divided.parent], divided.weights)
+    data["in_uv_front"], data["in_uv_back"] = places[..., :2], places[..., 2:]
+    data["in_material"] = scene.material_ids[divided.parent, None]
     flat = data.reshape(-1)
-    # Number what has been told apart so far together with one more property, in turn: numbers stay below 2³²
-    number = np.zeros(3 * count, np.uint64)
-    for name, more in (("in_position", 3), ("in_uv_front", 2), ("in_uv_back", 2), ("in_material", 1)):
-        words = np.ascontiguousarray(flat[name]).view(np.uint32).reshape(-1, more)
-        for word in words.T:
-            number = _numbers(number << np.uint64(32) | word)
+    number = divided.corners.reshape(-1).astype(np.uint64)
+    for name, more in (("in_uv_front", 2), ("in_uv_back", 2), ("in_material", 1)):
+        number = _told_apart(number, np.ascontiguousarray(flat[name]).view(np.uint32).reshape(-1, more))
     _, example = np.unique(number, return_index=True)
     return flat[example], number.reshape(-1, 3).astype(np.uint32)
+
+
+def _told_apart(number: NDArray[np.uint64], words: NDArray[np.uint32]) -> NDArray[np.uint64]:
+    """Numbers, from 0, that are equal where those given and words (n, k) are. In turn: numbers stay below 2³²."""
+    for word in words.T:
+        number = _numbers(number << np.uint64(32) | word)
+    return number
 
 
 def _numbers(values: NDArray[np.uint64]) -> NDArray[np.uint64]:

@@ -28,15 +28,14 @@ class SheerMesh:
         self._gpu, self.triangles = gpu, triangles
         self._table = Sheer(gpu, pool, triangles)
         drawn = pool.visible_mesh
-        row_of = np.empty(len(drawn.triangle), np.int64)
-        row_of[drawn.triangle] = np.arange(len(drawn.triangle))
-        vertices: Any = np.zeros((len(triangles), 3), SHEER_VERTEX)
-        shared: Any = drawn.vertices[drawn.corners[row_of[triangles]]]
+        rows, which = drawn.rows_of(triangles)
+        vertices: Any = np.zeros((len(rows), 3), SHEER_VERTEX)
+        shared: Any = drawn.vertices[drawn.corners[rows]]
         for name in VERTEX_FORMAT:
             vertices[name] = shared[name]
-        vertices["in_row"] = np.arange(len(triangles))[:, None]
+        vertices["in_row"] = which[:, None]
         has_cutoff = np.array([m.opacity_cutoff is not None for m in pool.scene.materials])
-        cut = has_cutoff[pool.scene.material_ids[triangles]]
+        cut = has_cutoff[pool.scene.material_ids[triangles[which]]]
         self.cut_out = self._mesh(vertices[cut])
         self.blended = self._mesh(vertices[~cut])
         self._centre = vertices["in_position"][~cut].mean(1).astype(np.float64)

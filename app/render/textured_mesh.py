@@ -31,32 +31,33 @@ class TexturedMesh:
         self._gpu = gpu
         self._pictures: dict[tuple[object, ...], Texture] = {}
         drawn = pool.visible_mesh
-        row_of = np.empty(len(drawn.triangle), np.int64)
-        row_of[drawn.triangle] = np.arange(len(drawn.triangle))
         self.batches: list[tuple[int, Mesh, dict[str, Texture]]] = []
         for number in materials:
             triangles = np.flatnonzero(pool.scene.material_ids == number)
-            vertices: Any = np.zeros((len(triangles), 3), TEXTURED)
-            shared: Any = drawn.vertices[drawn.corners[row_of[triangles]]]
+            rows, _ = drawn.rows_of(triangles)
+            vertices: Any = np.zeros((len(rows), 3), TEXTURED)
+            shared: Any = drawn.vertices[drawn.corners[rows]]
             for name in VERTEX_FORMAT:
                 vertices[name] = shared[name]
-            vertices["in_colour"] = 1.0 if pool.scene.colours is None else pool.scene.colours[triangles]
+            colours = pool.scene.colours
+            vertices["in_colour"] = 1.0 if colours is None else drawn.at_corners(rows, colours)
             pictures = {}
             for kind, name in KINDS.items():
-                pictures[name] = self._fill(vertices, pool.scene, triangles, kind)
+                pictures[name] = self._fill(vertices, pool, rows, kind)
             order = np.arange(vertices.size, dtype=np.uint32)
             mesh = Mesh(gpu, vertices.tobytes(), TEXTURED_FORMAT, indices=order.tobytes())
             self.batches.append((number, mesh, pictures))
 
-    def _fill(self, vertices: Any, scene: Scene, triangles: NDArray[np.int64], kind: str) -> Texture:
+    def _fill(self, vertices: Any, pool: TilePool, rows: NDArray[np.int64], kind: str) -> Texture:
         """Write where in the texture of this kind the corners lie; the texture, of one white pixel where there is none."""
-        material = scene.materials[scene.material_ids[triangles[0]]]
+        scene, drawn = pool.scene, pool.visible_mesh
+        material = scene.materials[scene.material_ids[drawn.triangle[rows[0]]]]
         picture: Picture | None = getattr(material, f"{kind}_texture")
         coordinates = None if picture is None else texture_coordinates(scene, picture)
         if picture is None or coordinates is None:
             return self._uploaded(np.ones((1, 1, 3), np.float32), ("repeat", "repeat"), bilinear=True, key=())
         mirrors = np.array([2 if wrap == "mirror" else 1 for wrap in picture.wrap])
-        vertices[f"in_{kind}_uv"] = coordinates[triangles] / mirrors
+        vertices[f"in_{kind}_uv"] = drawn.at_corners(rows, coordinates) / mirrors
         key = id(picture.pixels), picture.wrap, picture.bilinear
         return self._uploaded(picture.pixels, picture.wrap, bilinear=picture.bilinear, key=key)
 

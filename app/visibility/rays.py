@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from app.atlas.charts import corner_places
 from app.errors import UserError
 from app.gpu import Gpu, Texture, glsl_constant
 from app.lightmap.textures import BYTES
@@ -122,13 +122,8 @@ def corners_of(pool: TilePool) -> F64:
 
 
 def places_of(pool: TilePool) -> F32:
-    """(n, 3, 4): of each triangle's corners the place in the virtual atlas [texels of level 0] on the front (u, v) and on the
-    back (u, v), -1 where a side has no texels."""
-    drawn = pool.visible_mesh
-    places = np.empty((len(drawn.corners), 3, 4), np.float32)
-    vertices: Any = drawn.vertices[drawn.corners]
-    places[drawn.triangle, :, :2], places[drawn.triangle, :, 2:] = vertices["in_uv_front"], vertices["in_uv_back"]
-    return places
+    """(n, 3, 4): see corner_places, of the scene's triangles."""
+    return corner_places(pool.charts, len(pool.scene.triangles)).astype(np.float32)
 
 
 def _uploaded(gpu: Gpu, table: F32 | Words) -> Texture:

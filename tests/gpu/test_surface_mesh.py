@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from pictures import framing
+from solver_scenes import grey, quads_scene
 
 import app.atlas.visible_mesh
 from app.atlas.parametrize import parametrize
@@ -22,6 +23,16 @@ from app.scene.model import F64, Material, Scene
 
 SIZE = (160, 120)
 ALBEDO = DisplayOptions(layer="albedo", interpolation="nearest", tone_map="clamp")
+
+# Of a room 2 × 1 × 3: origin and two edges each
+SIDES = [
+    ((0, 0, 0), (0, 0, 3), (2, 0, 0)),
+    ((0, 1, 0), (2, 0, 0), (0, 0, 3)),
+    ((0, 0, 0), (2, 0, 0), (0, 1, 0)),
+    ((2, 0, 0), (0, 0, 3), (0, 1, 0)),
+    ((2, 0, 3), (-2, 0, 0), (0, 1, 0)),
+    ((0, 0, 3), (0, 0, -3), (0, 1, 0)),
+]
 
 
 def boxes() -> Scene:
@@ -163,6 +174,26 @@ def test_as_many_clusters_but_others(
                 assert (cut == whole).all()
             compared += 1
     assert compared > 2
+
+
+def test_no_background_is_seen_through_a_closed_room(gpu: Gpu, viewers: tuple[Viewer, Viewer]) -> None:
+    """Whose walls have other corners along their edges than its floor has."""
+    quads = []
+    for nth, (origin, u, v) in enumerate(np.array(SIDES, np.float64)):
+        across, up = (1, 1) if nth == 0 else (4 + nth, 2)
+        cells = [(origin + u * i / across + v * k / up, u / across, v / up) for i in range(across) for k in range(up)]
+        quads += [(at, at + a, at + a + b, at + b) for at, a, b in cells]
+    scene = quads_scene(quads, [grey(1.0, double_sided=True)], [0] * len(quads))
+    lightmap = Lightmap.of(gpu, scene, parametrize(scene, texels=4000))
+    holes = 0
+    for k in range(24):
+        view = CameraView(np.eye(4), 1.6, 1.0)
+        view.world_from_camera[:3, 3] = (1.1, 0.6, 1.4)
+        view.orbit(0.27 * k, 0.2 * (k % 3 - 1))
+        view.world_from_camera[:3, 3] = (1.1, 0.6, 1.4)
+        holes += int((viewers[0].picture(lightmap, view)[..., :3] < 250).any(-1).sum())
+    lightmap.release()
+    assert holes == 0
 
 
 def test_a_view_of_nothing(lightmaps: tuple[Lightmap, Lightmap], viewers: tuple[Viewer, Viewer], scene: Scene) -> None:

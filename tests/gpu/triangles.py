@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.visible_mesh import VERTEX
 from app.bench.speed.ray_batch import RayBatch
 from app.gpu import Gpu
 from app.lightmap.tile_pool import SolverSpace
@@ -28,13 +27,13 @@ def bare_pool(positions: F64, triangles: NDArray[np.integer]) -> Any:
     """As much of a tile pool as rays ask for; no side has texels."""
     corners = positions[triangles].reshape(-1, 3)
     space = SolverSpace.of(SimpleNamespace(bounds=(corners.min(0), corners.max(0))))  # type: ignore[arg-type]
-    vertices = np.zeros(3 * len(triangles), VERTEX)
-    vertices["in_uv_front"] = vertices["in_uv_back"] = -1.0
     count = len(triangles)
-    mesh = SimpleNamespace(vertices=vertices, corners=np.arange(3 * count).reshape(-1, 3), triangle=np.arange(count))
+    charts = SimpleNamespace(
+        face_triangle=np.empty(0, np.int32), face_back=np.empty(0, bool), face_uv=np.empty((0, 3, 2))
+    )
     material = {"materials": (Material("grey"),), "material_ids": np.zeros(count, np.int32)}
     return BarePool(
-        space=space, scene=SimpleNamespace(positions=positions, triangles=triangles, **material), visible_mesh=mesh
+        space=space, scene=SimpleNamespace(positions=positions, triangles=triangles, **material), charts=charts
     )
 
 

@@ -168,7 +168,44 @@ def test_small_scenes_have_no_clusters() -> None:
         scene = load_scene(name)
         drawn = visible_mesh(scene, parametrize(scene, texels=4000), scene.positions)
         assert drawn.clusters is None
-        assert (drawn.triangle == np.arange(len(scene.triangles))).all()
+        assert (np.diff(drawn.triangle) >= 0).all() and (
+            np.unique(drawn.triangle) == np.arange(len(scene.triangles))
+        ).all()
+
+
+@pytest.mark.parametrize("clustered", [False, True])
+def test_triangles_are_divided_where_corners_lie_on_their_edges(
+    monkeypatch: pytest.MonkeyPatch, clustered: bool
+) -> None:
+    """A floor of one quad beside one of 5 × 3: 4 corners on the common edge. Its parts make it whole, wherever corners lie in the
+    atlas."""
+    if clustered:
+        monkeypatch.setattr(app.atlas.visible_mesh, "CLUSTERED", 0)
+    whole, strips = (
+        shapes.quad((0, 0, 0), (0, 0, 1), (1, 0, 0)),
+        split_grid(shapes.quad((0, 0, 0), (-1, 0, 0), (0, 0, 1)), 3, 5),
+    )
+    scene = moved(scene_of([whole, strips], [Material("floor", double_sided=True)]), TURN)
+    drawn = visible_mesh(
+        scene, parametrize(scene, texels=4000), SolverSpace.of(scene).local_from_world(scene.positions)
+    )
+    corners = drawn.vertices[drawn.corners]
+    rows, which = drawn.rows_of(np.array([1, 0, 7]))
+    assert (
+        np.bincount(which).tolist() in ([5, 1, 1], [1, 5, 1])
+        and (drawn.triangle[rows] == np.array([1, 0, 7])[which]).all()
+    )
+    assert len(drawn.corners) == len(scene.triangles) + 4
+    for name in ("in_position", "in_uv_front", "in_uv_back"):
+        edges = (corners[name][:, 1:] - corners[name][:, :1]).astype(np.float64)
+        area = np.sqrt(np.linalg.det(edges @ edges.swapaxes(1, 2)))
+        of_triangles = np.bincount(drawn.triangle, area)
+        assert of_triangles[:2] == pytest.approx(area.sum() / 4, rel=1e-5)
+    edge = np.sort(drawn.corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2))
+    assert (np.unique(edge, axis=0, return_counts=True)[1] <= 2).all()
+    assert drawn.at_corners(rows, scene.positions[scene.triangles]) == pytest.approx(
+        SolverSpace.of(scene).world_from_local(corners["in_position"][rows].astype(np.float64)), abs=1e-6
+    )
 
 
 def test_clusters_are_small(monkeypatch: pytest.MonkeyPatch) -> None:
