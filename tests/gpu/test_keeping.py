@@ -1,106 +1,26 @@
-"""Sessions are saved and opened again: edits, settings, camera and light; what a crash would lose is put aside."""
+"""Sessions are saved and opened again: edits, settings, camera and light."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
-import shutil
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from places import Place, copied, edit, emitters, place, settle
 
-from app.atlas.options import AtlasOptions
 from app.bake.sky_file import write_sky
 from app.errors import UserError
-from app.gpu import Gpu
 from app.scene.area_lamps import Surfaces
-from app.scene.library import scene_path
 from app.scene.lights import Light
 from app.scene.load import load_scene
 from app.scene.sky import Sky
 from app.scene.sky_image import read_sky_image
-from app.session import keeping as module
 from app.session.baking import DONE, SOLVING, Baking, Order
-from app.session.keeping import Keeping, check_session, drop
-from app.session.session import Session
-from app.session.view import View
 from app.ui import area_edits, new_lamps
-from app.ui import settings as ui_settings
-from app.ui.state import State
-from app.util.state_file import read_state, write_state
 
-PATIENCE = 60.0  # s
-
-
-class Place:
-    """A view with its keeping, and frames."""
-
-    def __init__(self, gpu: Gpu, folder: Path | None = None) -> None:
-        self.session = Session(gpu, atlas=AtlasOptions(texels=2000))
-        self.view = View(self.session)
-        self.state = State()
-        self.state.keeping = self.keeping = Keeping(folder, ui_settings.KNOWN)
-        self.notes: list[str] = []
-
-    def frame(self) -> None:
-        self.session.poll()
-        self.notes += self.keeping.poll(self.view, self.tables, lambda s: ui_settings.put(self.view, self.state, s))
-
-    def tables(self) -> dict:
-        return ui_settings.tables(self.view, self.state)
-
-    def frames_until(self, there: Callable[[], bool]) -> None:
-        end = time.monotonic() + PATIENCE
-        while not there():
-            assert time.monotonic() < end, self.session.message
-            self.frame()
-            time.sleep(0.001)
-
-    def open(self, path: Path | str) -> Place:
-        if Path(path).suffix == ".glow":
-            self.keeping.open(self.view, Path(path))
-        else:
-            self.session.open(path)
-        self.frames_until(lambda: self.session.on_its_way is None)
-        self.frame()
-        return self
-
-    def save(self, path: Path) -> Path:
-        self.keeping.save(self.view, path, self.tables())
-        return self.keeping.path
-
-    def release(self) -> None:
-        self.view.release()
-        self.session.release()
-
-
-@pytest.fixture
-def place(gpu: Gpu) -> Iterator[Callable[..., Place]]:
-    made: list[Place] = []
-
-    def make(folder: Path | None = None) -> Place:
-        made.append(Place(gpu, folder))
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.release()
-
-
-def edit(place: Place) -> None:
-    """Something of each kind."""
-    session, view = place.session, place.view
-    session.set_material(1, dataclasses.replace(session.materials[1], albedo=(0.1, 0.2, 0.3)))
-    session.set_lights((Light("bulb", intensity=(1.0, 0.5, 0.25), position=(0.1, 0.2, 0.3)),))
-    session.set_options(session.options.replace(residual=0.05))
-    place.state.pace = place.state.pace.replace(pace="fast")
-    view.display = view.display.replace(exposure=1.5)
-    view.camera.orbit(0.3, 0.1)
-    view.bookmarks[4] = view.camera.copy()
-    view.camera.dolly(0.5)
+__all__ = ["place"]
 
 
 @pytest.mark.parametrize("solver", ["shooting", "gathering"])
@@ -144,11 +64,6 @@ def test_a_session_without_work_is_solved_anew(place: Callable[..., Place], tmp_
     assert second.session.materials[1].albedo == (0.1, 0.2, 0.3)
 
 
-def copied(folder: Path) -> Path:
-    folder.mkdir(exist_ok=True)
-    return Path(shutil.copy(scene_path("cornell-box"), folder / "room.toml"))
-
-
 def test_a_folder_that_was_moved_keeps_its_session(place: Callable[..., Place], tmp_path: Path) -> None:
     first = place().open(copied(tmp_path / "old"))
     edit(first)
@@ -178,14 +93,6 @@ def test_edits_find_their_materials_in_a_scene_that_has_changed(place: Callable[
     changed, lost, light = second.notes
     assert "room.toml has changed" in changed and "no green any more" in lost and "another scene" in light
     assert second.session.solver.issued == 0
-
-
-def emitters(place: Place) -> list[int]:
-    return [index for index in np.unique(place.session.scene.material_ids) if place.session.materials[index].emits]
-
-
-def settle(place: Place) -> None:
-    place.frames_until(lambda: place.session.on_its_way is None)
 
 
 def test_lamps_with_area_come_back_with_their_light(place: Callable[..., Place], tmp_path: Path) -> None:
@@ -352,114 +259,3 @@ def test_a_failed_scene_leaves_all_as_it_was(place: Callable[..., Place], tmp_pa
     open_now = two.session.unedited
     two.open(tmp_path / "a.glow")
     assert two.session.unedited is open_now and two.keeping.path is None and "not TOML" in (two.session.message or "")
-
-
-# -- files that are none -----------------------------------------------------------------------------------------------
-
-
-BAD = {
-    "camera": {"world_from_camera": [[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], "yfov": 1, "distance": 1},
-    "materials": [{"name": "x", "index": 0, "albedo": [2, 0, 0]}],
-    "lights": [{"name": "x"}],
-    "bookmarks": {"12": {}},
-    "settings": {"gathering": {"noize": 1}},
-    "scene": {"source": 3},
-    "sky": {"kind": "clear", "colour": [1, 1, 1], "strength": 1, "turbidity": 3},
-    "more": 1,
-}
-
-
-@pytest.mark.parametrize("key", BAD)
-def test_malformed_documents_are_one_line(place: Callable[..., Place], tmp_path: Path, key: str) -> None:
-    one = place().open("cornell-box")
-    file = one.save(tmp_path / "a.glow")
-    state = read_state(file)
-    document = json.loads(state.values["document"])
-    state.values["document"] = json.dumps(document | {key: BAD[key]})
-    write_state(file, state)
-    before = one.session.unedited
-    with pytest.raises(UserError) as caught:
-        one.keeping.open(one.view, file)
-    (line,) = str(caught.value).splitlines()
-    assert line.startswith(f"{file}: ") and key in line and len(line) < 300
-    assert one.session.loading is None and one.session.unedited is before
-
-
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"{}", 4096 * b"\xff"])
-def test_what_is_no_session_is_one_line(tmp_path: Path, content: bytes) -> None:
-    file = tmp_path / "a.glow"
-    file.write_bytes(content)
-    with pytest.raises(UserError) as caught:
-        check_session(file)
-    (line,) = str(caught.value).splitlines()
-    assert line.startswith(f"{file}: ")
-
-
-def test_a_file_cut_short_anywhere_is_one_line(place: Callable[..., Place], tmp_path: Path) -> None:
-    one = place().open("cornell-box")
-    one.session.work(4)
-    whole = one.save(tmp_path / "a.glow").read_bytes()
-    cut = tmp_path / "cut.glow"
-    for share in np.linspace(0.05, 0.999, 12):
-        cut.write_bytes(whole[: int(share * len(whole))])
-        with pytest.raises(UserError):
-            check_session(cut)
-
-
-# -- crashes -----------------------------------------------------------------------------------------------------------
-
-
-def test_after_a_crash_one_can_go_on(
-    place: Callable[..., Place], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = tmp_path / "aside"
-    monkeypatch.setattr(module, "EVERY_SECONDS", 0.0)
-    first = place(folder).open("cornell-box")
-    first.keeping._due = 0.0
-    first.frame()
-    assert not folder.exists() or not list(folder.glob("*.glow")), "nothing is to be lost yet"
-    first.session.set_material(1, dataclasses.replace(first.session.materials[1], albedo=(0.1, 0.2, 0.3)))
-    first.session.work(8)
-    first.keeping._due = 0.0
-    first.frame()
-    assert first.keeping._writer is not None
-    first.keeping._writer.join()
-    (file,) = folder.glob("*.glow")
-    assert Keeping(folder).asides() == [], "it lives"
-    crashed = file.with_name("99999999.glow")  # as if another process had written it, and died
-    file.rename(crashed)
-
-    second = place(folder)
-    (aside,) = second.keeping.asides()
-    assert aside.name == "Cornell box" and aside.file == crashed
-    assert Keeping(folder).asides() == [], "somebody looks at it already"
-    second.keeping.go_on(second.view, aside)
-    second.frames_until(lambda: second.session.on_its_way is None)
-    second.frame()
-    assert second.notes == [] and second.session.materials[1].albedo == (0.1, 0.2, 0.3)
-    for one in (first, second):
-        one.session.run.settle()
-    assert second.session.solver.issued == first.session.solver.issued > 0
-    assert second.keeping.path is None
-    assert file.exists() and not crashed.exists(), "kept until it is saved, as one's own"
-    second.keeping.end()
-    assert not list(folder.glob("*.glow"))
-
-
-def test_a_session_that_is_dropped_is_gone(place: Callable[..., Place], tmp_path: Path) -> None:
-    one = place().open("cornell-box")
-    (tmp_path / "aside").mkdir()
-    one.save(tmp_path / "aside" / "1.glow")
-    (aside,) = Keeping(tmp_path / "aside").asides()
-    drop(aside)
-    assert list((tmp_path / "aside").iterdir()) == []
-
-
-def test_what_is_saved_is_not_put_aside(place: Callable[..., Place], tmp_path: Path) -> None:
-    folder = tmp_path / "aside"
-    one = place(folder).open("cornell-box")
-    edit(one)
-    one.save(tmp_path / "a.glow")
-    one.keeping._due = 0.0
-    one.frame()
-    assert one.keeping._writer is None
