@@ -10,12 +10,13 @@ shoot are whole. A *facet* is a connected flat piece of one chart: nothing in it
 from __future__ import annotations
 
 import dataclasses
+import functools
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.seams import Seams
+from app.atlas.seams import Seams, SeamTexels, seam_texels
 
 TILES = (8, 16, 32)  # texels along the edge of a leaf tile
 DEFAULT_TILE = 16  # [Coombe03, 4.1]
@@ -71,6 +72,11 @@ class Charts:
             hidden_uv=self.hidden_uv[hidden >= 0],
             hidden_face=hidden[hidden >= 0],
         )
+
+    @functools.cached_property
+    def seam_texels(self) -> SeamTexels:
+        """Those of level 0 near seams."""
+        return seam_texels(self.seams)
 
     @property
     def chart_count(self) -> int:

@@ -71,6 +71,7 @@ def _made(
     charts = parametrize(
         cut.scene,
         ends=cut.ends,
+        facet=cut.facet,
         density=atlas.density,
         texels=atlas.texels,
         tile=atlas.tile,

@@ -23,10 +23,12 @@ from app.util.background import Report
 @dataclass(frozen=True, eq=False)
 class Cut:
     """A scene with its triangles cut. ends (m, 3) u8: what there is at the edge from corner k to k + 1 of each triangle, GOES_ON,
-    or ENDS or JUMPS, where charts end; None where nothing was cut."""
+    or ENDS or JUMPS, where charts end; None where nothing was cut. facet (m,): the flat piece of each triangle, as ``facets`` has
+    it."""
 
     scene: Scene
     ends: NDArray[np.uint8] | None
+    facet: I32
 
 
 def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
@@ -40,9 +42,8 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
     places = (points - origin) / size
     found, crowded = contacts(places[corners], surfaces(corners), lambda share: tell(0.1 + 0.4 * share))
     tell(0.5)
-    facet = np.zeros(len(corners), np.int32)
+    facet = facets(points, corners, scene.material_ids, size)
     if len(found.triangle):
-        facet = facets(points, corners, scene.material_ids, size)
         found = found.only(~on_rims(places[corners], corners, facet, found))
     notes: list[str] = []
     pieces: list[Piece] = []
@@ -56,14 +57,15 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
     if notes:
         scene = dataclasses.replace(scene, warnings=(*scene.warnings, *notes))
     if not pieces:
-        return Cut(scene, None)
+        return Cut(scene, None, facet)
     made = cut_pieces(pieces, places, corners, facet, lambda share: tell(0.9 + 0.1 * share))
-    return _joined(scene, corners, made, len(places), origin, size)
+    return _joined(scene, corners, facet, made, origin, size)
 
 
-def _joined(scene: Scene, corners: I32, made: CutTriangles, welded: int, origin: F64, size: float) -> Cut:
+def _joined(scene: Scene, corners: I32, facet: I32, made: CutTriangles, origin: F64, size: float) -> Cut:
     """The scene with triangles in the places of those that they were made of. corners (m, 3): its
-    triangles of welded points."""
+    triangles of welded points; facet (m,) of them."""
+    welded = int(corners.max()) + 1
     parent, numbers, weights, ends = made.parent, made.nodes, made.weights, made.ends
     count = len(scene.triangles)
     gone = np.zeros(count, bool)
@@ -99,4 +101,5 @@ def _joined(scene: Scene, corners: I32, made: CutTriangles, welded: int, origin:
         colours=shared(scene.colours),
         normals=normals,
     )
-    return Cut(cut, np.concatenate([np.zeros((len(kept), 3), np.uint8), ends])[order])
+    pieces = np.unique(facet[source], return_inverse=True)[1].astype(np.int32)  # slivers may have been a piece
+    return Cut(cut, np.concatenate([np.zeros((len(kept), 3), np.uint8), ends])[order], pieces)

@@ -43,6 +43,7 @@ def parametrize(
     tile: int = DEFAULT_TILE,
     roots: bool = False,
     ends: NDArray[np.uint8] | None = None,
+    facet: I32 | None = None,
     progress: Progress | None = None,
     time_limit: float | None = None,
 ) -> Charts:
@@ -53,8 +54,8 @@ def parametrize(
     A material's ``lightmap_scale`` is so many times that density; where neither was given, others keep the density that they have
     without it. Rectangles are made of whole patches, so that a small number of texels is met only roughly. Charts that are
     smaller than a texel have one all the same: where there are so many that a large floor among them would be left with one, too,
-    more texels are made than were asked for. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage,
-    share) is called from time to time and may raise to cancel.
+    more texels are made than were asked for. ends, facet: as in a Cut, if the scene was cut. tile: texels along the edge of a
+    leaf. time_limit [s] for xatlas. progress(stage, share) is called from time to time and may raise to cancel.
     Raises UserError for a density or number out of range, or when more than 16 777 216 texels are needed.
     """
     check(density, texels)
@@ -63,8 +64,9 @@ def parametrize(
     with ThreadPoolExecutor(1) as beside:
         sides = beside.submit(lit_sides, scene)
         points, corners = weld(scene)
-        report("finding flat pieces", 0.05)
-        facet = facets(points, corners, scene.material_ids, scene_size(scene))
+        if facet is None:
+            report("finding flat pieces", 0.05)
+            facet = facets(points, corners, scene.material_ids, scene_size(scene))
         report("finding sides that light can reach", 0.15)
         lit = sides.result()
     layout, method, warnings = _unfold(scene, lit, points, corners, facet, ends, time_limit, report)

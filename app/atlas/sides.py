@@ -73,7 +73,7 @@ def lit_sides(scene: Scene) -> Sides:
     corners = (scene.corners - (low + high) / 2) / size
     normals, _ = scene.normals_areas
     offsets = np.einsum("mk,mk->m", normals, corners[:, 0])
-    hull = _hull_points(corners.reshape(-1, 3)[distinct_rows(*corners.reshape(-1, 3).T)[0]])
+    hull = _hull_points((scene.positions[np.unique(scene.triangles)] - (low + high) / 2) / size)
     reach_front, reach_back = np.empty(len(normals)), np.empty(len(normals))
     step = max(1, BLOCK // len(hull))
     for start in range(0, len(normals), step):

@@ -35,7 +35,7 @@ TIME_LIMIT_S_PER_TRIANGLE = 1e-3  # more than ten times what xatlas takes for mo
 EXPECTED_S = 1.0, 5e-5  # and for each triangle: what it takes, about
 POLL_S = 0.05
 CACHE_FILES = 64  # kept, newest first
-FORMAT = b"glowtree unwrap 2"  # changes when the worker's options or its answer do
+FORMAT = b"glowtree unwrap 3"  # changes when the worker's options or its answer do
 # Diagonal of what xatlas sees: it drops triangles smaller than 1e-7 in area, whatever the unit.
 XATLAS_SIZE = 1000.0
 LARGE = 4096  # triangles of a surface, from which on its charts are limited: one chart of as many takes xatlas a second

@@ -9,14 +9,15 @@ plane come before all others, in the scene's order. So no picture depends on the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts, corner_places
-from app.atlas.sides import least, middle, most
+from app.atlas.sides import distinct_rows, least, middle, most
 from app.atlas.t_junctions import Divided, Floats, at_corners, without_t_junctions
-from app.scene.model import F32, F64, Scene
+from app.scene.model import F32, F64, I32, Scene
 
 Array = NDArray[np.generic]
 Ints = NDArray[np.int64]
@@ -28,6 +29,8 @@ MORTON_BITS = 10  # along each axis
 SAME_PLANE = 1e-4  # of the normal and, in the solver space, of the distance: below that, planes are compared as one
 TOUCHING = 1e-6  # solver space: what overlaps by no more only shares an edge, to single precision
 COMPARED = 512  # neighbours in its plane with which a triangle is compared, at most
+BLOCK = 1 << 12  # triangles that are compared at once
+SPACE = 4.0  # more than the solver space is wide, 2
 
 VERTEX = np.dtype([("in_position", "f4", 3), ("in_uv_front", "f4", 2), ("in_uv_back", "f4", 2), ("in_material", "u4")])
 VERTEX_FORMAT = {"in_position": "3f", "in_uv_front": "2f", "in_uv_back": "2f", "in_material": "1u"}
@@ -93,7 +96,7 @@ class VisibleMesh:
 
 def visible_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
     """local (positions, 3): of the scene, solver space."""
-    divided, places = _divided(local[scene.triangles])
+    divided, places = _divided(local, scene.triangles)
     vertices, corners = _shared_vertices(scene, charts, places, divided)
     count, weights = len(corners), divided.weights
     if count < CLUSTERED:
@@ -117,13 +120,12 @@ def visible_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
     )
 
 
-def _divided(places: F64) -> tuple[Divided, F32]:
-    """Triangles (m, 3, 3) divided at T-junctions; where the points are that their corners are, as the GPU holds them."""
-    rounded = places.astype(np.float32) + np.float32(0)  # no -0, which is another word than 0
-    number = _told_apart(np.zeros(3 * len(places), np.uint64), rounded.reshape(-1, 3).view(np.uint32))
-    _, example = np.unique(number, return_index=True)
-    points = rounded.reshape(-1, 3)[example]
-    return without_t_junctions(points.astype(np.float64), number.astype(np.int64).reshape(-1, 3)), points
+def _divided(local: F64, triangles: I32) -> tuple[Divided, F32]:
+    """Triangles of places (n, 3) divided at T-junctions; where the points are that their corners are, as the GPU holds them."""
+    rounded = local.astype(np.float32)
+    example, number, _ = distinct_rows(*rounded.T)
+    points = rounded[example]
+    return without_t_junctions(points.astype(np.float64), number[triangles]), points
 
 
 def _shared_vertices(scene: Scene, charts: Charts, points: F32, divided: Divided) -> tuple[Array, NDArray[np.uint32]]:
@@ -134,23 +136,13 @@ def _shared_vertices(scene: Scene, charts: Charts, points: F32, divided: Divided
     data["in_uv_front"], data["in_uv_back"] = places[..., :2], places[..., 2:]
     data["in_material"] = scene.material_ids[divided.parent, None]
     flat = data.reshape(-1)
-    number = divided.corners.reshape(-1).astype(np.uint64)
-    for name, more in (("in_uv_front", 2), ("in_uv_back", 2), ("in_material", 1)):
-        number = _told_apart(number, np.ascontiguousarray(flat[name]).view(np.uint32).reshape(-1, more))
-    _, example = np.unique(number, return_index=True)
+    columns: list[NDArray[Any]] = [np.repeat(data["in_material"][:, 0], 3), divided.corners.reshape(-1)]
+    for uv in ("in_uv_front", "in_uv_back"):
+        pairs = np.ascontiguousarray(flat[uv]).view(np.int64).reshape(-1)
+        if (pairs != pairs[0]).any():
+            columns.append(np.unique(pairs, return_inverse=True)[1])
+    example, number, _ = distinct_rows(*columns)
     return flat[example], number.reshape(-1, 3).astype(np.uint32)
-
-
-def _told_apart(number: NDArray[np.uint64], words: NDArray[np.uint32]) -> NDArray[np.uint64]:
-    """Numbers, from 0, that are equal where those given and words (n, k) are. In turn: numbers stay below 2³²."""
-    for word in words.T:
-        number = _numbers(number << np.uint64(32) | word)
-    return number
-
-
-def _numbers(values: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Equal numbers, from 0, for equal values."""
-    return np.unique(values, return_inverse=True)[1].astype(np.uint64)
 
 
 def _morton_order(centres: F64) -> Ints:
@@ -178,23 +170,23 @@ def _overlaps_in_plane(points: F64) -> Mask:
     flat = np.take_along_axis(points, across[:, None], 2)  # (n, 3, 2), seen along that axis
     (u0, v0), (u1, v1) = (least(flat) + TOUCHING).T, (most(flat) - TOUCHING).T
     for shift in (0.0, 0.5):  # or rounding would part equal planes
-        of = np.zeros(count, np.uint64)
-        for cell in np.floor(plane / SAME_PLANE + shift).T:
-            of = _numbers(of << np.uint64(32) | (cell + (1 << 30)).astype(np.uint64))
+        of = distinct_rows(*np.floor(plane / SAME_PLANE + shift).astype(np.int64).T)[1]
         order = np.lexsort((u0, of))
-        here = np.arange(count)
-        for ahead in range(1, COMPARED + 1):
-            here = here[: np.searchsorted(here, count - ahead)]
-            a, b = order[here], order[here + ahead]
-            near = (of[a] == of[b]) & (u0[b] < u1[a])
-            here, a, b = here[near], a[near], b[near]
-            if not len(here):
-                break
+        along = SPACE * of[order]  # each plane has its own stretch of numbers
+        beyond = np.searchsorted(along + u0[order], along + u1[order])
+        ahead = np.maximum(beyond - np.arange(count) - 1, 0)
+        found[order[ahead > COMPARED]] = True
+        ahead = np.minimum(ahead, COMPARED)
+        ends = np.cumsum(ahead)
+        for first in range(0, count, BLOCK):
+            some = np.arange(first, min(first + BLOCK, count))
+            nth = np.repeat(some, ahead[some])
+            start = ends[some] - ahead[some]
+            a, b = order[nth], order[nth + 1 + np.arange(len(nth)) - np.repeat(start - start[0], ahead[some])]
             boxes = (v0[a] < v1[b]) & (v0[b] < v1[a])
             a, b = a[boxes], b[boxes]
             hit = ~_apart(flat[a], flat[b])
             found[a[hit]] = found[b[hit]] = True
-        found[order[here]] = True
     return found
 
 

@@ -30,10 +30,10 @@ class Jumps:
 def finished(values: F32, covered: NDArray[np.bool_], charts: Charts) -> F32:
     """(H, W, c) of the charts' atlas, where ``covered``: with filled gutters, and faded from chart to chart at seams."""
     filled = fill_gutter(values, covered)
-    near = seam_texels(charts.seams, values.shape[0] // charts.size[1])
+    finer = values.shape[0] // charts.size[1]
+    near = charts.seam_texels if finer == 1 else seam_texels(charts.seams, finer)
     if not len(near.weight):
         return filled
-    finer = values.shape[0] // charts.size[1]
     seen = np.concatenate([np.where(covered[..., None], values, 0), covered[..., None]], axis=2)
     *sums, weight = bilinear(seen, near.other * finer).T
     there = (weight > 0) & (near.texel >= 0).all(1) & (near.texel < covered.shape[::-1]).all(1)

@@ -59,8 +59,8 @@ class Moves:
 
     def array(self, array: Any, value: float) -> Any:
         """What was kept for each slot, as it is to be kept now; ``value`` in slots that are new."""
-        more = np.full((self.slots - self.staying, *array.shape[1:]), value, array.dtype)
-        moved = np.concatenate([array[: self.staying], more])
+        moved = np.full((self.slots, *array.shape[1:]), value, array.dtype)
+        moved[: self.staying] = array[: self.staying]
         moved[self.new] = array[self.old]
         return moved
 

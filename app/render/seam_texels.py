@@ -54,7 +54,7 @@ def shown_at_seams(pool: TilePool, border: int) -> F32:
     order = np.argsort(keys)
     found = [np.empty((0, 5), np.float32)]
     for level in np.unique(pool.leaves.level[used]).tolist() if len(seams) else ():
-        near = seam_texels(seams, 1 << level)
+        near = pool.charts.seam_texels if level == 0 else seam_texels(seams, 1 << level)
         for shift in np.ndindex(3, 3):
             at = (
                 near.texel + (np.array(shift) - 1) * border

@@ -205,10 +205,12 @@ def _in_texels(
     exposure = None
     with ThreadPoolExecutor(1) as beside:
         mesh = beside.submit(visible_mesh, scene, charts, local)
+        seams = beside.submit(lambda: charts.seam_texels)
         pool = quadtree_pool(scene, charts, report) if options.adaptive else TilePool(scene, charts, report=report)
         report(1.0)
-        # cached in the pool: the window, which reads them next, does not wait
+        # cached in pool and charts: the window, which reads them next, does not wait
         pool.visible_mesh = mesh.result()
+        seams.result()
         arrays = beside.submit(lambda: (pool.arrays, pool.emission_weights)[0])
         if expose:
             camera = scene.cameras[0]

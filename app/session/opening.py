@@ -96,7 +96,7 @@ class Opening:
                 coarse, loading.coarse = loading.coarse, None
                 self._coarse = coarse is not None and not loading.ended
                 of = coarse if coarse is not None and self._coarse else loading.result
-                self._parts = self._upload(of, loading.solver, options)
+                self._parts = self._upload(of, loading.solver, options, coarse=self._coarse)
             next(self._parts)
         except StopIteration as last:
             self._parts = None
@@ -115,10 +115,13 @@ class Opening:
         """All of what was loaded elsewhere. Raises UserError."""
         return run_to_end(self._upload(loaded, solver_name, options))
 
-    def _upload(self, loaded: Loaded, solver_name: str, options: Mapping[str, Options]) -> Generator[None, None, Ready]:
+    def _upload(
+        self, loaded: Loaded, solver_name: str, options: Mapping[str, Options], *, coarse: bool = False
+    ) -> Generator[None, None, Ready]:
         """Upload what was loaded, and draw once with each program, since drivers compile it then; yields after each part. Raises
         UserError; then, and when given up between two parts, nothing stays on the GPU."""
-        began, gpu = time.perf_counter(), self._gpu
+        began, gpu, family = time.perf_counter(), self._gpu, SOLVERS[solver_name]
+        make = family.for_coarse if coarse and family.for_coarse is not None else family.make
         with contextlib.ExitStack() as undo:
             textures: dict[str, Texture] = {}
             uploads = undo.enter_context(contextlib.ExitStack())
@@ -131,7 +134,7 @@ class Opening:
             undo.callback(lightmap.release)
             gpu.ctx.finish()
             yield
-            solver = SOLVERS[solver_name].make(gpu, lightmap, options[solver_name])
+            solver = make(gpu, lightmap, options[solver_name])
             undo.callback(solver.release)
             yield
             yield from solver.warm_up()

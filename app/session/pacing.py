@@ -76,7 +76,8 @@ class Pacer:
         else:
             budget = self._fast_budget
             whole = bands == 1 and 0 < self._unit <= WHOLE * budget
-            made = self._whole(solver, start, budget, MOST) if whole else self._some(solver, start, budget, MOST)
+            amount = MOST if self._unit else 1  # first one unit: light is there before much is tried for more
+            made = self._whole(solver, start, budget, MOST) if whole else self._some(solver, start, budget, amount)
         self._end = time.perf_counter()
         return made
 

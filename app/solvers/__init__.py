@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from app.gpu import Gpu
@@ -38,6 +39,7 @@ class Family:
     distributes: whether what remains is light that is still to be distributed, in the energy balance; else it is an error.
     per_error: how little may remain where an expected error is asked for, as a share of that.
     relights: whether its next piece of work shows all light of other lamps, so that they may flicker from frame to frame.
+    for_coarse: makes one for coarse texels that better ones replace soon, where that is another; it takes less care.
     rays: whether it looks along rays, and so needs a tree of the scene's triangles (visibility/rays.py) before it is made.
     everywhere: whether it lights all surfaces alike, wherever they are seen from; else what is far is known roughly.
     quadratic: whether its work grows with the square of the texels.
@@ -60,6 +62,7 @@ class Family:
     part_of: str = "mean"
     per_error: float | None = None
     relights: bool = False
+    for_coarse: Callable[[Gpu, Lightmap, Any], Solver[Any]] | None = None
     rays: bool = False
     everywhere: bool = True
 
@@ -70,6 +73,7 @@ SOLVERS: dict[str, Family] = {
         help="progressive radiosity: one patch after the other shoots its light (Cohen et al. 1988, Coombe et al. 2003)",
         options=ShootingOptions,
         make=Shooting,
+        for_coarse=partial(Shooting, audits=False),
         unit="shots",
         remains="unshot",
         batch=BATCH,

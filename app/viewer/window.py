@@ -31,7 +31,7 @@ from app.viewer.ui_frame import UiFrame
 GL_VERSION = (4, 1)
 TITLE = "Glowtree"
 AWAKE_SECONDS = 1.0  # that frames go on after the last event: tooltips appear, scroll bars settle
-LOADING_PAUSE = 0.1  # s between frames while there is only a scene to wait for, or an event: loading gets the processor
+LOADING_PAUSE = 0.2  # s between frames while there is only a scene to wait for, or an event: loading gets the processor
 REST_SECONDS = 0.5  # between two looks around at rest; an event ends the rest at once
 NOWHERE = -3.4e38  # where Dear ImGui has the mouse when it is outside the window
 BUTTONS = {1: 0, 2: 1, 3: 2}  # left, right, middle: moderngl-window to Dear ImGui

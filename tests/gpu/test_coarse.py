@@ -87,6 +87,7 @@ def test_coarse_light_appears_and_gives_way_to_better(view: View, better: thread
     session.open("cornell-box")
     frames(session, lambda: session.opened)
     assert session.coarse and session.loading is not None
+    assert not session.solver.batch.auditor.wanted  # type: ignore[attr-defined]  # no care is taken for light that goes
     frames(session, lambda: session.run.converged or (adaptive and session.solver.issued > 20))
     few, coarse = session.lightmap.texel_count, mean_irradiance(session)
     assert picture(view, SIZE).mean() > 20  # of 255: it is lit
@@ -98,6 +99,7 @@ def test_coarse_light_appears_and_gives_way_to_better(view: View, better: thread
     better.set()
     frames(session, lambda: session.loading is None)
     assert not session.coarse and session.message is None
+    assert session.solver.batch.auditor.wanted  # type: ignore[attr-defined]
     assert session.lightmap.texel_count > 2 * few
     assert view.camera is seen and view.display == display
     assert session.materials[1] == material and session.light.adaptive == adaptive

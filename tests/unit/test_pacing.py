@@ -199,7 +199,7 @@ def test_fast_frames_solve_for_most_of_their_time(
     took, solved = fast_frames(clockwork, solver, rest)
     assert solved >= share
     assert took <= longest + 6.0, "no longer than a part more"
-    assert solver.asked == {MOST}, "batches are as large as the solver makes them"
+    assert solver.asked == {1, MOST}, "first one unit, then batches as large as the solver makes them"
 
 
 def test_solving_gets_as_long_as_drawing_where_that_is_slow(clockwork: Clockwork) -> None:
