@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from app.atlas.sides import distinct_rows
 from app.scene.model import F64
@@ -79,6 +80,11 @@ def _on(points: F64, low: Ints, high: Ints, edges: Ints, asked: Ints) -> tuple[I
     """Which of the points ``asked`` lie between the ends of which of the ``edges``, and at what share of the way."""
     if not len(edges) or not len(asked):
         return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
+    half = np.linalg.norm(points[high[edges]] - points[low[edges]], axis=1) / 2 + ON_EDGE
+    far, _ = cKDTree(points[asked]).query(
+        (points[low[edges]] + points[high[edges]]) / 2, distance_upper_bound=half.max() + ON_EDGE, workers=-1
+    )
+    edges = edges[far <= half]
     seen = np.argsort(np.ptp(points, axis=0))[1:]  # along the axis in which least lies above another
     lines = np.stack([points[low[edges]], points[high[edges]]], axis=1)
     tree = shapely.STRtree(shapely.linestrings(lines[..., seen]))
