@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
 from app.gpu import Gpu, Texture, keep, take_over
@@ -153,6 +154,20 @@ class Lightmap(LightTextures):
         """E = πL of every texel (tiles, t, t, 3) f32 [W/m²]."""
         return self._factor([m.emission for m in self.scene.materials], self.pool.emission_tiles) * np.float32(np.pi)
 
+    @property
+    def emits(self) -> NDArray[np.bool_]:
+        """(tiles, t, t) which texels do."""
+        face = self.pool.surfaces.face
+        of_face = np.array([m.emits for m in self.scene.materials])[self.scene.material_ids[self.charts.face_triangle]]
+        return np.asarray(of_face[face] & (face >= 0))
+
+    def emitted_power(self, slots: NDArray[np.int64]) -> F64:
+        """E A of the texels of these slots, summed over RGB (n, t, t) f64 [W]."""
+        pool = self.pool
+        face, tint = pool.surfaces.face[slots], None if pool.emission_tiles is None else pool.emission_tiles[slots]
+        exitance = self._factor([m.emission for m in self.scene.materials], tint, face) * np.float32(np.pi)
+        return np.asarray(exitance.sum(-1, dtype=np.float64) * pool.surfaces.area[slots])
+
     def radiosity(self) -> F32:
         """B = E + ρH of every texel (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""
         return self.emission() + self.albedo() * self.irradiance()
@@ -164,8 +179,11 @@ class Lightmap(LightTextures):
         scale = self.unit / (255 if texture.dtype == "f1" else 1)
         return self.pool.tiles_from_image(raw)[..., :3].astype(np.float32) * np.float32(scale)
 
-    def _factor(self, factors: list[tuple[float, float, float]], colours: F32 | None) -> F32:
-        surfaces = self.pool.surfaces
-        material = self.scene.material_ids[self.charts.face_triangle[surfaces.face]]
-        out = np.where((surfaces.face >= 0)[..., None], np.array(factors, np.float32)[material], np.float32(0))
+    def _factor(
+        self, factors: list[tuple[float, float, float]], colours: F32 | None, face: NDArray[np.int32] | None = None
+    ) -> F32:
+        """Of texels with these faces, by default of all; colours: of their textures."""
+        face = self.pool.surfaces.face if face is None else face
+        material = self.scene.material_ids[self.charts.face_triangle[face]]
+        out = np.where((face >= 0)[..., None], np.array(factors, np.float32)[material], np.float32(0))
         return out if colours is None else out * colours

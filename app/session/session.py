@@ -34,7 +34,7 @@ from app.util.background import BackgroundTask
 
 # Of solving in coarse texels, as fast as it goes, and the share of what is emitted that remains then: once either is reached, the
 # processor makes better ones
-COARSE_SECONDS, COARSE_LEFT = 1.0, 0.2
+COARSE_SECONDS, COARSE_LEFT = 2.0, 0.2
 
 
 @dataclass(frozen=True)

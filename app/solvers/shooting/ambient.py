@@ -148,10 +148,7 @@ class Ambient:
 
     def find_lamps(self) -> None:
         """See which texels emit now."""
-        pool = self._lightmap.pool
-        emits = np.array([m.emits for m in self._lightmap.scene.materials])
-        face = pool.surfaces.face
-        shines = emits[pool.scene.material_ids[pool.charts.face_triangle[face]]] & (face >= 0)
+        pool, shines = self._lightmap.pool, self._lightmap.emits
         across = pool.tile >> BLOCK_LEVEL
         blocks = shines.reshape(-1, across, 1 << BLOCK_LEVEL, across, 1 << BLOCK_LEVEL).any(axis=(2, 4))
         tile, row, column = np.nonzero(blocks)

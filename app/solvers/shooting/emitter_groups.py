@@ -40,11 +40,11 @@ class EmitterGroups:
         its groups may have to settle."""
         if self._lightmap.storage == "fixed8":
             return
-        power = self._lightmap.emission().sum(-1, dtype=np.float64) * self._lightmap.pool.surfaces.area
-        slots = np.arange(len(power))
+        slots = np.flatnonzero(self._lightmap.emits.any((1, 2)))
+        power = self._lightmap.emitted_power(slots)
         largest, finest = (phases.levels_of(slots, choice) for choice in (phases.now, phases.finest))
         most = MOST * self._ledger.emitted.sum()
-        self._marks.divide_emitters(power, most, largest, finest, phases.coarser(slots))
+        self._marks.divide_emitters(slots, power, most, largest, finest, phases.coarser(slots))
 
     def divide_contacts(self) -> None:
         """Let patches be finer where something stands on them; not with 8 bits, as above."""

@@ -64,13 +64,15 @@ class PatchMarks:
 
     def divide_emitters(
         self,
+        slots: NDArray[np.int64],
         power: F64,
         most: float,
         largest: NDArray[np.int64],
         finest: NDArray[np.int64],
         coarser: NDArray[np.int64],
     ) -> None:
-        """Let no patch hold more than so much power (slots, t, t) of texels; largest, finest (slots,): levels of patches.
+        """Let no patch hold more than so much power (slots, t, t) of texels of these slots, which are all that emit; largest,
+        finest (slots,): levels of patches.
 
         Where texels of uniform size, finer by ``coarser`` levels (slots,), hold more than ``most`` by themselves, patches shoot
         each for itself, ungrouped: one would represent three others beside which nothing else counts."""
@@ -85,10 +87,11 @@ class PatchMarks:
         level = level.reshape(in_blocks).min((2, 4))
         largest, finest = largest[:, None, None], finest[:, None, None]
         finer = np.where(level < largest, np.maximum(finest + 1 - level, 1), 0)
-        place = np.divmod(np.arange(len(power)), self.tiles.shape[1])
+        self.levels %= EMITTER
+        place = np.divmod(slots, self.tiles.shape[1])
         tiles = self.tiles[place]
         _mark(tiles, finer)
-        self.tiles[place] = tiles % EMITTER + EMITTER * ((finer > 0) & grouped)
+        self.tiles[place] = tiles + EMITTER * ((finer > 0) & grouped)
         self.upload()
 
     def divide_at(self, places: NDArray[np.bool_], finer: int) -> None:

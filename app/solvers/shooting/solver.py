@@ -46,10 +46,10 @@ class Shooting:
     issued: shots given to the GPU. last_shot: the last that was reported. batch: the parts that make shots.
     """
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool = True) -> None:
-        """audits: whether strong shots are tried before they are made."""
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, hasty: bool = False) -> None:
+        """hasty: for light that is soon replaced, neither try strong shots before they are made, nor gather the ambient term."""
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
-        self.batch = Batch(gpu, lightmap, options, audits=audits)
+        self.batch = Batch(gpu, lightmap, options, hasty=hasty)
         self._reports, self._edits, self._picture = Reports(gpu), MaterialEdits(gpu, lightmap), ItemImage(gpu)
         self._under_way = UnderWay()
         self._leaves: Leaves | None = None
