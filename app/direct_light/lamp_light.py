@@ -8,17 +8,22 @@ there is noise in half-shadows only. What is kept is Σ F V, so that another exi
 
 from __future__ import annotations
 
+from collections.abc import Generator
+
 import numpy as np
 from numpy.typing import NDArray
 
-from app.direct_light.lamps import LampSet, chances, lamp_set, lamp_sets
+from app.direct_light.lamps import CELL, NEAR, LampSet, NearLamps, far_chances, lamp_set, lamp_sets
 from app.direct_light.lit import A_ROW, PASS, Draw, Kind, Lit, folded
 from app.gpu import Gpu, Mesh, Pass, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import QUAD_FORMAT, quads
 from app.lightmap.tile_pool import Moves
 from app.scene.model import Scene
+from app.util.parts import run_to_end
 from app.visibility.origins import Origins
+
+SLOTS_AT_ONCE = 256  # of which near lamps are looked up
 
 
 class LampLight(Kind[LampSet]):
@@ -52,14 +57,18 @@ class LampLight(Kind[LampSet]):
         }
 
     def reads(self, of: LampSet) -> dict[str, Texture]:
-        """The triangles of a set of lamps, and near and far as Chances have them, folded."""
-        known = chances(self.lightmap.pool, of)
+        """The triangles of a set of lamps, and their chances: those of near ones once a slot is looked at."""
         more = {"t_unoccluded": self.gpu.texture(self.lightmap.size, 1, "f4")} if of.closed_form else {}
         return {
             "t_lamps": folded(self.gpu, of.rows.reshape(-1, 4)),
-            "t_near": folded(self.gpu, known.near.reshape(-1, 2)),
-            "t_far": folded(self.gpu, known.far.reshape(-1, 1)),
+            "t_near": self._no_near(),
+            "t_far": folded(self.gpu, far_chances(of).reshape(-1, 1)),
         } | more
+
+    def _no_near(self) -> Texture:
+        """Room for the near lamps of all cells."""
+        pool = self.lightmap.pool
+        return self.gpu.texture((A_ROW, -(-pool.tiles * (pool.tile // CELL) ** 2 * NEAR // A_ROW)), 2, "f4")
 
     def kept(self, lit: Lit[LampSet]) -> dict[str, Texture]:
         return lit.found | {"unoccluded": lit.reads["t_unoccluded"]} if lit.of.closed_form else lit.found
@@ -84,7 +93,7 @@ class LampLight(Kind[LampSet]):
     def from_afar(self, of: LampSet) -> bool | None:
         return None
 
-    def look(self, lit: Lit[LampSet], slots: NDArray[np.int64], *, changed: bool) -> None:
+    def look(self, lit: Lit[LampSet], slots: NDArray[np.int64]) -> Generator[None, None, None]:
         """Σ F, where it has a closed form, and which lamps are near."""
         pool = self.lightmap.pool
         if lit.of.closed_form:
@@ -98,16 +107,27 @@ class LampLight(Kind[LampSet]):
                 mesh=mesh,
             )
             self.gpu.release_all(mesh, target)
-        if not changed:
-            return
-        for slot, near in zip(slots.tolist(), chances(pool, lit.of, slots).near, strict=True):
-            y, x = divmod(slot * near.shape[0] * near.shape[1], A_ROW)
-            lit.reads["t_near"].write(near.tobytes(), viewport=(x, y, near.shape[0] * near.shape[1], 1))
+        yield from self.look_again(lit, slots)
+
+    def look_again(self, lit: Lit[LampSet], slots: NDArray[np.int64]) -> Generator[None, None, None]:
+        """Which lamps are near."""
+        near = NearLamps(self.lightmap.pool, lit.of)
+        for first in range(0, len(slots), SLOTS_AT_ONCE):
+            some = np.sort(slots[first : first + SLOTS_AT_ONCE])
+            known = near.of(some)
+            width = known.shape[1] * NEAR  # of a slot; A_ROW is a multiple of it
+            new_row = (np.diff(some, prepend=-2) > 1) | (some * width % A_ROW == 0)
+            starts = np.flatnonzero(new_row)
+            for start, end in zip(starts.tolist(), [*starts[1:].tolist(), len(some)], strict=True):
+                y, x = divmod(int(some[start]) * width, A_ROW)
+                lit.reads["t_near"].write(known[start:end].tobytes(), viewport=(x, y, (end - start) * width, 1))
+            yield
 
     def resized(self, lit: Lit[LampSet], moves: Moves) -> None:
         super().resized(lit, moves)
         self.gpu.release_all(lit.reads["t_near"])
-        lit.reads["t_near"] = folded(self.gpu, chances(self.lightmap.pool, lit.of).near.reshape(-1, 2))
+        lit.reads["t_near"] = self._no_near()
+        run_to_end(self.look_again(lit, np.flatnonzero(lit.passes)))
         if lit.of.closed_form:
             lit.reads["t_unoccluded"] = self.lightmap.moved(lit.reads["t_unoccluded"], moves)
 

@@ -29,7 +29,6 @@ CELL = int(
 NEAR = int(glsl_constant("direct_light/shadow_rays.frag.glsl", "NEAR"))  # lamps that each cell knows
 CANDIDATES = 3 * NEAR  # nearest lamps, of which those are chosen
 LEAST, MOST = 0.2, 0.95  # shares of shadow rays that choose among them, where there are others
-CELLS_AT_ONCE = 1 << 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,47 +125,53 @@ def _means(pool: TilePool, triangles: NDArray[np.int64]) -> F64:
     return np.asarray(np.where(whole[triangles, None] > 0, means[triangles], 1.0))
 
 
-@dataclass(frozen=True, eq=False)
-class Chances:
-    """With which probability shadow rays choose each lamp of a set, cell by cell.
-
-    near (slots, cells, NEAR, 2) f32: of each cell the lamps that may give it most, in rows: their chances summed up, to 1 where
-    they are all, and their numbers, which rise. far (n,) f32: chances of all lamps by power, summed up: the other lamps are found
-    by these.
-    """
-
-    near: F32
-    far: F32
+def far_chances(lamps: LampSet) -> F32:
+    """(n,) chances of all lamps of a set by power, summed up: by these a shadow ray finds one that its cell does not know."""
+    return np.asarray(_summed_up(_weights(lamps)[None])[0])
 
 
-def chances(pool: TilePool, lamps: LampSet, slots: NDArray[np.int64] | None = None) -> Chances:
-    """The chances of a set, in these slots, or in all. Charts start at multiples of a cell, so that all of it is of one chart.
+class NearLamps:
+    """The lamps of a set that each cell knows, and with which probability shadow rays choose them there. All of a cell is of one
+    chart, since charts start at multiples of it.
 
     Half of the chances are in proportion to a bound of what a lamp may give to any texel of the cell: its power, times the
     largest cosine at the lamp, over the least squared distance, which is not taken as less than the lamp's own area. The other
     half go by power to all that face the cell: lamps that are near but hidden would leave few rays to what all texels see.
     """
-    area, count = lamps.rows[:, 0, 3].astype(np.float64), len(lamps.rows)
-    weight = np.maximum(area * lamps.strength, 1e-300)
-    centre, radius = _spheres(pool, np.arange(pool.tiles) if slots is None else slots)
-    corner, u, v = (lamps.rows[:, row, :3].astype(np.float64) for row in range(3))
-    middle = corner + (u + v) / 3
-    normal = np.cross(u, v) / (2 * area[:, None])
-    extent = np.sqrt(np.maximum((u**2).sum(1), (v**2).sum(1)))
-    known, shape = min(count, NEAR), centre.shape[:2]
-    there = np.flatnonzero(radius.reshape(-1) > 0)  # cells that hold anything
-    at, round_ = centre.reshape(-1, 3)[there], radius.reshape(-1, 1)[there]
-    near, tree = np.ones((shape[0] * shape[1], NEAR, 2), np.float32), cKDTree(middle)
-    for first in range(0, len(there), CELLS_AT_ONCE):
-        some = slice(first, first + CELLS_AT_ONCE)
-        which = np.tile(np.arange(count), (len(at[some]), 1))
+
+    def __init__(self, pool: TilePool, lamps: LampSet) -> None:
+        self._pool, self._area = pool, lamps.rows[:, 0, 3].astype(np.float64)
+        self._weight = _weights(lamps)
+        corner, u, v = (lamps.rows[:, row, :3].astype(np.float64) for row in range(3))
+        self._middle = corner + (u + v) / 3
+        self._normal = np.cross(u, v) / (2 * self._area[:, None])
+        self._extent = np.sqrt(np.maximum((u**2).sum(1), (v**2).sum(1)))
+        self._two_sided = lamps.rows[:, 1, 3] > 0
+        self._tree = cKDTree(self._middle)
+
+    def of(self, slots: NDArray[np.int64]) -> F32:
+        """(slots, cells, NEAR, 2): of each cell the lamps that may give it most, in rows: their chances summed up, to 1 where
+        they are all, and their numbers, which rise."""
+        centre, radius = _spheres(self._pool, slots)
+        there = np.flatnonzero(radius.reshape(-1) > 0)  # cells that hold anything
+        near = np.ones((radius.size, NEAR, 2), np.float32)
+        if len(there):
+            known = min(len(self._area), NEAR)
+            near[there, :known] = self._of_cells(centre.reshape(-1, 3)[there], radius.reshape(-1, 1)[there])
+        return near.reshape(*radius.shape, NEAR, 2)
+
+    def _of_cells(self, at: F64, radius: F64) -> F32:
+        """The same of cells at (c, 3) that reach (c, 1) from there; as many lamps as there are, NEAR at most."""
+        count, area, weight = len(self._area), self._area, self._weight
+        known = min(count, NEAR)
+        which = np.tile(np.arange(count), (len(at), 1))
         if count > CANDIDATES:
-            which = np.asarray(tree.query(at[some], k=CANDIDATES)[1])
-        way = at[some, None] - middle[which]
+            which = np.asarray(self._tree.query(at, k=CANDIDATES)[1])
+        way = at[:, None] - self._middle[which]
         distance = np.linalg.norm(way, axis=2)
-        reach = round_[some] + extent[which]
-        height = np.einsum("clk,clk->cl", way, normal[which])
-        height = np.where(lamps.rows[which, 1, 3] > 0, np.abs(height), height) + reach
+        reach = radius + self._extent[which]
+        height = np.einsum("clk,clk->cl", way, self._normal[which])
+        height = np.where(self._two_sided[which], np.abs(height), height) + reach
         cosine = np.clip(height / np.maximum(distance, 1e-30), 0.0, 1.0)
         most = weight[which] * cosine / np.maximum(np.maximum(distance - reach, 0.0) ** 2, area[which])
         facing = weight[which] * (cosine > 0)
@@ -181,9 +186,13 @@ def chances(pool: TilePool, lamps: LampSet, slots: NDArray[np.int64] | None = No
             share = np.clip(1 - rest / (most.sum(1) + beyond / distance.max(1) ** 2), LEAST, MOST)[:, None]
             chance, which = (np.take_along_axis(values, best, 1) for values in (chance, which))
         by_number = np.argsort(which, axis=1)
-        near[there[some], :known, 0] = share * _summed_up(np.take_along_axis(chance, by_number, 1))
-        near[there[some], :known, 1] = np.take_along_axis(which, by_number, 1)
-    return Chances(near.reshape(*shape, NEAR, 2), _summed_up(weight[None])[0])
+        chance, which = (np.take_along_axis(values, by_number, 1) for values in (chance, which))
+        return np.stack([share * _summed_up(chance), which], axis=2).astype(np.float32)
+
+
+def _weights(lamps: LampSet) -> F64:
+    """(n,) by which lamps of a set are chosen: their power."""
+    return np.asarray(np.maximum(lamps.rows[:, 0, 3].astype(np.float64) * lamps.strength, 1e-300))
 
 
 def _summed_up(bound: F64) -> F32:

@@ -7,6 +7,7 @@ programs; all else is the same, see shadow_rays.py.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -92,8 +93,13 @@ class Kind(ABC, Generic[SetT]):
     def release(self, lit: Lit[SetT]) -> None:
         self.gpu.release_all(lit.target, lit.passes_table, *lit.found.values(), *lit.reads.values())
 
-    def look(self, lit: Lit[SetT], slots: NDArray[np.int64], *, changed: bool) -> None:
-        """Find out what can be known without a ray, in slots that have had none. changed: they hold other leaves."""
+    def look(self, lit: Lit[SetT], slots: NDArray[np.int64]) -> Generator[None, None, None]:
+        """Find out what can be known without a ray, in slots that have had none, or hold other leaves; in parts."""
+        yield from self.look_again(lit, slots)
+
+    def look_again(self, lit: Lit[SetT], slots: NDArray[np.int64]) -> Generator[None, None, None]:
+        """The same of what is not kept."""
+        yield from ()
 
     @abstractmethod
     def reads(self, of: SetT) -> dict[str, Texture]:

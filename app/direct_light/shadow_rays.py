@@ -23,6 +23,7 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import QUAD_FORMAT, quads
 from app.lightmap.tile_pool import Moves
 from app.scene.model import F32, F64, Scene
+from app.util.parts import run_to_end
 from app.util.state import State, StateError
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
@@ -107,7 +108,7 @@ class DirectLight:
         texels, each = self._lightmap.pool.slot_texels, max(count // PASS, 1)
         for lit in self.sets:
             if not lit.passes.any():
-                lit.kind.look(lit, np.flatnonzero(texels), changed=False)
+                yield from lit.kind.look(lit, np.flatnonzero(texels))
             known = np.zeros(len(texels)) if gain is None else gain
             more = allocate(lit.passes, known, texels, each)
             for nth in range(int(more.max(initial=0))):
@@ -119,7 +120,7 @@ class DirectLight:
         for lit in self.sets:
             fresh = slots[lit.passes[slots] == 0]
             if len(fresh):
-                lit.kind.look(lit, fresh, changed=False)
+                yield from lit.kind.look(lit, fresh)
             self._shoot_at(lit, slots, "add")
             yield
 
@@ -153,7 +154,7 @@ class DirectLight:
         """Other leaves are in these slots: as many shadow rays as the others have had on average, in parts."""
         others = np.setdiff1d(np.flatnonzero(self._lightmap.pool.used), slots)
         for lit in self.sets:
-            lit.kind.look(lit, slots, changed=True)
+            yield from lit.kind.look(lit, slots)
             known = lit.passes[others] if len(others) else lit.passes[slots]
             wanted = max(int(np.rint(known.mean())), 1)
             lit.passes[slots] = 0
@@ -167,7 +168,7 @@ class DirectLight:
         texels = self._lightmap.pool.slot_texels
         for lit in self.sets:
             if not lit.passes.any():
-                lit.kind.look(lit, np.flatnonzero(texels), changed=False)
+                yield from lit.kind.look(lit, np.flatnonzero(texels))
             missing = wanted - PASS * float(lit.passes @ texels) / max(int(texels.sum()), 1)
             for _ in range(max(int(missing // PASS), 0 if lit.passes.any() else 1)):
                 self._shoot_at(lit, np.flatnonzero(texels), "add")
@@ -278,6 +279,7 @@ class DirectLight:
             part = state.part(str(nth))
             lit.passes = part.array("passes", np.int64, self._lightmap.pool.tiles).copy()
             kind.write_passes(lit)
+            run_to_end(kind.look_again(lit, np.flatnonzero(lit.passes)))
             take_over(part, **kind.kept(lit))
         self._streams, self.traced = int(state.values["streams"]), int(state.values["traced"])
 

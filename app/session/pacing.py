@@ -69,10 +69,11 @@ class Pacer:
         start = time.perf_counter()
         bands = self._pieces(start, INTERACTIVE_FRAME if interactive else LONG_FRAME)
         if interactive:
-            whole = bands == 1 and self._unit <= self._left
+            whole = bands == 1 and 0 < self._unit <= self._left
             made = self._whole(solver, start) if whole else self._some(solver, start, self._left, 1)
         elif not fast:
-            made = self._whole(solver, start) if bands == 1 else self._some(solver, start, WATCH_BUDGET, 1)
+            whole = bands == 1 and self._unit > 0  # it is not known yet how long the first one takes
+            made = self._whole(solver, start) if whole else self._some(solver, start, WATCH_BUDGET, 1)
         else:
             budget = self._fast_budget
             whole = bands == 1 and 0 < self._unit <= WHOLE * budget
