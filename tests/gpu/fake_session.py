@@ -20,7 +20,7 @@ from app.scene.lights import Light
 from app.scene.model import Material
 from app.scene.sky import Sky
 from app.session.versions import edits_of, with_edits
-from app.solvers import DEFAULT_SOLVER, SOLVERS, EnergyBalance, Inspection, ShootingOptions
+from app.solvers import DEFAULT_SOLVER, SOLVERS, EnergyBalance, Inspection, Progress, ShootingOptions
 
 EMITTED = 34.6  # W
 MATERIALS = (
@@ -230,6 +230,10 @@ class FakeSession:
         stats = self.stats
         powers = (np.full(3, getattr(stats, name) / 3) for name in ("emitted", "absorbed", "escaped", "unshot"))
         return EnergyBalance(*powers, np.full(3, 0.5), 1.0)
+
+    @property
+    def progress(self) -> Progress:
+        return Progress(self.done, self.stats.remaining, self.energy.escaped)
 
     def poll(self) -> None:
         pass

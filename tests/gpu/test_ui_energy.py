@@ -85,13 +85,29 @@ def test_little_is_fine_and_much_has_a_remedy(family) -> None:  # type: ignore[n
 def test_shares_are_of_one_whole(distributes: bool) -> None:
     """Also where more was absorbed than emitted, since light overshoots: that is to be taken back."""
     powers = (np.full(3, power) for power in (10.0, 10.4, 0.1, -0.5))
-    rows = energy.shares(EnergyBalance(*powers, np.zeros(3), 1.0), 0.05, distributes=distributes)
+    balance = EnergyBalance(*powers, np.zeros(3), 1.0)
+    rows = energy.shares(balance, 0.05, balance.escaped, distributes=distributes)
     shown = {label: float(power.mean()) for label, power, _, _ in rows}
     if distributes:
         assert shown["Unshot"] == pytest.approx(0.5) and shown["Absorbed"] == pytest.approx(9.4)
         assert sum(shown.values()) - shown["Emitted"] == pytest.approx(10.0)
     else:
         assert "Unshot" not in shown and shown["Absorbed"] == 10.4
+
+
+def test_shares_are_of_one_moment(gpu: Gpu) -> None:
+    """Half of the light leaves the scene with the first shots: they were in what had escaped, and still in what was unshot."""
+    session = Session(gpu, atlas=AtlasOptions(texels=1500))
+    session.open_now("cornell-box")
+    for _ in range(4):
+        session.work(8)
+        session.run.poll()
+        balance, progress = session.solver.energy(), session.solver.poll()
+        rows = energy.shares(balance, progress.remaining, progress.escaped, distributes=True)
+        emitted, *others = (float(power.sum()) for _, power, _, _ in rows)
+        assert sum(others) == pytest.approx(emitted - balance.imbalance.sum(), rel=1e-3)
+        assert progress.escaped == pytest.approx(balance.escaped)
+    session.release()
 
 
 def test_progress_never_goes_back_but_for_an_edit(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:

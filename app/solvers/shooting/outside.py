@@ -2,7 +2,8 @@
 
 Patches shoot in between, where they are stronger than what comes next. How much is still to come counts as unshot: of points it
 is known; of directions, which send out what texels receive of them, it is about what the box around the scene would, times the
-share of that which texels have received until now. An edit shoots the difference, negative too [Chen90].
+share of that which texels have received until now. An edit shoots the difference, negative too [Chen90], in turns with what is
+positive.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from app.solvers.shooting.outside_sources import (
     OutsideShot,
     Sources,
     difference,
+    in_turns,
     light_of,
     share_of_shot,
     shots_of,
@@ -92,7 +94,7 @@ class Outside:
         """There is other light outside: the difference to what was given is to come."""
         self._given = self._given_now()
         wanted = sources_of(self._lightmap.scene, self._lightmap)
-        self._line_up(shots_of(difference(wanted, self._given), self._box))
+        self._line_up(in_turns(shots_of(difference(wanted, self._given), self._box)))
 
     def _line_up(self, queue: list[OutsideShot]) -> None:
         """These are to come, besides what was given."""

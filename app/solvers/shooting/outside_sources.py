@@ -16,6 +16,7 @@ from app.lightmap.lightmap import Lightmap
 from app.scene.lights import Light
 from app.scene.model import F64, Scene
 from app.scene.sky_directions import Directions, disc_directions, sky_directions
+from app.solvers.shooting.records import BATCH
 
 PLACES = 32  # in the sphere of a light with a radius
 ASIDE = np.array([0.5319, 0.7023, 0.4733]) / np.linalg.norm([0.5319, 0.7023, 0.4733])  # a direction that no wall has
@@ -58,11 +59,14 @@ class OutsideShot:
         """Whether it is the only one of its light, which casts sharp shadows."""
         return self.place == 0
 
+    @property
+    def gives(self) -> bool:
+        """Whether it gives light, or takes some back."""
+        return bool(self.light.sum() > 0)
+
     def is_like(self, other: OutsideShot) -> bool:
         """Whether both may be of one batch: of a kind, as sharp, and both give light, or take it back."""
-        return (
-            self.kind == other.kind and self.sharp == other.sharp and (self.light.sum() > 0) == (other.light.sum() > 0)
-        )
+        return self.kind == other.kind and self.sharp == other.sharp and self.gives == other.gives
 
     @property
     def values(self) -> list[Any]:
@@ -151,6 +155,22 @@ def shots_of(sources: Sources, box: F64) -> list[OutsideShot]:
     return [shots[nth] for nth in np.argsort(-power, kind="stable")]
 
 
+def in_turns(shots: list[OutsideShot]) -> list[OutsideShot]:
+    """Shots of a difference in turns, some that give light and some that take it back, each the strongest first: the sum of all
+    that is given stays within a batch of what it is to be. Else a sky would be taken away before another one is there, and where
+    the sun is dragged, which changes both again and again, all would be dark until it is let go."""
+    gives, takes = ([shot for shot in shots[::-1] if shot.gives is wanted] for wanted in (True, False))
+    to_come, queue = sum(float(shot.flux.sum()) for shot in shots), list[OutsideShot]()
+    while gives and takes:
+        of = gives if to_come >= 0 else takes
+        run = [of.pop()]
+        while of and run[0].is_like(of[-1]) and (len(run) < BATCH or of[-1].source is run[-1].source):
+            run.append(of.pop())
+        to_come -= sum(float(shot.flux.sum()) for shot in run)
+        queue += run
+    return queue + gives[::-1] + takes[::-1]
+
+
 def _axes(source: Light) -> tuple[F64, ...]:
     if source.kind == "point":
         return ASIDE, -ASIDE
@@ -179,4 +199,4 @@ def difference(wanted: Sources, given: Sources) -> Sources:
     return {source: light for source, light in change.items() if np.abs(light).sum() > LEAST * most[source.from_afar]}
 
 
-__all__ = ["OutsideShot", "Sources", "difference", "light_of", "share_of_shot", "shots_of", "sources_of"]
+__all__ = ["OutsideShot", "Sources", "difference", "in_turns", "light_of", "share_of_shot", "shots_of", "sources_of"]

@@ -238,9 +238,11 @@ class Shooting:
         return self.poll()
 
     def energy(self) -> EnergyBalance:
-        """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
-        self.poll(wait=True)
-        return self.batch.ledger.balance()
+        """Where all emitted energy is now, RGB [W]; progress is of the same moment. Reads every texel and waits for the GPU."""
+        self.settle()
+        balance = self.batch.ledger.balance()
+        self._progress = replace(self._progress, escaped=balance.escaped)
+        return balance
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
 

@@ -33,7 +33,8 @@ def draw(view: View, state: State) -> None:
     stats, family = state.stats, view.session.family
     assert stats is not None
     widgets.section(f"Energy [{QUANTITIES[view.display.quantities]['flows'].unit}]")
-    rows = shares(view.session.run.energy, stats.remaining, distributes=family.distributes)
+    run = view.session.run
+    rows = shares(run.energy, stats.remaining, run.progress.escaped, distributes=family.distributes)
     emitted = float(rows[0][1].sum())
     powers = [(float(power.sum()), colour) for _, power, colour, _ in rows[1:]]
     _bar(powers, max(emitted, sum(power for power, _ in powers)))
@@ -51,19 +52,20 @@ def draw(view: View, state: State) -> None:
     _imbalance(view, stats)
 
 
-def shares(balance: EnergyBalance, remaining: float, *, distributes: bool) -> list[Row]:
-    """Emitted, and where it is. What is unshot is the one number that says so everywhere, ``remaining`` of what is emitted. Where
-    light overshoots [Feda92], surfaces have absorbed what will be taken back from them: that is unshot, not absorbed."""
+def shares(balance: EnergyBalance, remaining: float, escaped: F64, *, distributes: bool) -> list[Row]:
+    """Emitted, and where it is. What is unshot is the one number that says so everywhere, ``remaining`` of what is emitted, and
+    what has ``escaped``, RGB [W], is of the same moment; the balance was measured a little before. Where light overshoots
+    [Feda92], surfaces have absorbed what will be taken back from them: that is unshot, not absorbed."""
     emitted = ("Emitted", balance.emitted, theme.TEXT, "By all lamps and the sky")
-    escaped = ("Escaped", balance.escaped, theme.ESCAPED, "Left the scene where no surface is")
+    away = ("Escaped", escaped if distributes else balance.escaped, theme.ESCAPED, "Left the scene where no surface is")
     if not distributes:
-        return [emitted, ("Absorbed", balance.absorbed, theme.ABSORBED, "By surfaces, which reflect the rest"), escaped]
+        return [emitted, ("Absorbed", balance.absorbed, theme.ABSORBED, "By surfaces, which reflect the rest"), away]
     unshot = remaining * balance.emitted
-    kept = np.maximum(balance.emitted - balance.imbalance - balance.escaped - unshot, 0.0)
+    kept = np.maximum(balance.emitted - balance.imbalance - escaped - unshot, 0.0)
     return [
         emitted,
         ("Absorbed", kept, theme.ABSORBED, "By surfaces, less what was given ahead and is taken back"),
-        escaped,
+        away,
         (
             "Unshot",
             unshot,
