@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.flat_pieces import MOST_PIECES, Piece, on_rims, parted_pieces
-from app.atlas.intersections import contacts, surfaces
+from app.atlas.intersections import Contacts, contacts, surfaces
 from app.atlas.sides import facets, scene_size, weld
 from app.atlas.triangle_cuts import CutTriangles, cut_pieces
 from app.scene.model import F32, F64, I32, Scene
@@ -48,9 +48,13 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
     notes: list[str] = []
     pieces: list[Piece] = []
     loose = 0
-    if crowded or len(np.unique(facet[found.triangle])) > MOST_PIECES:
-        notes.append("too many surfaces meet to cut them all: charts do not end where they do")
+    if crowded:
+        notes.append("too many surfaces meet to cut them: charts do not end where they do")
     elif len(found.triangle):
+        largest, left = _largest(facet, scene.normals_areas[1], found)
+        if left:
+            notes.append(f"{left:,} more surfaces meet others than the {MOST_PIECES:,} largest, where charts end there")
+        found = found.only(largest)
         pieces, loose = parted_pieces(scene, places, corners, facet, found, lambda share: tell(0.5 + 0.4 * share))
     if loose:
         notes.append(f"{loose} thin things end on surfaces that thousands share: charts do not end where they stand")
@@ -60,6 +64,15 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
         return Cut(scene, None, facet)
     made = cut_pieces(pieces, places, corners, facet, lambda share: tell(0.9 + 0.1 * share))
     return _joined(scene, corners, facet, made, origin, size)
+
+
+def _largest(facet: I32, area: F64, found: Contacts) -> tuple[NDArray[np.bool_], int]:
+    """Which contacts are those of the MOST_PIECES flat pieces that have most area, of those that have any; how many are left out.
+    facet, area (m,): of triangles."""
+    met = np.unique(facet[found.triangle])
+    areas = np.bincount(facet, area)[met]
+    chosen = met[np.argsort(-areas, kind="stable")[:MOST_PIECES]]
+    return np.isin(facet[found.triangle], chosen), len(met) - len(chosen)
 
 
 def _joined(scene: Scene, corners: I32, facet: I32, made: CutTriangles, origin: F64, size: float) -> Cut:

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from app.atlas.charts import DEFAULT_TILE, Charts
 from app.atlas.contacts import hidden_pieces
+from app.atlas.enclosed import without_enclosed
 from app.atlas.layout import Layout, density_for, measured, place, scaled, texel_count
 from app.atlas.rectangles import Rectangles, find_rectangles
 from app.atlas.seams import find_seams
@@ -68,7 +69,7 @@ def parametrize(
             report("finding flat pieces", 0.05)
             facet = facets(points, corners, scene.material_ids, scene_size(scene))
         report("finding sides that light can reach", 0.15)
-        lit = sides.result()
+        lit = without_enclosed(sides.result(), scene, points, corners)
     layout, method, warnings = _unfold(scene, lit, points, corners, facet, ends, time_limit, report)
     report("placing pieces side by side", UNFOLDED)
     plain, layout = layout, scaled(layout, scene)

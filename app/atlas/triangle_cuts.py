@@ -243,21 +243,24 @@ def _along(parts: F64, flat: F64, numbers: I64, piece: I64) -> Mask:
     """(t, 3) which edges of triangles (t, 3, 2), of nodes (t, 3) and of pieces (t,), run along the segments."""
     if not len(parts):
         return np.zeros(flat.shape[:2], bool)
-    follows = np.roll(flat, -1, axis=1)
-    tree, far = shapely.STRtree(shapely.linestrings(parts)), np.zeros(flat.shape[:2])
-    for at in flat, (flat + follows) / 2, follows:
+    ends = np.sort(np.stack([numbers, np.roll(numbers, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    first, edge, _ = distinct_rows(*ends.T, np.repeat(piece, 3))
+    start, end = flat.reshape(-1, 2)[first], np.roll(flat, -1, axis=1).reshape(-1, 2)[first]
+    tree, farthest = shapely.STRtree(shapely.linestrings(parts)), np.zeros(len(first))
+    left = np.arange(len(first))
+    for at in (start + end) / 2, start, end:  # most have their middle elsewhere
         (place, _), distance = tree.query_nearest(
-            shapely.points(at.reshape(-1, 2)), max_distance=NEAR, return_distance=True, all_matches=False
+            shapely.points(at[left]), max_distance=NEAR, return_distance=True, all_matches=False
         )
-        here = np.full(flat[..., 0].size, np.inf)
+        here = np.full(len(left), np.inf)
         here[place] = distance
-        far = np.maximum(far, here.reshape(far.shape))
+        farthest[left] = np.maximum(farthest[left], here)
+        left = left[farthest[left] <= NEAR]
+    far = farthest[edge].reshape(flat.shape[:2])
     on = far <= NEAR
     # a sliver lies between: of its edges, one goes on
     sliver = np.flatnonzero(on.all(1))
     on[sliver, far[sliver].argmax(1)] = False
-    ends = np.sort(np.stack([numbers, np.roll(numbers, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    edge = distinct_rows(*ends.T, np.repeat(piece, 3))[1]
     both = np.ones(edge.max() + 1, bool)
     np.logical_and.at(both, edge, on.reshape(-1))
     return np.asarray(both[edge].reshape(on.shape))

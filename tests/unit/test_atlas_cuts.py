@@ -10,7 +10,7 @@ import trimesh
 from numpy.typing import NDArray
 from solver_scenes import grey, quads_scene, room
 
-from app.atlas import flat_pieces, intersections
+from app.atlas import cuts, flat_pieces, intersections
 from app.atlas.charts import Charts
 from app.atlas.cuts import cut_at_contacts
 from app.atlas.parametrize import parametrize
@@ -166,3 +166,16 @@ def test_too_many_to_look_at_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(intersections, "MOST_PAIRS", 3)
     cut = cut_at_contacts(scene_of(WALL))
     assert cut.ends is None and "too many" in cut.scene.warnings[0]
+
+
+def test_of_too_many_that_meet_the_largest_are_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The floor, of what four sunken boxes pierce."""
+    boxes = [box((x, -0.1, 0.3), (x + 0.2, 0.3, 0.6)) for x in (0.1, 0.5, 0.9, 1.3)]
+    scene = scene_of(*np.concatenate(boxes))
+    assert cut_at_contacts(scene).scene.warnings == scene.warnings
+    monkeypatch.setattr(cuts, "MOST_PIECES", 1)
+    cut = cut_at_contacts(scene)
+    assert any("16 more surfaces meet others than the 1 largest" in note for note in cut.scene.warnings)
+    assert cut.ends is not None
+    jumps = cut.scene.object_ids[(cut.ends == JUMPS).any(1)]
+    assert set(jumps.tolist()) == {0}  # the room's first wall

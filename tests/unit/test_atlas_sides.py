@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from atlas_scenes import TURN, box_room, moved, scene_of, split_grid
 
+from app.atlas.enclosed import without_enclosed
 from app.atlas.rectangles import find_rectangles
 from app.atlas.sides import facets, lit_sides, scene_size, weld
 from app.scene import shapes
-from app.scene.model import Material, Scene
+from app.scene.model import Camera, Light, Material, Scene
 from app.scene.shapes import Mesh
 
 BOTH = Material("both", double_sided=True)
@@ -37,6 +40,38 @@ def test_sides_with_something_in_front(
     assert (np.count_nonzero(~sides.back), np.count_nonzero(sides.back), sides.dark) == (fronts, backs, dark)
     for way in (False, True):
         assert (np.diff(sides.triangle[sides.back == way]) > 0).all()
+
+
+BOX, BALL = shapes.box((1, 1, 1)), shapes.icosphere(0.5, 1)
+LAMP = Material("lamp", emission=(1.0, 1.0, 1.0), double_sided=True)
+EYE = Camera("eye", np.block([[np.eye(3), np.array([[3.1], [0.2], [0.1]])], [np.zeros((1, 3)), np.ones((1, 1))]]), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "material", "more", "within"),
+    [
+        (BOX, BOTH, {}, 24),
+        (BOX.flipped(), BOTH, {}, 24),  # whichever way its triangles turn
+        (BALL, LAMP, {}, 160),
+        (BOX, FRONT, {}, 0),  # whose insides are none
+        (shapes.box((1, 1, 1), without=["bottom"]), BOTH, {}, 0),
+        (shapes.merged([BOX, BALL.transformed(np.diag([0.5, 0.5, 0.5, 1.0]))]), BOTH, {}, 2 * 80),  # the ball alone
+        (BOX, Material("glass", opacity=0.5, double_sided=True), {}, 0),
+        (BOX, BOTH, {"cameras": (EYE,)}, 12),
+        (BOX, BOTH, {"lights": (Light("lamp", "point"),)}, 0),
+    ],
+)
+def test_insides_of_closed_bodies(mesh: Mesh, material: Material, more: dict[str, object], within: int) -> None:
+    """Of two that see each other; one of them has what is within it."""
+    scene = replace(scene_of([mesh, mesh.moved(3, 0, 0)], [material]), **more)
+    lit = lit_sides(scene)
+    left = without_enclosed(lit, scene, *weld(scene))
+    assert left.dark - lit.dark == len(lit.triangle) - len(left.triangle) == within
+    if within == 2 * len(mesh.triangles):
+        out = np.where(left.back, -1.0, 1.0)[:, None] * scene.normals_areas[0][left.triangle]
+        middle = scene.corners[left.triangle].mean(1)
+        centre = mesh.positions.mean(0) + 3.0 * (left.triangle >= len(mesh.triangles))[:, None] * [1, 0, 0]
+        assert (((middle - centre) * out).sum(1) > 0).all()
 
 
 def test_a_coplanar_neighbour_lights_nothing() -> None:

@@ -1,0 +1,72 @@
+"""The insides of closed bodies, which no light reaches and nobody sees: a box of a file whose materials all have two sides.
+
+A body is what its edges join. It is closed if each edge has two triangles, which run along it in opposite directions. What shares
+room with something, a lamp, another body, a camera, is left alone: a room is a closed body, too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from app.atlas.sides import FLAT, Sides, distinct_rows, groups_of, least, most, scene_size, totals
+from app.scene.model import F64, I32, Scene
+
+Mask = NDArray[np.bool_]
+
+
+def without_enclosed(lit: Sides, scene: Scene, points: F64, corners: I32) -> Sides:
+    """The lit sides that are not within such a body; all of them where there are lamps without area, or a sky. points (n, 3) [m],
+    corners (m, 3) of the triangles: welded."""
+    if scene.open_to_lights or not scene.sides.any():
+        return lit
+    within = _enclosed(scene, points, corners)[lit.triangle, lit.back.astype(np.int64)]
+    if within.all():
+        return lit
+    return Sides(lit.triangle[~within], lit.back[~within], lit.dark + int(np.count_nonzero(within)))
+
+
+def _enclosed(scene: Scene, points: F64, corners: I32) -> Mask:
+    """(m, 2) fronts and backs of triangles that are the inside of such a body."""
+    start, end = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
+    _, edge, uses = distinct_rows(np.minimum(start, end), np.maximum(start, end))
+    order = np.argsort(edge, kind="stable")
+    joined = edge[order[1:]] == edge[order[:-1]]
+    pairs = np.stack([order[:-1][joined], order[1:][joined]], axis=1) // 3
+    count, body = groups_of(len(corners), pairs)
+    way = np.bincount(edge, np.where(start < end, 1.0, -1.0))
+    holds = np.array([m.opaque and m.double_sided for m in scene.materials])[scene.material_ids]
+    holds &= ((uses[edge] == 2) & (way[edge] == 0)).reshape(-1, 3).all(1)
+    triangles = points[corners]
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low, body, least(triangles))
+    np.maximum.at(high, body, most(triangles))
+    closed = np.bincount(body, ~holds, count) == 0
+    closed[closed] = _alone(scene, triangles, body, np.flatnonzero(closed), low, high)
+    # what a body holds, by the tetrahedra from its middle to its triangles; below 0 where its fronts are inside
+    off = triangles - ((low + high) / 2)[body][:, None]
+    volume = totals(body, np.einsum("mk,mk->m", off[:, 0], np.cross(off[:, 1], off[:, 2])), count)
+    out = np.zeros((len(corners), 2), bool)
+    out[:, 0] = (closed & (volume < 0))[body]
+    out[:, 1] = (closed & (volume > 0))[body]
+    return out
+
+
+def _alone(
+    scene: Scene, triangles: F64, body: NDArray[np.int64], asked: NDArray[np.int64], low: F64, high: F64
+) -> Mask:
+    """Whether nothing else reaches into the boxes low to high (bodies, 3) of the bodies asked for, and no camera is there."""
+    near = FLAT * scene_size(scene)
+    x, y = np.argsort(-np.ptp(triangles.reshape(-1, 3), axis=0))[:2]
+    lower, upper = low[asked] + near, high[asked] - near
+    tree = shapely.STRtree(shapely.box(lower[:, x], lower[:, y], upper[:, x], upper[:, y]))
+    eyes = np.array([camera.world_from_camera[:3, 3] for camera in scene.cameras]).reshape(-1, 3)
+    first = np.concatenate([least(triangles), eyes])
+    last = np.concatenate([most(triangles), eyes])
+    owner = np.concatenate([body, np.full(len(eyes), -1)])
+    one, other = tree.query(shapely.box(first[:, x], first[:, y], last[:, x], last[:, y]))
+    meets = (owner[one] != asked[other]) & (first[one] < upper[other]).all(1) & (last[one] > lower[other]).all(1)
+    alone = np.asarray((upper > lower).all(1))
+    alone[other[meets]] = False
+    return alone
