@@ -141,11 +141,13 @@ class Options:
             spec.check(getattr(self, spec.name))
 
     def replace(self, **changes: Any) -> Self:
-        """A checked copy with some fields changed; an unknown name is an error."""
-        unknown = changes.keys() - {f.name for f in dataclasses.fields(self)}
+        """A checked copy with some fields changed, or itself where they are as they were; an unknown name is an error."""
+        own = {spec.name for spec in specs(type(self))}
+        unknown = changes.keys() - own
         if unknown:
             raise UserError(f"unknown option {', '.join(sorted(unknown))} for {type(self).__name__}")
-        return dataclasses.replace(self, **changes)
+        same = all(getattr(self, name) == value for name, value in changes.items())
+        return self if same else dataclasses.replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:
         return dataclasses.asdict(self)

@@ -81,9 +81,9 @@ class Pass:
         Raises ShaderError on a wrong name."""
         if self._generation != self.gpu.shaders.generation:
             self._bind()
-        self._check("texture", set(textures or {}), set(self._samplers))
-        self._check("uniform", set(uniforms or {}), set(self._uniforms))
-        self._check("block", set(blocks or {}), set(self._blocks))
+        self._check("texture", textures or {}, self._samplers)
+        self._check("uniform", uniforms or {}, self._uniforms)
+        self._check("block", blocks or {}, self._blocks)
         for name, (buffer, offset, size) in (blocks or {}).items():
             buffer.bind_to_uniform_block(self._blocks[name].binding, offset=offset, size=size)
         for name, texture in (textures or {}).items():
@@ -117,10 +117,12 @@ class Pass:
         for plane in range(clip_distances):
             ctx.disable_direct(GL_CLIP_DISTANCE0 + plane)
 
-    def _check(self, kind: str, given: set[str], known: set[str]) -> None:
-        if unknown := given - known:
+    def _check(self, kind: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> None:
+        if given.keys() == known.keys():
+            return
+        if unknown := given.keys() - known.keys():
             raise ShaderError(f"pass {self.name} has no {kind} {', '.join(sorted(unknown))}")
-        if missing := known - given:
+        if missing := known.keys() - given.keys():
             raise ShaderError(f"pass {self.name} needs {kind} {', '.join(sorted(missing))}")
 
 

@@ -5,30 +5,36 @@ from __future__ import annotations
 import contextlib
 from collections import defaultdict, deque
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 
 import moderngl
 
 LAG = 3  # queries in flight per pass before the oldest is read
+EVERY = (
+    7  # draws of a pass, after the first LAG, of which one is timed: a software rasteriser ends all it draws at a query
+)
+NOT_TIMED = contextlib.nullcontext()
 
 
 class Timers:
-    """Totals per pass label. Off by default: a query costs little, but not nothing."""
+    """Totals per pass label, of some of its draws. Off by default: a query costs little, but not nothing."""
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
         self._pending: dict[str, deque[moderngl.Query]] = defaultdict(deque)
         self._free: list[moderngl.Query] = []
         self._open = False
+        self._met: dict[str, int] = defaultdict(int)  # draws, timed or not
         self.enabled = False
         self.total_ms: dict[str, float] = defaultdict(float)
         self.calls: dict[str, int] = defaultdict(int)
 
-    @contextlib.contextmanager
-    def measure(self, label: str) -> Iterator[None]:
+    def measure(self, label: str) -> AbstractContextManager[None]:
         """Time what is drawn inside. GL allows one timer at a time: an inner one is counted with the outer."""
-        if not self.enabled or self._open:
-            yield
-            return
+        return self._timed(label) if self.enabled and not self._open and self._due(label) else NOT_TIMED
+
+    @contextlib.contextmanager
+    def _timed(self, label: str) -> Iterator[None]:
         query = self._free.pop() if self._free else self._ctx.query(time=True)
         self._open = True
         try:
@@ -40,6 +46,10 @@ class Timers:
         pending.append(query)
         if len(pending) > LAG:
             self._collect(label, pending.popleft())
+
+    def _due(self, label: str) -> bool:
+        self._met[label] += 1
+        return self._met[label] <= LAG or self._met[label] % EVERY == 0
 
     def flush(self) -> None:
         """Read every query in flight (waits for the GPU)."""

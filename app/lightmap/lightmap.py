@@ -121,7 +121,15 @@ class Lightmap(LightTextures):
         texture = self._textures["t_ambient"]
         if texture.size != self.size:
             return np.frombuffer(texture.read(), np.float32)[:3] * np.float32(self.unit)
-        return self.light_of(texture)
+        a = self._tiles_of(texture)
+        if whole:
+            return a[..., :3]
+        # as common/ambient.glsl
+        since = self.light_of(self._textures["t_irradiance"]).sum(-1) + a[..., 3]
+        total = a[..., :3].sum(-1)
+        known = (a[..., 3] < 0) & (total != 0)
+        share = np.where(known, np.clip(1 - since / np.where(known, total, 1), 0, 1), 1)
+        return a[..., :3] * share[..., None].astype(np.float32)
 
     def residual(self) -> F32:
         """r of every tile (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""
@@ -175,9 +183,13 @@ class Lightmap(LightTextures):
     def light_of(self, texture: Texture) -> F32:
         """What an RGBA texture of the tile pool holds in stored units, of every tile (tiles, t, t, 3) f32 [W/m²]. Waits for the
         GPU."""
+        return self._tiles_of(texture)[..., :3]
+
+    def _tiles_of(self, texture: Texture) -> F32:
+        """The same with alpha."""
         raw = np.frombuffer(texture.read(), _DTYPES[texture.dtype]).reshape(*self.size[::-1], 4)
         scale = self.unit / (255 if texture.dtype == "f1" else 1)
-        return self.pool.tiles_from_image(raw)[..., :3].astype(np.float32) * np.float32(scale)
+        return self.pool.tiles_from_image(raw).astype(np.float32) * np.float32(scale)
 
     def _factor(
         self, factors: list[tuple[float, float, float]], colours: F32 | None, face: NDArray[np.int32] | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+import functools
 from dataclasses import dataclass
 
 from app.render.options import LAYERS
@@ -53,6 +53,7 @@ LAYER_SHADERS = {
 assert tuple(LAYER_SHADERS) == LAYERS
 
 
-def layers_with(offered: Container[str]) -> tuple[str, ...]:
+@functools.cache
+def layers_with(offered: tuple[str, ...]) -> tuple[str, ...]:
     """Those that can be shown where a solver offers so much."""
     return tuple(n for n, layer in LAYER_SHADERS.items() if layer.offered in ("", SEAMS) or layer.offered in offered)

@@ -59,6 +59,7 @@ class DisplayTexels:
         sides = np.array([m.double_sided for m in lightmap.scene.materials], np.uint32)
         self._unlit = gpu.texture((len(sides), 2), 4, dtype)
         self._unlit_target = gpu.target(self._unlit)
+        self._unlit_of: object = None  # what it shows
         self._version, self._keys = lightmap.version, self._leaf_keys()
         self._nothing = gpu.texture((1, 1), 4, "f4", bytes(16))
         self._tables = {
@@ -138,7 +139,10 @@ class DisplayTexels:
         ) -> None:
             draw("edges", target, uniforms=values, textures=own, defines={"FOLLOWS": kind.follows})
 
-        draw("unlit", self._unlit_target)
+        shown = layer_name, shader, instead, tuple(uniforms.items()), self._gpu.shaders.generation
+        if (shown, lightmap.scene) != self._unlit_of:
+            draw("unlit", self._unlit_target)
+            self._unlit_of = shown, lightmap.scene
         band = 0, first, self.size[0], rows
         if len(self._stale) and rows < self.size[1]:  # their borders between levels come with their band
             rects = self._quads(self._stale)

@@ -56,7 +56,7 @@ def edit_options(
             value = getattr(options, spec.name)
             unit, offered = (units or {}).get(spec.name, spec.unit), (choices or {}).get(spec.name, spec.choices)
             same = (unit, offered) == (spec.unit, spec.choices)
-            shown_as = spec if same else dataclasses.replace(spec, unit=unit, choices=offered)
+            shown_as = spec if same else _shown_as(spec, unit, offered)
             reason = (off or {}).get(spec.name) or (spec.off(options) if spec.off is not None else None)
             edited = edit_option(
                 shown_as, value, (starts or {}).get(spec.name), off=reason, names=(names or {}).get(spec.name)
@@ -65,6 +65,12 @@ def edit_options(
                 changes[spec.name] = edited
     imgui.pop_id()
     return options.replace(**changes) if changes else options
+
+
+@functools.lru_cache
+def _shown_as(spec: Spec, unit: str, choices: tuple[Any, ...]) -> Spec:
+    """With another unit and other choices than are declared."""
+    return dataclasses.replace(spec, unit=unit, choices=choices)
 
 
 @functools.cache

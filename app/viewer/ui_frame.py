@@ -92,7 +92,6 @@ class UiFrame:
         self._present.draw(
             target,
             textures={"t_image": texture},
-            uniforms={"u_corner_px": (left, bottom)},
             viewport=(left, bottom, width, height),
         )
         self._renderer.draw(target, data)

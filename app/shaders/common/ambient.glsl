@@ -1,5 +1,12 @@
 // The ambient light of a texel: about the irradiance that it will still receive, see app/solvers/shooting/ambient.py. Where less
 // light is to be there than was shot, residual and ambient are negative.
-uniform sampler2D t_ambient;  // irradiance, stored units; of one texel, where all have the same
+//
+// It was found a while ago: of it, what has arrived since then is no more to come.
+uniform sampler2D t_ambient;  // irradiance, stored units; of one texel, where all have the same. w: -(Σ H then), 0: as it is
 
-vec3 ambient_at(ivec2 texel_px) { return texelFetch(t_ambient, min(texel_px, textureSize(t_ambient, 0) - 1), 0).rgb; }
+// H: irradiance of the texel now
+vec3 ambient_at(ivec2 texel_px, vec3 H) {
+    vec4 a = texelFetch(t_ambient, min(texel_px, textureSize(t_ambient, 0) - 1), 0);
+    float all = dot(a.rgb, vec3(1.0)), since = dot(H, vec3(1.0)) + a.w;
+    return a.rgb * (a.w < 0.0 && all != 0.0 ? clamp(1.0 - since / all, 0.0, 1.0) : 1.0);
+}

@@ -32,6 +32,6 @@ Surface surface_of(Hit hit) {
     if (px.y < 0 || facet_from_ids(texelFetch(t_normal_ids, px, 0).y) == 0u) return seen;  // no light is held there
     vec3 H = texelFetch(t_irradiance, px, 0).rgb;
     seen.albedo = albedo_of(t_materials, material, px);
-    seen.irradiance = (H + ambient_at(px)) * u_unit;
+    seen.irradiance = (H + ambient_at(px, H)) * u_unit;
     return seen;
 }

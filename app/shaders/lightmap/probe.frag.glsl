@@ -18,7 +18,7 @@ vec4 texel_at(vec2 uv) {
     if (px.y < 0) return vec4(0.0);
     bool covered = texelFetch(t_position_area, px, 0).w > 0.0;
     vec3 H = texelFetch(t_irradiance, px, 0).rgb;
-    return covered ? vec4((H + ambient_at(px)) * u_unit, 1.0) : vec4(0.0);
+    return covered ? vec4((H + ambient_at(px, H)) * u_unit, 1.0) : vec4(0.0);
 }
 
 vec4 filled(vec2 uv, float texel) {

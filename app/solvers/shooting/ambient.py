@@ -24,15 +24,21 @@ from app.visibility.bvh import Bvh
 from app.visibility.rays import tree_is_near, tree_of
 
 SWEEPS = 6  # looks of each point until nothing changes: as many reflections
-RAYS_A_LOOK = 1 << 15  # of one frame, where not all must be
-TRACING = 4  # times as long as to look up what a ray hit
+# Of one frame, where not all must be: points that look around. Fewer passes do more at once: frames wait until there are so many.
+POINTS_A_FRAME, POINTS_A_LOOK = 512, 2048
+# What a point takes, of the time of a look: to see what its texels have to pass on; to find what its rays hit
+SEEING, TRACING = 0.25, 8.0
+FIRST = 4  # times as many points of a frame where it is not known yet what their rays hit
+# Share of the light that is passed on until points look again: of that, what they foresaw is shown
+PASSED_ON = 1 / 32
 
 
 class Ambient:
     """Whoever makes it releases it.
 
     overshoot: one texel, what is overshot, see even_ambient.frag.glsl. shown: whether the lightmap is given any. held: while
-    light is taken from those who shoot and has not arrived.
+    light is taken from those who shoot and has not arrived: points look after that. strongest: share of the light that a shot
+    passes on at most.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch, ledger: Ledger, *, shown: bool) -> None:
@@ -54,11 +60,15 @@ class Ambient:
         self.shown, self.held = shown, False
         self.note: str | None = None
         self._sweeps, self._next_row = SWEEPS, 0
+        self._passed_on = 1.0  # share of the light, at most, since points began to look
+        self._owed = 0.0  # points that frames asked to look
+        self.strongest = 1.0
         lightmap.ambient_of = self.refresh
 
-    def update(self, bins: Bins, shots: int = 0) -> None:
-        """Estimate what is overshot from what is unshot in the bins, and from so many shots of a batch since."""
-        self.changed()
+    def update(self, bins: Bins, shots: int | None = None) -> None:
+        """Estimate what is overshot from what is unshot in the bins, and from so many shots of a batch since; None: anything may
+        be other than it was. Points look that frames asked for while light was held."""
+        self.changed(1.0 if shots is None else shots * self.strongest)
         ledger = self._ledger
         if self._lightmap.storage != "fixed8":
             self._estimate.draw(
@@ -68,17 +78,20 @@ class Ambient:
                     "t_ledger": ledger.texture,
                     "t_shooters": self._shooters.texture,
                 },
-                uniforms={"u_shots": shots, "u_albedo": ledger.albedo, "u_area": ledger.area},
+                uniforms={"u_shots": shots or 0, "u_albedo": ledger.albedo, "u_area": ledger.area},
             )
+        if self._owed and self._points is not None:
+            self._look_for_frames(self._points)
 
-    def changed(self) -> None:
-        """Other light is unshot than when the lightmap was given its ambient term."""
+    def changed(self, share: float = 1.0) -> None:
+        """Other light is unshot than when the lightmap was given its ambient term. share: of all light, that was passed on."""
         self._sweeps = SWEEPS
+        self._passed_on = min(self._passed_on + share, 1.0)
 
     def refresh(self, whole: bool, wait: bool) -> None:
-        """Give the lightmap the ambient term of the light as it is; if not ``whole``, RAYS_A_LOOK towards it. wait: for the tree
-        that rays walk, without which there is none."""
-        if not self.shown or self.note is not None or not self._sweeps or (self.held and not whole):
+        """Give the lightmap the ambient term of the light as it is; if not ``whole``, POINTS_A_FRAME towards it. wait: for the
+        tree that rays walk, without which there is none."""
+        if not self.shown or self.note is not None or not self._sweeps:
             return
         try:
             points = self._points_now(wait)
@@ -87,16 +100,40 @@ class Ambient:
             return
         if points is None:
             return
+        if whole:
+            self._look(points, float("inf"))
+            self._passed_on = 0.0
+            return
+        self._owed = min(self._owed + POINTS_A_FRAME, FIRST * POINTS_A_LOOK)
+        if not self.held:
+            self._look_for_frames(points)
+
+    def _look_for_frames(self, points: GatherPoints) -> None:
+        """As many looks as frames asked for, once they are enough, and where as much was passed on that it is seen."""
+        first = not points.knows(self._next_row % points.rows)
+        if self._next_row == 0 and self._passed_on < PASSED_ON:
+            self._owed = 0.0
+        elif first or self._owed >= min(POINTS_A_LOOK, points.rows * points.columns):
+            self._look(points, self._owed * (FIRST if first else 1))
+            self._owed = 0.0
+
+    def _look(self, points: GatherPoints, budget: float) -> None:
+        """Looks that take as long as so many, in turn: in the first half of a sweep it is seen what texels have to pass on, in
+        the other points look at that."""
         self._see_to_come()
-        rays = RAYS_A_LOOK if points.knows(self._next_row) else RAYS_A_LOOK // TRACING
-        rows = points.rows if whole else points.rows_of(rays)
-        looked = 0
-        while self._sweeps and (whole or looked < rows):  # a few sweeps, where all take less than a look
-            some = min(rows, points.rows - self._next_row)
-            points.look(self._to_come, self._next_row, some)
-            looked += some
-            self._next_row = (self._next_row + some) % points.rows
-            self._sweeps -= self._next_row == 0
+        while self._sweeps and budget > 0:
+            half, row = divmod(self._next_row, points.rows)
+            cost = SEEING if half == 0 else 1.0 if points.knows(row) else TRACING
+            some = int(max(min(budget / (cost * points.columns), points.rows - row), 1))
+            if half == 0:
+                points.see_light(row, some)
+            else:
+                points.look(self._to_come, row, some)
+            budget -= cost * some * points.columns
+            self._next_row = (self._next_row + some) % (2 * points.rows)
+            if self._next_row == 0:
+                self._sweeps -= 1
+                self._passed_on *= float(np.mean(self._ledger.albedo))  # of it, what is reflected once more
 
     def _points_now(self, wait: bool) -> GatherPoints | None:
         """The points; unless ``wait``, none while their tree is built in the background. Raises UserError where there can be

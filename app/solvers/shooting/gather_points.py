@@ -6,6 +6,8 @@ lamps, shows from the start what it will get, and a room without lamps gets no m
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from app.errors import UserError
@@ -14,22 +16,26 @@ from app.lightmap.lightmap import Lightmap
 from app.solvers.shooting.records import BLOCK_LEVEL
 from app.visibility.rays import RayScene
 
-RAY_EDGE = 12  # squared: rays of a point, where a texture holds what they hit of all
+RAY_EDGE = 8  # squared: rays of a point, where a texture holds what they hit of all; a texel has those of four
 PLACES = "t_position_area", "t_normal_ids"  # of the lightmap
 
 
 class GatherPoints:
     """Of one lightmap. Whoever makes it releases it. Raises UserError where rays cannot be traced, or memory does not do, as
-    ``resize`` does, too."""
+    ``resize`` does, too.
+
+    rows, columns: of points.
+    """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap) -> None:
         self._gpu, self._lightmap = gpu, lightmap
         self._rays = RayScene(gpu, lightmap.pool)
-        self._spread = Pass(
-            gpu,
-            "solvers/shooting/spread_ambient",
-            defines=lightmap.defines("MATERIAL_BITS", "TILE") | {"BLOCK_LEVEL": BLOCK_LEVEL},
-        )
+        bits, tile, own = (lightmap.defines(name) for name in ("MATERIAL_BITS", "TILE", "ALBEDO_TEXTURE"))
+        blocks = {"BLOCK_LEVEL": BLOCK_LEVEL}
+        self._find_around = Pass(gpu, "solvers/shooting/around", defines=bits | tile | blocks)
+        self._see_light = Pass(gpu, "solvers/shooting/to_pass_on", defines=bits | own)
+        self._smooth = Pass(gpu, "solvers/shooting/smooth_ambient", defines=tile | blocks)
+        self._spread = Pass(gpu, "solvers/shooting/spread_ambient", defines=blocks)
         try:
             self._fit()
         except UserError:
@@ -37,29 +43,28 @@ class GatherPoints:
             raise
 
     def _fit(self) -> None:
-        width, height = (edge >> BLOCK_LEVEL for edge in self._lightmap.size)
-        self._ray_edge = min(RAY_EDGE, self._gpu.limits.max_texture // max(width, height))
-        self._make_passes()
-        self._hits = self._gpu.texture((width * self._ray_edge, height * self._ray_edge), 1, "u4")
-        self._hits_target = self._gpu.target(self._hits)
-        self._gathered = self._gpu.texture((width, height), 4, "f4")
-        self._gathered_target = self._gpu.target(self._gathered)
-        self.rows = height
+        gpu, lightmap = self._gpu, self._lightmap
+        self.columns, self.rows = (edge >> BLOCK_LEVEL for edge in lightmap.size)
+        points = self.columns, self.rows
+        self._ray_edge = min(RAY_EDGE, gpu.limits.max_texture // max(points))
+        looks = {"BLOCK_LEVEL": BLOCK_LEVEL, "RAY_EDGE": self._ray_edge} | lightmap.defines("MATERIAL_BITS")
+        traced = looks | lightmap.defines("TILE") | dict(self._rays.defines)
+        self._trace = Pass(gpu, "solvers/shooting/gather_hits", defines=traced)
+        self._gather = Pass(gpu, "solvers/shooting/gather_ambient", defines=looks)
+        self._hits = gpu.texture((self.columns * self._ray_edge, self.rows * self._ray_edge), 1, "u4")
+        self._around = gpu.texture(lightmap.size, 4, "u4")
+        self._to_pass_on = gpu.texture(lightmap.size, 4, "f4")
+        self._gathered, self._smoothed = gpu.texture(points, 4, "f4"), gpu.texture(points, 4, "f4")
+        self._textures = self._hits, self._around, self._to_pass_on, self._gathered, self._smoothed
+        self._targets = {texture: gpu.target(texture) for texture in self._textures}
+        self._targets[self._gathered].clear()
         self.leaves_changed()
-
-    def _make_passes(self) -> None:
-        """Those that know how many rays a point has."""
-        bits, tile, own = (self._lightmap.defines(name) for name in ("MATERIAL_BITS", "TILE", "ALBEDO_TEXTURE"))
-        points = {"BLOCK_LEVEL": BLOCK_LEVEL, "RAY_EDGE": self._ray_edge}
-        traced = bits | tile | points | dict(self._rays.defines)
-        self._trace = Pass(self._gpu, "solvers/shooting/gather_hits", defines=traced)
-        self._gather = Pass(self._gpu, "solvers/shooting/gather_ambient", defines=bits | own | points)
 
     @property
     def memory(self) -> int:
         """Bytes on the GPU."""
-        points = self._gathered.width * self._gathered.height
-        return points * (4 * self._ray_edge**2 + 16) + self._rays.memory
+        points, texels = self.columns * self.rows, self._around.width * self._around.height
+        return points * (4 * self._ray_edge**2 + 2 * 16) + 2 * 16 * texels + self._rays.memory
 
     def leaves_changed(self) -> None:
         """Points are elsewhere, and what rays hit is."""
@@ -69,46 +74,50 @@ class GatherPoints:
         """Whether it is known what the rays of points in a row hit."""
         return bool(self._traced[row])
 
-    def rows_of(self, rays: int) -> int:
-        """Rows of points that have about so many rays: whole tiles, one at least."""
-        across = self._lightmap.pool.tile >> BLOCK_LEVEL
-        return max(rays // (self._hits.width * self._ray_edge * across), 1) * across
+    def see_light(self, first: int, rows: int) -> None:
+        """See what texels have yet to pass on, those that so many rows of points stand for."""
+        reads = "t_normal_ids", "t_materials", "t_albedo", "t_irradiance", "t_residual", "t_ambient"
+        self._draw(self._see_light, self._to_pass_on, self._lightmap.textures(*reads), (first, rows), 1 << BLOCK_LEVEL)
 
     def look(self, to_come: Texture, first: int, rows: int) -> None:
-        """Let points in so many rows look around, and the texels there have the ambient light that they find now. to_come: see
-        to_come.frag.glsl."""
-        lightmap, width = self._lightmap, self._gathered.width
-        band = first, min(first + rows, self.rows)
-        if not self._traced[slice(*band)].all():
-            self._trace.draw(
-                self._hits_target,
-                textures=self._rays.textures | lightmap.textures("t_pages", "t_leaves", *PLACES),
-                uniforms=self._rows | self._pages,
-                scissor=_scissor(band, width, self._ray_edge),
-            )
-            self._traced[slice(*band)] = True
-        self._gather.draw(
-            self._gathered_target,
-            textures={"t_hits": self._hits}
-            | lightmap.textures("t_residual", "t_materials", "t_albedo", "t_ambient", "t_facets", *PLACES),
-            uniforms=self._rows,
-            scissor=_scissor(band, width, 1),
-        )
+        """Let points in so many rows look around at the light that was seen, and the texels there have the ambient light that
+        they find. to_come: see to_come.frag.glsl."""
+        lightmap, band, edge = self._lightmap, (first, rows), 1 << BLOCK_LEVEL
+        places = lightmap.textures("t_facets", *PLACES)
+        pages = lightmap.textures("t_pages", "t_leaves")
+        beside: dict[str, object] = {"u_pages": (float(lightmap.columns), lightmap.pool.pages_per_texel)}
+        rays: dict[str, object] = {"u_rows": lightmap.size[1], "u_points": self.columns}
+        if not self._traced[first : first + rows].all():
+            reads = self._rays.textures | pages | lightmap.textures(*PLACES)
+            self._draw(self._trace, self._hits, reads, band, self._ray_edge, rays | beside)
+            self._draw(self._find_around, self._around, places | pages, band, edge, beside)
+            self._traced[first : first + rows] = True
+        found = {"t_hits": self._hits, "t_to_pass_on": self._to_pass_on}
+        self._draw(self._gather, self._gathered, found | places, band, 1, rays)
+        self._draw(self._smooth, self._smoothed, {"t_gathered": self._gathered} | pages, band, 1, beside)
+        found = {"t_around": self._around, "t_gathered": self._smoothed, "t_to_come": to_come}
         self._spread.draw(
             lightmap.ambient_target,
-            textures={"t_gathered": self._gathered, "t_to_come": to_come}
-            | lightmap.textures("t_pages", "t_leaves", "t_irradiance", "t_facets", *PLACES),
-            uniforms=self._pages,
-            scissor=_scissor(band, width, 1 << BLOCK_LEVEL),
+            textures=found | lightmap.textures("t_irradiance"),
+            scissor=self._scissor(band, edge),
         )
 
-    @property
-    def _rows(self) -> dict[str, object]:
-        return {"u_rows": self._lightmap.size[1]}
+    def _draw(
+        self,
+        program: Pass,
+        into: Texture,
+        textures: Mapping[str, Texture],
+        band: tuple[int, int],
+        edge: int,
+        uniforms: Mapping[str, object] | None = None,
+    ) -> None:
+        """A band of rows of points, of which each is a square of so many pixels."""
+        scissor = self._scissor(band, edge)
+        program.draw(self._targets[into], textures=textures, uniforms=uniforms, scissor=scissor)
 
-    @property
-    def _pages(self) -> dict[str, object]:
-        return {"u_pages": (float(self._lightmap.columns), self._lightmap.pool.pages_per_texel)}
+    def _scissor(self, band: tuple[int, int], edge: int) -> tuple[int, int, int, int]:
+        first, rows = band
+        return 0, first * edge, self.columns * edge, rows * edge
 
     def resize(self) -> None:
         """For a lightmap that has got another number of slots."""
@@ -120,9 +129,4 @@ class GatherPoints:
         self._rays.release()
 
     def _release_points(self) -> None:
-        self._gpu.release_all(self._hits_target, self._hits, self._gathered_target, self._gathered)
-
-
-def _scissor(band: tuple[int, int], width: int, edge: int) -> tuple[int, int, int, int]:
-    """A band of rows of points, of which each is a square of so many pixels."""
-    return 0, band[0] * edge, width * edge, (band[1] - band[0]) * edge
+        self._gpu.release_all(*self._targets.values(), *self._textures)

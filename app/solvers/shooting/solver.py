@@ -200,6 +200,7 @@ class Shooting:
                 batch.shoot_finer()
                 self._uneven = None
         self._strongest = float(values["strongest"]) * ledger.watt
+        batch.ambient.strongest = min(ledger.share(float(values["strongest"])), 1.0)
         remaining = min(unshot, 1.0) if outside.left else unshot  # an edit takes back light, and gives as much
         self._progress = Progress(int(values["shots"]), remaining, values["escaped"].astype(np.float64) * ledger.watt)
         if choice is None:

@@ -10,7 +10,7 @@ uniform float u_unit;       // W/m² per stored unit
 
 vec3 layer_colour(ivec2 texel_px) {
     uint material = material_from_ids(texelFetch(t_normal_ids, texel_px, 0).y);
-    vec3 H = texelFetch(t_light, texel_px, 0).rgb, received = (H + ambient_at(texel_px)) * u_unit;
+    vec3 H = texelFetch(t_light, texel_px, 0).rgb, received = (H + ambient_at(texel_px, H)) * u_unit;
     return (exitance_of(t_materials, material, texel_px) + albedo_of(t_materials, material, texel_px) * received) / PI;
 }
 

@@ -6,7 +6,7 @@ uniform float u_unit;           // W/m² per stored unit
 uniform float u_dark;           // length of a colour that counts as dark [W/m²]
 
 vec3 layer_colour(ivec2 texel_px) {
-    vec3 H = texelFetch(t_light, texel_px, 0).rgb, received = (H + ambient_at(texel_px)) * u_unit, right = texelFetch(t_reference, texel_px, 0).rgb;
+    vec3 H = texelFetch(t_light, texel_px, 0).rgb, received = (H + ambient_at(texel_px, H)) * u_unit, right = texelFetch(t_reference, texel_px, 0).rgb;
     return vec3(length(received - right) / max(length(right), u_dark));
 }
 

@@ -6,7 +6,7 @@ uniform float u_unit;       // W/m² per stored unit
 
 vec3 layer_colour(ivec2 texel_px) {
     vec3 H = texelFetch(t_light, texel_px, 0).rgb;
-    return (H + ambient_at(texel_px)) * (u_unit / PI);
+    return (H + ambient_at(texel_px, H)) * (u_unit / PI);
 }
 
 vec3 unlit_colour(int material) { return vec3(0.0); }
