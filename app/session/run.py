@@ -242,7 +242,6 @@ class Run:
         elif wanted and self._energy.due:
             slow = True
             self._energy.measure(self.solver)
-            self.progress = self.solver.poll()
         self.furthest = max(self.furthest, self.share_done(NEVER))
         if self.converged:
             self.effort.converged(self.progress.done)
@@ -257,7 +256,6 @@ class Run:
         self.progress = self.solver.settle()
         self.furthest = max(self.furthest, self.share_done(NEVER))
         self._energy.measure(self.solver)
-        self.progress = self.solver.poll()
         self.settled = True
         if self.energy.emitted.sum() > 0:
             self.history.add(self.solver.issued, self.seconds, self.progress.remaining, self.escaped_share)

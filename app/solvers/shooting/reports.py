@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.gpu import Gpu, Pass, ReadBack
+from app.scene.model import F64
 from app.solvers.shooting.choose import Bins, Choice
 from app.solvers.shooting.ledger import Ledger
 from app.solvers.shooting.outside import Sent
@@ -23,22 +24,25 @@ LAG = 2  # read-backs in flight before the oldest is looked at
 class Report:
     """What became of a batch. choice: of its patches; none where it came from outside, or the
     choice is no more. values: REPORT; shooter: the first of the
-    batch, SHOOTER. sent: how far light from outside was after it."""
+    batch, SHOOTER. sent: how far light from outside was after it. escaped: what had left the scene
+    when that was unshot which the report tells, RGB [stored units · solver area]."""
 
     choice: Choice | None
     values: np.void
     shooter: np.void
     sent: Sent
+    escaped: F64
 
 
 class Reports:
-    """Those that are on their way. Whoever makes it releases it."""
+    """Those that are on their way. Whoever makes it releases it. escaped: what had left the scene after the last that arrived."""
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
         self._texture = gpu.texture((REPORT.rows + SHOOTER.rows, 1), 4, "f4")
         self._target = gpu.target(self._texture)
         self._make = Pass(gpu, "solvers/shooting/report", slots=RECORDS)
+        self.escaped = np.zeros(3)
         self._sent: deque[tuple[Choice | None, ReadBack, Sent]] = deque()
 
     def send(self, choice: Choice | None, bins: Bins, ledger: Ledger, shooters: ShooterBatch, sent: Sent) -> None:
@@ -60,7 +64,8 @@ class Reports:
             choice, readback, sent = self._sent.popleft()
             texels = np.frombuffer(readback.take(), np.float32).reshape(-1, 4)
             values, shooter = REPORT.read(texels[: REPORT.rows])[0], SHOOTER.read(texels[REPORT.rows :])[0]
-            yield Report(choice, values, shooter, sent)
+            before, self.escaped = self.escaped, values["escaped"].astype(np.float64)
+            yield Report(choice, values, shooter, sent, self.escaped if choice is None else before)
 
     @property
     def all_arrived(self) -> bool:
@@ -68,6 +73,7 @@ class Reports:
 
     def drop(self) -> None:
         """Forget those on their way."""
+        self.escaped = np.zeros(3)
         while self._sent:
             self._sent.popleft()[1].take()
 

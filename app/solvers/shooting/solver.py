@@ -202,7 +202,7 @@ class Shooting:
         self._strongest = float(values["strongest"]) * ledger.watt
         batch.ambient.strongest = min(ledger.share(float(values["strongest"])), 1.0)
         remaining = min(unshot, 1.0) if outside.left else unshot  # an edit takes back light, and gives as much
-        self._progress = Progress(int(values["shots"]), remaining, values["escaped"].astype(np.float64) * ledger.watt)
+        self._progress = Progress(int(values["shots"]), remaining, report.escaped * ledger.watt)
         if choice is None:
             return
         if sizes_of(report.shooter):
@@ -235,15 +235,14 @@ class Shooting:
     def settle(self) -> Progress:
         """End the work under way, and measure what is unshot."""
         self.poll(wait=True)
-        self._progress = replace(self._progress, remaining=self._unshot_share())
+        escaped = self._reports.escaped * self.batch.ledger.watt
+        self._progress = replace(self._progress, remaining=self._unshot_share(), escaped=escaped)
         return self.poll()
 
     def energy(self) -> EnergyBalance:
-        """Where all emitted energy is now, RGB [W]; progress is of the same moment. Reads every texel and waits for the GPU."""
-        self.settle()
-        balance = self.batch.ledger.balance()
-        self._progress = replace(self._progress, escaped=balance.escaped)
-        return balance
+        """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
+        self.poll(wait=True)
+        return self.batch.ledger.balance()
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
 
@@ -318,8 +317,8 @@ class Shooting:
         self.batch.restore(state.part("batch"))
         self._reports.restore(state.part("reports"), self.batch.phases.choices)
         self._progress, self.issued = Progress.of(state.values["progress"]), int(state.values["issued"])
-        self._look_at = int(state.values["look_at"])
-        self._strongest = float(state.values["strongest"])
+        self._look_at, self._strongest = int(state.values["look_at"]), float(state.values["strongest"])
+        self._reports.escaped = self._progress.escaped / self.batch.ledger.watt
 
     # -- what there is to see ------------------------------------------------------------------------------------------
 
