@@ -63,7 +63,7 @@ class Members:
 
 
 @dataclass(frozen=True, eq=False)
-class _Facets:
+class Facets:
     """Flat pieces of triangles, those of the scene first. corners (m, 3, 3); members: triangles of each facet; normal, point
     (n, 3): their planes; least, most (n, 3): boxes around them; depth (n,): see _depths; scene: how many are the scene's."""
 
@@ -77,7 +77,13 @@ class _Facets:
     scene: int
 
     @staticmethod
-    def of(points: F64, triangles: I32, facet: I32, double_sided: NDArray[np.bool_], flat: float) -> _Facets:
+    def of_scene(scene: Scene, points: F64, triangles: I32, facet: I32) -> Facets:
+        """points (n, 3), triangles (m, 3): welded; facet (m,) of them."""
+        two = np.array([m.double_sided for m in scene.materials])[scene.material_ids]
+        return Facets.of(points - points.min(0), triangles, facet, two, FLAT * scene_size(scene))
+
+    @staticmethod
+    def of(points: F64, triangles: I32, facet: I32, double_sided: NDArray[np.bool_], flat: float) -> Facets:
         """points (n, 3), triangles (m, 3), facet (m,), whether their material has two sides (m,)."""
         count = int(facet.max(initial=-1)) + 1
         caps, cap = _caps(points, triangles, double_sided, flat)
@@ -91,7 +97,7 @@ class _Facets:
         normals /= np.maximum(area, np.finfo(float).tiny)[:, None]
         order = np.lexsort((-area, facet))
         first = np.flatnonzero(np.diff(facet[order], prepend=-1))
-        return _Facets(
+        return Facets(
             corners,
             Members(order, np.append(first, len(order))),
             normals[order[first]],
@@ -105,8 +111,7 @@ class _Facets:
 
 def hidden_pieces(
     scene: Scene,
-    points: F64,
-    triangles: I32,
+    all_: Facets,
     facet: I32,
     face_triangle: I32,
     face_back: NDArray[np.bool_],
@@ -114,18 +119,16 @@ def hidden_pieces(
     density: float,
     report: Report | None = None,
 ) -> Hidden:
-    """points (n, 3), triangles (m, 3): welded; facet (m,) of them; face_triangle (f,), face_back (f,), face_uv (f, 3, 2): sides
-    in the atlas; density [texels/m]. report(share) is called now and then and may raise to cancel."""
+    """all_: those of the scene; facet (m,) of its triangles; face_triangle (f,), face_back (f,), face_uv (f, 3, 2): sides in the
+    atlas; density [texels/m]. report(share) is called now and then and may raise to cancel."""
     tell = report or (lambda share: None)
     tell(0.0)
     flat = FLAT * scene_size(scene)
     within = max(GAP / density, flat)
-    two = np.array([m.double_sided for m in scene.materials])[scene.material_ids]
-    all_ = _Facets.of(points - points.min(0), triangles, facet, two, flat)
-    tell(0.3)
     sides, side = np.unique(2 * facet[face_triangle].astype(np.int64) + face_back, return_inverse=True)
     faces_of = Members.of(side.reshape(-1))
     own, up = sides // 2, all_.normal[sides // 2] * np.where(sides % 2 == 1, -1.0, 1.0)[:, None]
+    tell(0.2)
     lids, left_out = _lids(all_, own, up, within, flat, tell)
     pieces, owners = [np.empty((0, 3, 2))], [np.empty(0, np.int64)]
     sheer = np.zeros(len(all_.normal), bool)  # nothing that is not opaque hides what it lies on
@@ -149,7 +152,7 @@ def covers(
 ) -> tuple[dict[int, shapely.Geometry], dict[int, shapely.Geometry]]:
     """What lies on the fronts of some facets, own (k,), and on their backs: by the place in ``own``, in axes (k, 3, 2) of their
     planes. points (n, 3) from their least, triangles (m, 3): welded; facet (m,) of them, whether they have two sides (m,)."""
-    all_ = _Facets.of(points, triangles, facet, double_sided, flat)
+    all_ = Facets.of(points, triangles, facet, double_sided, flat)
     up = all_.normal[own]
     lids, _ = _lids(all_, np.tile(own, 2), np.concatenate([up, -up]), flat, flat, lambda share: None)
     found: tuple[dict[int, shapely.Geometry], dict[int, shapely.Geometry]] = {}, {}
@@ -166,7 +169,7 @@ def hidden_points(scene: Scene, triangle: I32, back: NDArray[np.bool_], weights:
     own = np.tile(np.eye(3)[:, 1:], (len(sides), 1, 1))  # of each side, the weights of its second and third corner
     facet = facets(points, corners, scene.material_ids, scene_size(scene))
     at = (sides // 2).astype(np.int32), sides % 2 == 1, own
-    found = hidden_pieces(scene, points, corners, facet, *at, math.inf)
+    found = hidden_pieces(scene, Facets.of_scene(scene, points, corners, facet), facet, *at, math.inf)
     hidden = np.zeros(len(triangle), bool)
     for piece, one in zip(found.uv, found.face.tolist(), strict=True):
         mine = np.flatnonzero(side.reshape(-1) == one)
@@ -183,7 +186,7 @@ def inside_triangles(triangles: F64, points: F64) -> NDArray[np.bool_]:
 
 
 def _lids(
-    all_: _Facets, own: I64, up: F64, within: float, flat: float, report: Report
+    all_: Facets, own: I64, up: F64, within: float, flat: float, report: Report
 ) -> tuple[list[tuple[int, I64]], int]:
     """Sides that something may lie on, and the facets that do; how many were left out. own, up: facet and normal of each side."""
     ends = np.flatnonzero(all_.depth > 2 * within)  # else of one thin body
@@ -218,7 +221,7 @@ def _lids(
     return list(zip(side[starts].tolist(), np.split(other, starts[1:]), strict=True)) if len(side) else [], left_out
 
 
-def _boxes_that_meet(all_: _Facets, own: I64, lids: I64, axis: I64, within: float, report: Report) -> tuple[I64, I64]:
+def _boxes_that_meet(all_: Facets, own: I64, lids: I64, axis: I64, within: float, report: Report) -> tuple[I64, I64]:
     """Pairs of sides and lids, the number of each, whose boxes meet as seen along the axis of the side, in the order of sides; no
     more than MOST_MEET, and one block."""
     sides, others = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
@@ -240,7 +243,7 @@ def _boxes_that_meet(all_: _Facets, own: I64, lids: I64, axis: I64, within: floa
     return side[order], lid[order]
 
 
-def _cover(all_: _Facets, lid: I64, axes: F64) -> shapely.Geometry:
+def _cover(all_: Facets, lid: I64, axes: F64) -> shapely.Geometry:
     """All of these facets, in axes (3, 2) of their plane."""
     lying = shapely.polygons(np.concatenate([all_.corners[all_.members[k]] for k in lid]) @ axes)
     return shapely.union_all(lying[shapely.area(lying) > 0])

@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from app.atlas.charts import DEFAULT_TILE, Charts
-from app.atlas.contacts import hidden_pieces
+from app.atlas.contacts import Facets, hidden_pieces
 from app.atlas.enclosed import without_enclosed
 from app.atlas.layout import Layout, density_for, measured, place, scaled, texel_count
 from app.atlas.rectangles import Rectangles, find_rectangles
@@ -62,15 +62,20 @@ def parametrize(
     check(density, texels)
     report = progress or (lambda stage, share: None)
     report("joining corners", 0.0)
-    with ThreadPoolExecutor(1) as beside:
+    beside = ThreadPoolExecutor(1)
+    try:
         sides = beside.submit(lit_sides, scene)
         points, corners = weld(scene)
         if facet is None:
             report("finding flat pieces", 0.05)
             facet = facets(points, corners, scene.material_ids, scene_size(scene))
         report("finding sides that light can reach", 0.15)
+        flat_pieces = beside.submit(Facets.of_scene, scene, points, corners, facet)
         lit = without_enclosed(sides.result(), scene, points, corners)
-    layout, method, warnings = _unfold(scene, lit, points, corners, facet, ends, time_limit, report)
+        layout, method, warnings = _unfold(scene, lit, points, corners, facet, ends, time_limit, report)
+        all_facets = flat_pieces.result()
+    finally:
+        beside.shutdown(wait=False, cancel_futures=True)
     report("placing pieces side by side", UNFOLDED)
     plain, layout = layout, scaled(layout, scene)
     if density is None:
@@ -88,8 +93,7 @@ def parametrize(
     face_uv, face_chart, face_facet, rects, size = charts
     hidden = hidden_pieces(
         scene,
-        points,
-        corners,
+        all_facets,
         facet,
         lit.triangle,
         lit.back,
