@@ -35,20 +35,7 @@ def coarse_charts(scene: Scene, tile: int, texels: int, report: Report) -> Chart
     density = density_for(layout, texels)
     facet = np.arange(len(piece), dtype=np.int32)
     report(0.8)
-    face_uv, face_chart, face_facet, rects, size = place(layout, lit, facet, density, tile, report)
-    return Charts(
-        size=size,
-        tile=tile,
-        density=density,
-        face_triangle=lit.triangle,
-        face_back=lit.back,
-        face_uv=face_uv,
-        face_chart=face_chart,
-        face_facet=face_facet,
-        chart_rects=rects,
-        dark_faces=lit.dark,
-        method=f"{count} pieces seen along an axis",
-    )
+    return place(layout, lit, facet, density, tile, f"{count} pieces seen along an axis", report)
 
 
 def _pieces(scene: Scene, way: NDArray[np.int64]) -> tuple[int, I32]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.charts import ALIGN, GAP
+from app.atlas.charts import ALIGN, GAP, Charts
 from app.atlas.packing import MAX_SIDE, outlines, pack
 from app.atlas.sides import Sides, distinct_rows, least, most, totals
 from app.scene.model import F64, I32, Scene
@@ -133,10 +133,9 @@ def density_for(layout: Layout, texels: int) -> float:
     return min((low, high), key=lambda d: abs(texel_count(layout, d) - texels))
 
 
-def place(
-    layout: Layout, lit: Sides, facet: I32, density: float, tile: int, report: Report
-) -> tuple[F64, I32, I32, NDArray[np.int32], tuple[int, int]]:
-    """face_uv, face_chart, face_facet, chart_rects and the atlas's size."""
+def place(layout: Layout, lit: Sides, facet: I32, density: float, tile: int, method: str, report: Report) -> Charts:
+    """Charts side by side in an atlas, without seams or what is hidden. facet (m,): flat piece of each triangle; density
+    [texels/m]; method: how they were made."""
     box = _sizes(layout, density)
     stretch = np.full_like(box, density)
     stretch[: layout.rectangles] = (box / layout.extent)[: layout.rectangles]
@@ -149,7 +148,19 @@ def place(
     uv += origins[chart][:, None]
     rects = np.concatenate([origins, box[piece[first]].astype(np.int32)], axis=1)
     face_facet = distinct_rows(chart, facet[lit.triangle])[1]
-    return uv, chart.astype(np.int32), face_facet.astype(np.int32), rects, size
+    return Charts(
+        size=size,
+        tile=tile,
+        density=density,
+        face_triangle=lit.triangle,
+        face_back=lit.back,
+        face_uv=uv,
+        face_chart=chart.astype(np.int32),
+        face_facet=face_facet.astype(np.int32),
+        chart_rects=rects,
+        dark_faces=lit.dark,
+        method=method,
+    )
 
 
 assert GAP < ALIGN, "outlines let gaps stick out by one column only"

@@ -5,6 +5,7 @@ The unfolding is in metres and is made once; a density only lays it out, see lay
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -88,16 +89,21 @@ def parametrize(
             f"--density {density:g} needs {need:,.0f} texels: the limit is {MAX_TEXELS:,} (density {best:.3g})"
         )
     charts = place(
-        layout, lit, facet, density, tile, lambda share: report("placing pieces side by side", UNFOLDED + 0.1 * share)
+        layout,
+        lit,
+        facet,
+        density,
+        tile,
+        method,
+        lambda share: report("placing pieces side by side", UNFOLDED + 0.1 * share),
     )
-    face_uv, face_chart, face_facet, rects, size = charts
     hidden = hidden_pieces(
         scene,
         all_facets,
         facet,
         lit.triangle,
         lit.back,
-        face_uv,
+        charts.face_uv,
         density,
         lambda share: report("finding what lies on surfaces", 0.8 + 0.15 * share),
     )
@@ -109,23 +115,8 @@ def parametrize(
     if not roots:
         warnings += _too_small(layout, density)
     report("joining edges of pieces", 0.95)
-    return Charts(
-        size=size,
-        tile=tile,
-        density=density,
-        face_triangle=lit.triangle,
-        face_back=lit.back,
-        face_uv=face_uv,
-        face_chart=face_chart,
-        face_facet=face_facet,
-        chart_rects=rects,
-        dark_faces=lit.dark,
-        method=method,
-        warnings=warnings,
-        seams=find_seams(scene, corners, lit.triangle, lit.back, face_uv, face_chart, ends),
-        hidden_uv=hidden.uv,
-        hidden_face=hidden.face,
-    )
+    seams = find_seams(scene, corners, lit.triangle, lit.back, charts.face_uv, charts.face_chart, ends)
+    return dataclasses.replace(charts, warnings=warnings, seams=seams, hidden_uv=hidden.uv, hidden_face=hidden.face)
 
 
 def _too_small(layout: Layout, density: float) -> tuple[str, ...]:
