@@ -21,15 +21,12 @@ GL41 = {
     "-GL_ARB_shader_image_load_store -GL_ARB_shading_language_420pack",
 }
 
-
 LONGEST = ("desktop", "screenshots", "web")
-# Parameters of tests that pick other programs, textures or targets
-WAYS = ("program", "solver", "method", "adaptive", "projection", "storage", "way", "occlusion", "bounces")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--gl41", action="store_true", help="run in an OpenGL 4.1 context, as macOS has it")
-    parser.addoption("--kills", type=int, default=2, help="random moments at which each bake is killed and resumed")
+    parser.addoption("--kills", type=int, default=1, help="random moments at which each bake is killed and resumed")
     parser.addoption("--regenerate-screenshots", action="store_true", help="write the goldens instead of comparing")
 
 
@@ -37,27 +34,11 @@ def pytest_configure(config: pytest.Config) -> None:
     if config.getoption("--gl41"):
         os.environ |= GL41
     config.addinivalue_line("markers", "display: needs an X server or Xvfb")
-    config.addinivalue_line("markers", "long: whole solves, left out of the second run in an OpenGL 4.1 context")
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """In an OpenGL 4.1 context, drivers may refuse what others take: a shader, a format, a call. Tests run there that have a
-    context, and of cases that differ in numbers alone the first, since the others ask the driver for the same. In either run the
-    longest come first: none is left to one worker at the end."""
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest come first: none is left to one worker at the end."""
     items.sort(key=lambda item: item.path.parent.name not in LONGEST)
-    if not config.getoption("--gl41"):
-        return
-    asked, kept, left = set(), [], []
-    for item in items:
-        parameters = item.callspec.params if isinstance(item, pytest.Function) and hasattr(item, "callspec") else {}
-        ways = ((name, repr(parameters[name])) for name in WAYS if name in parameters)
-        case = item.nodeid.split("[")[0], *ways
-        again = case in asked or "_gpu" not in getattr(item, "fixturenames", ())
-        (left if again else kept).append(item)
-        if item.get_closest_marker("long") is None:
-            asked.add(case)
-    config.hook.pytest_deselected(items=left)
-    items[:] = kept
 
 
 def pytest_collection_finish() -> None:

@@ -95,12 +95,7 @@ def table_room() -> Scene:
 
 
 WAYS = [
-    pytest.param(
-        adaptive,
-        projection,
-        id=f"{'adaptive' if adaptive else 'uniform'}-{projection}",
-        marks=() if projection == "hemicube" else pytest.mark.long,
-    )
+    pytest.param(adaptive, projection, id=f"{'adaptive' if adaptive else 'uniform'}-{projection}")
     for adaptive, projection in itertools.product((False, True), PROJECTIONS)
 ]
 EVERY_WAY = pytest.mark.parametrize(("adaptive", "projection"), WAYS)

@@ -44,7 +44,7 @@ def rounding(corners: F64, directions: F64, distance: F64) -> F64:
 
 
 @pytest.mark.parametrize("plain", [0.0, 1e4])
-@pytest.mark.parametrize("count", [4096, pytest.param(1 << 17, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [4096, 1 << 17])
 def test_rays_meet_what_they_meet_in_double_precision(
     gpu: Gpu, rng: np.random.Generator, count: int, plain: float
 ) -> None:
@@ -94,7 +94,7 @@ def ball() -> object:
     return bare_pool(mesh.positions * rng.uniform(0.9, 1.0, (len(mesh.positions), 1)), mesh.triangles)
 
 
-@pytest.mark.parametrize("count", [1 << 16, pytest.param(1 << 20, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [1 << 16, 1 << 20])
 def test_no_ray_leaves_a_closed_room(gpu: Gpu, rng: np.random.Generator, ball: object, count: int) -> None:
     """Rays at vertices, at edges, and anywhere."""
     corners = corners_of(ball)

@@ -11,8 +11,6 @@ from solver_scenes import Solution, begin, grey, solve, table_room
 from app.gpu import Gpu
 from app.scene.model import Material, Scene
 
-pytestmark = pytest.mark.long
-
 LAMP, RED = 2, 1
 EDITS: dict[str, tuple[int, dict[str, object]]] = {
     "brighter lamp": (LAMP, {"emission": (9.0, 9.0, 9.0)}),

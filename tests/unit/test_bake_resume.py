@@ -69,7 +69,6 @@ def same_light(one: Path, other: Path) -> bool:
 
 
 @posix
-@pytest.mark.long
 @pytest.mark.parametrize("name", BAKES)
 def test_killed_at_any_moment_it_goes_on_to_the_same_light(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
