@@ -3,8 +3,8 @@
     python drive_window.py FOLDER [SECONDS]
 
 Writes FOLDER/state.json every few frames: where buttons and sliders are, and where the session stands. A file name in
-FOLDER/drop is dropped on the window, and a FOLDER/close presses its close button, as the window system would. SECONDS: of
-solving, after which quitting asks.
+FOLDER/drop is dropped on the window, and a FOLDER/close presses its close button, as the window system would. A FOLDER/enough
+ends the solve with half of what remains now. SECONDS: of solving, after which quitting asks.
 """
 
 from __future__ import annotations
@@ -86,6 +86,9 @@ class ReportingSession(Session):
     def poll(self, *, interactive: bool = False) -> None:
         super().poll(interactive=interactive)
         pyglet.app.platform_event_loop.dispatch_posted_events()  # of the test; at rest the window does it
+        if (self.folder / "enough").exists():
+            (self.folder / "enough").unlink()
+            self.set_options(self.options.replace(residual=self.run.progress.remaining / 2))
         self.frame += 1
         if self.frame % EVERY == 0:
             for panel in ("Bake", "Lights", "Materials"):

@@ -293,7 +293,7 @@ def test_where_nothing_reflects_no_more_lacks_than_what_is_seen(gpu: Gpu) -> Non
 
 def test_shadows_on_coarse_texels_are_expected_to_be_off(gpu: Gpu) -> None:
     """Within a factor of two of how far they are from ten times as many texels."""
-    coarse, fine = (begin(gpu, table_room(), density=density, residual=3e-3, resolution=128) for density in (6.0, 20.0))
+    coarse, fine = (begin(gpu, table_room(), density=density, residual=3e-3, resolution=128) for density in (4.0, 12.6))
     for one in (coarse, fine):
         one.settle()
     points = random_points(coarse.lightmap.scene, 2000, 3)
@@ -344,7 +344,7 @@ def two_rooms_and_a_gap() -> Scene:
 def beyond_a_gap(_gpu: Gpu) -> tuple[Points, F64]:
     """Points behind and before it, and the irradiance there."""
     scene = two_rooms_and_a_gap()
-    late = begin(_gpu, scene, density=16.0, residual=1e-3, resolution=256)
+    late = begin(_gpu, scene, density=12.0, residual=1e-3, resolution=256)
     late.settle()
     points = random_points(late.lightmap.scene, 3000, 3)
     right = irradiance_of(late.lightmap, points)
@@ -357,7 +357,7 @@ def test_light_through_a_gap(gpu: Gpu, beyond_a_gap: tuple[Points, F64], residua
     """How far off a solve is that stopped early, where most surfaces see no lamp: RMS and median, held against one of more texels
     that did not stop."""
     points, right = beyond_a_gap
-    early = begin(gpu, two_rooms_and_a_gap(), density=8.0, residual=residual, resolution=256)
+    early = begin(gpu, two_rooms_and_a_gap(), density=6.0, residual=residual, resolution=256)
     early.settle()
     H = irradiance_of(early.lightmap, points)
     lit = lit_points(right)

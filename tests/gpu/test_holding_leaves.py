@@ -15,7 +15,7 @@ from app.session.run import Stop
 from app.session.session import Session
 from app.solvers import SOLVERS
 
-FINE = {"depth": 5, "gradient": 1e-3, "budget": 100_000}
+FINE = {"depth": 5, "gradient": 1e-3, "budget": 65_536}
 
 
 @pytest.fixture(params=["shooting", "gathering"])

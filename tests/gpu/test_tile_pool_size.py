@@ -35,7 +35,7 @@ from app.viewer.picture import picture
 __all__ = ["forest"]
 
 SMALL_ROOM = 4096  # texels that a tile pool has room for at least: a small scene outgrows it
-MANY: dict[str, object] = {"depth": 4, "gradient": 0.06}
+MANY: dict[str, object] = {"depth": 3, "gradient": 0.06}
 FEW: dict[str, object] = {"depth": 1, "gradient": 0.5}
 
 
@@ -217,7 +217,6 @@ def replay_of(solution: Solution) -> Replay:
     return solution.solver.batch.replay
 
 
-@pytest.mark.long
 def test_memory_follows_the_light(planted: Callable[..., Solution]) -> None:
     """A tree that merges gives its room back, once: what is left serves as it comes and goes a little."""
     box = planted(**MANY)
@@ -303,7 +302,6 @@ def twin(gpu: Gpu, solution: Solution) -> Solution:
     return Solution(lightmap, Shooting(gpu, lightmap, solution.solver.options))
 
 
-@pytest.mark.long
 def test_further_shots_come_to_the_same_answer(gpu: Gpu, planted: Callable[..., Solution]) -> None:
     """As of a solver that kept its room: what either leaves unshot, at most 1 %, lies elsewhere, since the strongest patches are
     found bin by bin. As of one that had these leaves from the start: what patches of other leaves make of it is 1 %
@@ -332,7 +330,6 @@ def test_further_shots_come_to_the_same_answer(gpu: Gpu, planted: Callable[..., 
 # -- what the user sees --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_the_picture_stays_and_the_panel_tells(gpu: Gpu) -> None:
     """Texels of a leaf lie elsewhere in a texture of another height: the sampler weighs them with a fraction of so many bits."""
     light = LightmapOptions(adaptive=True, **MANY)  # type: ignore[arg-type]

@@ -14,8 +14,6 @@ from app.lightmap.refinement import MERGE
 from app.scene.load import load_scene
 from app.scene.model import Scene
 
-pytestmark = pytest.mark.long
-
 DENSITY = 4.0  # of the roots [1/m]
 ROUGH = 0.1  # a threshold that splits about half of a room with shadows
 FEW_STEPS = 1500
@@ -139,10 +137,10 @@ def test_a_tree_grows_as_deep_late_as_early(planted: Callable[..., Solution]) ->
 
 def test_a_restart_after_a_slider_was_moved_is_a_restart(planted: Callable[..., Solution]) -> None:
     """An edit, other options and a restart while shots are made again leave nothing of that behind."""
-    box = planted(table_room(), **(SHADOW | {"depth": 0, "residual": 0.1, "resolution": 64, "gradient": 0.03}))
+    box = planted(table_room(), **(SHADOW | {"depth": 0, "residual": 0.1, "resolution": 64, "gradient": 0.06}))
     box.settle()
     for disturb in (
-        lambda: box.solver.set_options(box.solver.options.replace(resolution=192)),
+        lambda: box.solver.set_options(box.solver.options.replace(resolution=128)),
         lambda: box.solver.set_materials(box.lightmap.scene.materials),
         box.solver.reset,
     ):

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from solver_scenes import EACH_WAY, EVERY_LIGHTMAP, UNIT_SQUARE, grey, quads_scene, room, solve, table_room
+from solver_scenes import EVERY_LIGHTMAP, UNIT_SQUARE, grey, quads_scene, room, solve, table_room
 
 from app.gpu import Gpu
 from app.reference.dense import DenseSolution, irradiance_at, solve_dense
 from app.reference.form_factors import point_to_polygon
 from app.reference.metrics import relative_rms
 from app.scene.model import F64, Material, Scene
-
-pytestmark = pytest.mark.long
 
 
 def object_means(dense: DenseSolution, scene: Scene) -> F64:
@@ -57,13 +55,11 @@ def table_dense() -> DenseSolution:
     return solve_dense(table_room(), 380, 2)
 
 
-@EACH_WAY
-def test_room_with_a_table(gpu: Gpu, table_dense: DenseSolution, adaptive: bool, projection: str) -> None:
+@EVERY_LIGHTMAP
+def test_room_with_a_table(gpu: Gpu, table_dense: DenseSolution, adaptive: bool) -> None:
     """Shadow, both sides, colour: means within 3 % of TABLE_MEANS: 1 % is still unshot, and another is lost where patches of a
-    quarter of a metre see from their middles past table and lamp."""
-    mine = solve(
-        gpu, table_room(), density=8, level=1, residual=5e-3, resolution=128, adaptive=adaptive, projection=projection
-    )
+    quarter of a metre see from their middles past table and lamp. Other projections: test_projections_agree.py."""
+    mine = solve(gpu, table_room(), density=8, level=1, residual=5e-3, resolution=128, adaptive=adaptive)
     scene = mine.lightmap.scene
     np.testing.assert_allclose(mine.means(mine.H), TABLE_MEANS, rtol=0.03)
     under = np.flatnonzero((mine.object == 7) & (mine.normal[:, 1] < 0))[::5]

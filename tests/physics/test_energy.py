@@ -201,7 +201,8 @@ def test_furnace_with_a_ball(gpu: Gpu, adaptive: bool, projection: str) -> None:
         object_ids=np.concatenate([walls.object_ids, np.full(len(ball.triangles), 6)]).astype(np.int32),
         objects=(*walls.objects, "ball"),
     )
-    furnace = solve(gpu, scene, texels=1000, residual=0.01, adaptive=adaptive, projection=projection)
+    options = {"residual": 0.01, "resolution": 128, "adaptive": adaptive, "projection": projection}
+    furnace = solve(gpu, scene, texels=1000, **options)
     B = furnace.means(furnace.B)[:, 0] / 2
     np.testing.assert_allclose(B, 1.0, atol=0.04)
     assert abs(shares(furnace)["imbalance"]) < 0.015
@@ -270,7 +271,8 @@ def test_cornell_box_with_an_audit_per_shot(gpu: Gpu, adaptive: bool, projection
 def test_cornell_box_book(gpu: Gpu, adaptive: bool, projection: str) -> None:
     """At 4000 texels a block's foot is a texel wide (2 cm), and a patch whose middle lies close to it sees too much or too
     little: the solve loses 1 % of the light, 1.5 % is allowed. The open front is a sixth of the box."""
-    box = solve(gpu, load_scene("cornell-box"), texels=4000, residual=5e-3, adaptive=adaptive, projection=projection)
+    options = {"residual": 2e-2, "resolution": 128, "adaptive": adaptive, "projection": projection}
+    box = solve(gpu, load_scene("cornell-box"), texels=4000, **options)
     s = shares(box)
     assert abs(s["imbalance"]) < 0.015
     assert 0.2 < s["escaped"] < 0.4

@@ -14,7 +14,7 @@ from app.gpu import Gpu
 from app.scene.model import F64, Scene
 from app.scene.shapes import transform
 
-DENSITY = 8.0  # texels/m: every edge of the room is whole patches
+DENSITY = 4.0  # texels/m: every edge of the room is whole patches
 # Patches of two texels: with four, as far from the lamp as they are wide, it is chance which of those that mirror each other
 # fail their audits, since each changes what the others are asked with; the lamp's light then differs by 0.7 %.
 SOLVE = {"residual": 2e-3, "level": 1, "coarsen": False, "resolution": 128}
@@ -105,7 +105,7 @@ def compare(gpu: Gpu, plain: Solution, change: str, solver: str) -> None:
     tree = cKDTree(np.c_[plain.position, plain.normal])
     distance, match = tree.query(np.c_[back, normal])
     assert len(other.area) == len(plain.area)
-    assert distance.max() < 1e-4  # of a texel of 1/8: they are the same texels
+    assert distance.max() < 1e-4  # of a texel of 1/4: they are the same texels
     np.testing.assert_array_equal(np.sort(match), np.arange(len(match)))
     np.testing.assert_allclose(other.area, plain.area[match] * scale**2, rtol=1e-6)
 

@@ -130,10 +130,11 @@ def test_overlapping_faces_in_one_plane_keep_their_order(monkeypatch: pytest.Mon
     normal = np.cross(along[..., 0], along[..., 1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     shares, common = np.random.default_rng(0).dirichlet(np.ones(3), 60), set()
+    to_uv = np.linalg.pinv(along)
     for k in range(len(points)):
         inside = shares @ points[k] - a[:, None]  # (n, 60, 3), seen from each triangle
-        uv = np.einsum("nij,nsj->nsi", np.linalg.pinv(along), inside)
-        flat = (np.abs(np.einsum("nsi,ni->ns", inside, normal)) < 1e-9).all(1)
+        uv = inside @ to_uv.swapaxes(1, 2)
+        flat = (np.abs(inside @ normal[:, :, None]) < 1e-9).all((1, 2))
         overlaps = flat & ((uv > 1e-3).all(2) & (uv.sum(2) < 1 - 1e-3)).any(1)
         overlaps[k] = False
         common |= {k, *np.flatnonzero(overlaps).tolist()} if overlaps.any() else set()
