@@ -12,6 +12,7 @@ from typing import Any
 from app.atlas.charts import Charts
 from app.atlas.charts_cache import charts_of
 from app.atlas.coarse import coarse_charts
+from app.atlas.mesh_cache import kept_mesh
 from app.atlas.options import MAX_TEXELS, AtlasOptions
 from app.atlas.parametrize import check, default_texels
 from app.atlas.visible_mesh import visible_mesh
@@ -187,7 +188,7 @@ def _show_coarse(
         if charts is None:
             return None
         alive(0.0)
-        pool, arrays, exposure = _in_texels(scene, charts, options, alive, expose=expose)
+        pool, arrays, exposure = _in_texels(scene, charts, options, alive, expose=expose, coarse=True)
         if rays:
             tree_of(pool, alive)
     except (UserError, MemoryError):
@@ -198,13 +199,14 @@ def _show_coarse(
 
 
 def _in_texels(
-    scene: Scene, charts: Charts, options: LightmapOptions, report: Report, *, expose: bool
+    scene: Scene, charts: Charts, options: LightmapOptions, report: Report, *, expose: bool, coarse: bool = False
 ) -> tuple[TilePool, dict[str, Array], float | None]:
-    """A scene cut into texels, as it is uploaded, and with ``expose`` the exposure that its light will need [EV]."""
+    """A scene cut into texels, as it is uploaded, and with ``expose`` the exposure that its light will need [EV]. coarse: texels
+    that are not there for long, nothing of which is kept on disk."""
     local = SolverSpace.of(scene).local_from_world(scene.positions)
     exposure = None
-    with ThreadPoolExecutor(1) as beside:
-        mesh = beside.submit(visible_mesh, scene, charts, local)
+    with ThreadPoolExecutor(2) as beside:
+        mesh = beside.submit(visible_mesh if coarse else kept_mesh, scene, charts, local)
         seams = beside.submit(lambda: charts.seam_texels)
         pool = quadtree_pool(scene, charts, report) if options.adaptive else TilePool(scene, charts, report=report)
         report(1.0)

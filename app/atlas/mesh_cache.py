@@ -1,0 +1,49 @@
+"""The visible mesh of many triangles is kept on disk: reading takes a tenth of making it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from app.atlas.charts import Charts
+from app.atlas.charts_cache import program
+from app.atlas.visible_mesh import Clusters, VisibleMesh, visible_mesh
+from app.scene.model import F64, Scene
+from app.util import cache
+
+FEWEST = 1 << 16  # triangles that a file is worth: they take a third of a second
+CACHE_FILES = 4  # kept, newest first: of a million triangles a file takes 50 MB
+CLUSTERS = "clusters_"  # before the names of what is theirs
+
+
+def kept_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
+    """That of ``visible_mesh``, from the cache if it is there."""
+    if len(scene.triangles) < FEWEST:
+        return visible_mesh(scene, charts, local)
+    own = {name: getattr(charts, name) for name in ("face_triangle", "face_back", "face_uv")}
+    given = {"local": local, "triangles": scene.triangles, "materials": scene.material_ids, **own}
+    file = cache.entry("mesh", cache.digest(program(), given))
+    found = _read(cache.read(file))
+    if found is None:
+        found = visible_mesh(scene, charts, local)
+        cache.store(cache.content(_content(found)), file, CACHE_FILES)
+    return found
+
+
+def _content(mesh: VisibleMesh) -> cache.Arrays:
+    own = {name: value for name, value in vars(mesh).items() if name != "clusters" and value is not None}
+    clusters = {} if mesh.clusters is None else {CLUSTERS + name: value for name, value in vars(mesh.clusters).items()}
+    return {name: np.asarray(value) for name, value in (own | clusters).items()}
+
+
+def _read(data: cache.Arrays | None) -> VisibleMesh | None:
+    """The mesh that a file holds; None where it holds none."""
+    names = {field.name for field in dataclasses.fields(VisibleMesh)} - {"weights", "clusters"}
+    if data is None or not names <= data.keys():
+        return None
+    clusters = {name.removeprefix(CLUSTERS): array for name, array in data.items() if name.startswith(CLUSTERS)}
+    if clusters:
+        clusters["fixed"] = int(clusters["fixed"])  # type: ignore[assignment]
+    own = {name: data[name] for name in names}
+    return VisibleMesh(**own, weights=data.get("weights"), clusters=Clusters(**clusters) if clusters else None)  # type: ignore[arg-type]
