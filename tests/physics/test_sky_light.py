@@ -237,12 +237,15 @@ def test_a_sun_that_is_dragged_leaves_light_there(gpu: Gpu) -> None:
     """Each step of it changes the whole sky: what the old one takes back comes in turns with what the new one gives."""
     scene = quads_scene([FLOOR, WALL], [grey(0.5, double_sided=True)]).with_sky(Sky("clear", sun=Sun(60, 30)))
     lit = solved(gpu, scene, "shooting")
+    known = lit.lightmap.pool.surfaces.area > 0
     before = float(lit.H.sum())
     for azimuth in (66, 72, 78):
         lit.solver.set_sky(Sky("clear", sun=Sun(azimuth, 30)))
         for _ in range(10):
             lit.step(8)
             assert 0.5 < lit.H.sum() / before < 1.5  # one batch is all of the sun, which is four tenths of the light
+            shown = lit.lightmap.irradiance(ambient=True)[known].sum()
+            assert 0.5 < shown / before < 1.5  # nothing is foreseen where what is taken back was not
             assert abs(lit.book.imbalance_share) < 0.02 and lit.solver.poll().remaining > 0.01
     lit.release()
 

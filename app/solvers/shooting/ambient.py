@@ -179,7 +179,7 @@ class Ambient:
             textures={"t_lamps": self._lamps, "t_ledger": ledger.texture},
             uniforms={
                 "u_area": ledger.area,
-                "u_outside": tuple((ledger.to_come / ledger.watt).tolist()),
+                "u_outside": tuple((ledger.foreseen / ledger.watt).tolist()),
             },
         )
 

@@ -27,8 +27,9 @@ class Ledger:
 
     emitted: by all lamps, and from outside, RGB [W]; of that lamps: by those with an area; directions: what has come from the sky
     and directional lights, as far as it is known; points: what point and spot lights have sent out; to_come: about what of either
-    is still to come. albedo: mean of all texels, RGB; area: of all texels, solver space: see ``weigh``. watt: watts in one stored
-    unit of power, the lightmap's unit [W/m²] times solver area.
+    is still to come; foreseen: of that what the picture shows as ambient light: nothing while lights replace others, which
+    lit other places. albedo: mean of all texels, RGB; area: of all texels, solver space: see ``weigh``. watt: watts in one
+    stored unit of power, the lightmap's unit [W/m²] times solver area.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch) -> None:
@@ -44,7 +45,7 @@ class Ledger:
         self._add_tiles = Pass(gpu, "solvers/shooting/tile_energy", defines=lightmap.defines("TILE") | reads)
         self._enter_directions = Pass(gpu, "solvers/shooting/ledger_directions", slots=RECORDS)
         self.lamps, self.albedo, self.area = np.zeros(3), (0.0, 0.0, 0.0), 0.0
-        self.directions = self.points = self.to_come = np.zeros(3)
+        self.directions = self.points = self.to_come = self.foreseen = np.zeros(3)
         self._fit()
 
     def _fit(self) -> None:
@@ -64,6 +65,10 @@ class Ledger:
         """Power [stored units · solver area] as a share of what is emitted; 0 where nothing is."""
         emitted = float(self.emitted.sum())
         return power * self.watt / emitted if emitted > 0 else 0.0
+
+    def capped(self, share: float) -> float:
+        """A share of what is emitted, while some of that is still estimated, and may come to nothing: all is unshot then."""
+        return min(share, 1.0) if self.emitted.sum() > 0 else 1.0
 
     def follow_emission(self) -> None:
         """See what lamps with an area send out now."""
@@ -138,7 +143,7 @@ class Ledger:
     def clear(self) -> None:
         """Nothing has been shot."""
         self.target.clear()
-        self.directions = self.points = self.to_come = np.zeros(3)
+        self.directions = self.points = self.to_come = self.foreseen = np.zeros(3)
 
     def state(self) -> State:
         """All that was entered and weighed."""

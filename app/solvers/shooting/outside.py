@@ -100,7 +100,7 @@ class Outside:
         """These are to come, besides what was given."""
         before = (s.solid_angle * light for s, light in self._given.items() if not s.from_afar)
         self._points_before = np.asarray(sum(before, np.zeros(3)))
-        self._queue, self._at = queue, 0
+        self._queue, self._at, self._in_turns = queue, 0, len({shot.gives for shot in queue}) == 2
         flux = np.array([shot.flux for shot in self._queue]).reshape(-1, 3)
         kinds = np.array([shot.kind for shot in self._queue], object)
         self._to_come = {kind: _from_each_on(flux * (kinds == kind)[:, None]) for kind in KINDS}
@@ -180,6 +180,7 @@ class Outside:
         """Enter in the ledger what was sent out, and what is to come."""
         to_come = {kind: flux[self._at] for kind, flux in self._to_come.items()}
         self._ledger.to_come = sum((self._share_received(k) * flux for k, flux in to_come.items()), np.zeros(3))
+        self._ledger.foreseen = np.zeros(3) if self._in_turns else self._ledger.to_come
         self._ledger.points = self._points_before + self._to_come[POINTS][0] - to_come[POINTS]
 
     # -- shots ---------------------------------------------------------------------------------------------------------

@@ -201,7 +201,7 @@ class Shooting:
                 self._uneven = None
         self._strongest = float(values["strongest"]) * ledger.watt
         batch.ambient.strongest = min(ledger.share(float(values["strongest"])), 1.0)
-        remaining = min(unshot, 1.0) if outside.left else unshot  # an edit takes back light, and gives as much
+        remaining = ledger.capped(unshot) if outside.left else unshot  # an edit takes back light, and gives as much
         self._progress = Progress(int(values["shots"]), remaining, report.escaped * ledger.watt)
         if choice is None:
             return
@@ -214,7 +214,7 @@ class Shooting:
         """What is unshot now, as a share of the emitted power. Waits for the GPU."""
         self._under_way.finish()
         unshot = self.batch.ledger.share(self.batch.unshot())
-        return min(unshot, 1.0) if self.batch.outside.left else unshot
+        return self.batch.ledger.capped(unshot) if self.batch.outside.left else unshot
 
     @property
     def _all_shot(self) -> bool:
