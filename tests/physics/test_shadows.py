@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from solver_scenes import EVERY_SOLVER, UNIT_SQUARE, grey, quads_scene, room, solve
 
 from app.gpu import Gpu
+from app.scene.model import Camera
 from app.solvers.shooting.options import VISIBILITIES
 from app.visibility.projections import PROJECTIONS
 
@@ -35,8 +38,12 @@ QUADTREES = [("combined", "hemicube"), (RAYS, "none")]
 def test_nothing_inside_a_closed_box_from_a_lamp_outside(
     gpu: Gpu, adaptive: bool, visibility: str, projection: str, double_sided: bool, shift: float
 ) -> None:
-    """The walls are as thin as can be, and patches of the lamp lie in the planes of floor and walls."""
+    """The walls are as thin as can be, and patches of the lamp lie in the planes of floor and walls. A camera is within, so that
+    the inside has texels."""
     scene = quads_scene([*room(), LAMP + shift], [grey(0.5, double_sided=double_sided), grey(0.0, 1.0)], [0] * 6 + [1])
+    eye = np.eye(4)
+    eye[:3, 3] = 0.5
+    scene = replace(scene, cameras=(Camera("within", eye, 1.0),))
     box = solve(gpu, scene, texels=2000, residual=0.05, adaptive=adaptive, **way(visibility, projection))
     inside = (box.object < 6) & (((0.5 - box.position) * box.normal).sum(1) > 0)
     assert inside.sum() > 500
