@@ -14,14 +14,14 @@ from app.render.atlas_image import AtlasImage
 from app.render.background import Background
 from app.render.camera import CameraView
 from app.render.false_colour import LAYER, Scale, false_colour_scale, measured
-from app.render.flat import FlatMesh
+from app.render.flat import FlatMesh, FlatScene
 from app.render.mean_picture import MeanPicture
 from app.render.options import DisplayOptions
 from app.render.pick import Picker, PickHit
 from app.render.ray_picture import RayPicture
 from app.render.resolve import Reference
 from app.render.surfaces import Rect, Surfaces
-from app.scene.model import F64
+from app.scene.model import F64, Scene
 
 GL_DEPTH_CLAMP = 0x864F  # OpenGL 3.2: what lies before the near plane is drawn at it instead of being cut away
 
@@ -55,6 +55,8 @@ class FrameRenderer:
         self._surfaces: Surfaces | None = None
         self._prepared: Surfaces | None = None
         self._picture: _Picture | None = None
+        self._asked: Scene | None = None  # of the last picture of light
+        self._flat: FlatMesh | None = None  # of that scene, where nothing in it emits light
         self._last: tuple[Lightmap, CameraView, tuple[int, int]] | None = None
 
     def prepare(self, lightmap: Lightmap, interpolation: str) -> None:
@@ -112,6 +114,8 @@ class FrameRenderer:
         ):
             return False
         sky = lightmap.scene.sky if layer == "combined" else None
+        plain = layer == "combined" and display.show == "solution" and not display.grid and scale is None
+        unlit = self._unlit(lightmap.scene) if plain and not self._linear else None
 
         def draw(picture: _Picture, aside_px: F64) -> None:
             aside = np.eye(4)
@@ -119,10 +123,14 @@ class FrameRenderer:
             clip_from_local = aside @ view.clip_from_local(size[0] / size[1], lightmap.space)
             picture.target.clear(depth=1.0)
             with self._depth_clamp():
-                surfaces.draw(picture.target, clip_from_local, layer, display, shooter=shooter)
+                if unlit is not None:
+                    unlit.draw(picture.target, clip_from_local, view.eye)
+                else:
+                    surfaces.draw(picture.target, clip_from_local, layer, display, shooter=shooter)
             self._background.draw(picture.target, view, size[0] / size[1], sky, display, scale, aside_px)
-            with self._depth_clamp():
-                surfaces.draw_blended(picture.target)
+            if unlit is None:
+                with self._depth_clamp():
+                    surfaces.draw_blended(picture.target)
             if rays is not None:
                 rays.draw(picture.target, clip_from_local, size, display, linear=self._linear)
 
@@ -138,6 +146,14 @@ class FrameRenderer:
             self._mean.show(target)
         self._last = lightmap, view.copy(), size
         return True
+
+    def _unlit(self, scene: Scene) -> FlatMesh | None:
+        """What is drawn of a scene in which nothing emits light, where all would be black; None of others."""
+        if scene is not self._asked:
+            if self._flat is not None:
+                self._flat.release()
+            self._asked, self._flat = scene, None if scene.emits else FlatMesh(self._gpu, FlatScene.of(scene))
+        return self._flat
 
     @contextlib.contextmanager
     def _depth_clamp(self) -> Iterator[None]:
@@ -161,7 +177,7 @@ class FrameRenderer:
         picture, aspect = self._picture_for(target, size, direct=True), size[0] / size[1]
         picture.target.clear(depth=1.0)
         with self._depth_clamp():
-            mesh.draw(picture.target, aspect)
+            mesh.draw(picture.target, mesh.view.clip_from_local(aspect, mesh.scene.space), mesh.view.eye)
         self._background.draw(picture.target, mesh.view, aspect, None, display, None, np.zeros(2))
         self._show_own(picture, target, size)
 
@@ -192,7 +208,15 @@ class FrameRenderer:
 
     def release(self) -> None:
         self.give_up()
-        for resource in (self._surfaces, self._picture, self._picker, self._atlas, self._background, self._mean):
+        for resource in (
+            self._surfaces,
+            self._picture,
+            self._flat,
+            self._picker,
+            self._atlas,
+            self._background,
+            self._mean,
+        ):
             if resource is not None:
                 resource.release()
 

@@ -206,17 +206,17 @@ def _in_the_middle(text: str, state: State) -> None:
 
 
 def no_lamps(view: View, state: State) -> None:
-    """What to do where nothing shines: a button for each kind of lamp, in the middle of the view."""
+    """What to do where nothing shines: a button for each kind of lamp, at the foot of the view, which shows the scene unlit."""
     session = view.session
     if not (session.opened and state.show_ui) or session.on_its_way is not None or new_lamps.is_lit(view, state):
         return
     left, top, width, height = state.view_px
-    middle = imgui.ImVec2(left + width / 2, top + height / 2)
     em = imgui.get_font_size()
-    imgui.set_next_window_pos(middle, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
+    foot = imgui.ImVec2(left + width / 2, top + height - em)
+    imgui.set_next_window_pos(foot, imgui.Cond_.always, imgui.ImVec2(0.5, 1.0))
     imgui.set_next_window_size(imgui.ImVec2(min(NO_LAMPS_EM * em, width), 0))
     imgui.begin("##no lamps", None, FLOATING & ~int(imgui.WindowFlags_.always_auto_resize))
-    widgets.wrapped(f"{new_lamps.DARK}: add a lamp")
+    widgets.wrapped(f"{new_lamps.DARK}, shown unlit: add a lamp")
     new_lamps.buttons(view, state)
     imgui.end()
 

@@ -5,10 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
+from solver_scenes import grey, quads_scene, room
 
 from app.atlas.options import AtlasOptions
+from app.atlas.parametrize import parametrize
 from app.gpu import Gpu
+from app.lightmap.lightmap import Lightmap
+from app.render.camera import CameraView
+from app.render.frame import FrameRenderer
+from app.render.options import DisplayOptions
 from app.session import loading
 from app.session.session import Session
 from app.session.view import View
@@ -51,6 +59,32 @@ def test_a_scene_is_seen_before_it_is_unfolded_in_the_colours_of_its_materials(g
         time.sleep(0.001)
     assert view.session.opened and not view.draw_flat(target, SIZE)
     gpu.release_all(target, texture)
+
+
+def test_a_scene_in_which_nothing_emits_light_is_shown_flat(gpu: Gpu) -> None:
+    """And as it is lit once something does, and in layers that are no light."""
+    texture, renderer = gpu.texture(SIZE, 4, "f1"), FrameRenderer(gpu)
+    target = gpu.target(texture)
+    scene = quads_scene(room(), [grey(0.5)])
+    lightmap = Lightmap.of(gpu, scene, parametrize(scene, texels=600))
+    view = CameraView(np.eye(4), 1.6, 1.0)
+    view.world_from_camera[:3, 3] = (0.5, 0.5, 0.9)
+
+    def picture(**display: object) -> NDArray[np.int64]:
+        renderer.render(target, SIZE, lightmap, view, DisplayOptions(**display))
+        return pixels(target, SIZE).astype(np.int64)
+
+    unlit, albedo = picture(), picture(layer="albedo")
+    assert unlit[64, 64, 0] == pytest.approx(188, abs=1)  # sRGB of 0.5, seen straight on
+    assert 80 < unlit[64, 2, 0] < 175, "a wall, seen askew"
+    assert np.ptp(albedo[..., 0]) <= 1
+    lightmap.set_materials((grey(0.5, 1e-9),))
+    assert picture()[..., 0].max() < 8, "lit, if dimly"
+    lightmap.set_materials((grey(0.5),))
+    assert (picture() == unlit).all()
+    renderer.release()
+    gpu.release_all(target, texture)
+    lightmap.release()
 
 
 def test_nothing_is_seen_of_what_was_stopped(gpu: Gpu, view: View, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,7 +56,12 @@ def shares(balance: EnergyBalance, remaining: float, escaped: F64, *, distribute
     """Emitted, and where it is. What is unshot is the one number that says so everywhere, ``remaining`` of what is emitted, and
     what has ``escaped``, RGB [W], is of the same moment; the balance was measured a little before. Where light overshoots
     [Feda92], surfaces have absorbed what will be taken back from them: that is unshot, not absorbed."""
-    emitted = ("Emitted", balance.emitted, theme.TEXT, "By all lamps and the sky")
+    emitted = (
+        "Emitted",
+        balance.emitted,
+        theme.TEXT,
+        "By all lamps and the sky; not what a lamp sends into a surface that it lies on",
+    )
     away = ("Escaped", escaped if distributes else balance.escaped, theme.ESCAPED, "Left the scene where no surface is")
     if not distributes:
         return [emitted, ("Absorbed", balance.absorbed, theme.ABSORBED, "By surfaces, which reflect the rest"), away]
