@@ -77,10 +77,10 @@ def test_lamps_with_area_are_duplicated_and_removed(desk: Desk, where: dict[str,
         assert [call[0] for call in desk.session.calls] == ["change_surfaces"], button
 
 
-def test_the_view_is_free_behind_the_offer(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
+def test_the_view_is_free_above_the_offer(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
     put_out(desk)
     before = desk.session.camera.eye.copy()
-    desk.drag((VIEW[0], VIEW[1] + 200), (VIEW[0] + 60, VIEW[1] + 200))
+    desk.drag(VIEW, (VIEW[0] + 60, VIEW[1]))
     assert (desk.session.camera.eye != before).any()
     desk.key(imgui.Key.f2)
     where.clear()
