@@ -151,7 +151,7 @@ def load(
         start = time.perf_counter()
         tree_of(pool, lambda share: tell(SORTING, 0.8 + 0.2 * share))
         seconds["rays"] = time.perf_counter() - start
-    tell("done", 1.0)
+    tell("copying to the GPU", 1.0)
     return Loaded(read, pool, arrays, atlas, options, exposure, seconds)
 
 

@@ -23,6 +23,7 @@ HIGHEST_UPPER = 0.54  # of a low window for it
 NARROW_EM = 72.0  # width of a window, below which one column holds all panels, one group above the other
 WIDEST_SIDE = 0.4  # of a very narrow window for it
 ABOVE_SHARE = 0.68  # height of the upper group, in which the solver is
+OPENING = "opening"
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def panels(view: View, state: State) -> None:
             if view.session.opened:
                 panel.draw(view, state)
             else:
-                widgets.dim("no scene")
+                widgets.dim("no scene" if view.session.on_its_way is None else OPENING)
         imgui.end()
 
 

@@ -129,7 +129,7 @@ def _under_pointer(view: View, state: State) -> None:
 def _status(view: View, state: State) -> list[tuple[str, theme.RGBA]]:
     stats = state.stats
     if stats is None:
-        return [("no scene", theme.DIM)]
+        return [("no scene", theme.DIM) if view.session.on_its_way is None else ("opening", theme.AMBER)]
     word, colour = (
         ("no light", theme.AMBER)
         if not new_lamps.is_lit(view, state)

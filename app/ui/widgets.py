@@ -131,9 +131,8 @@ def _editor(spec: Spec, value: Any, start: Any, names: Mapping[str, str]) -> Any
         return imgui.checkbox("##value", value)[1]
     if spec.choices:
         index = spec.choices.index(value)
-        return spec.choices[
-            imgui.combo("##value", index, [names.get(str(choice), str(choice)) for choice in spec.choices])[1]
-        ]
+        called = [names.get(str(choice), str(choice)) for choice in spec.choices]
+        return spec.choices[imgui.combo("##value", index, called, len(called))[1]]  # all of them, without scrolling
     if spec.type in (int, float):
         return _number(spec, value, start)
     return imgui.input_text("##value", value)[1]
@@ -271,10 +270,10 @@ def begin_modal(title: str) -> bool:
 
 
 def number(value: float, digits: int = 4) -> str:
-    """``digits`` significant ones, thousands apart, no exponent between 0.001 and a million."""
+    """``digits`` significant ones, thousands apart, no exponent between 0.001 and a thousand million."""
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
-    if 1e-3 <= abs(value) < 1e7:
+    if 1e-3 <= abs(value) < 1e9:
         decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
         return f"{value:,.{decimals}f}"
     return f"{value:.{digits - 1}e}"

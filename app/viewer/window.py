@@ -7,7 +7,6 @@ Events go to Dear ImGui through its queue, so that a press shorter than a frame 
 from __future__ import annotations
 
 import os
-import string
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -24,6 +23,7 @@ from app.session.pacing import Turns
 from app.session.view import View
 from app.ui.app import Ui
 from app.ui.state import Pace, Request
+from app.viewer.keyboard import Keyboard, pyglet_keys
 from app.viewer.mouse import Mouse
 from app.viewer.saving import Pictures, save_screenshot
 from app.viewer.ui_frame import UiFrame
@@ -35,32 +35,6 @@ LOADING_PAUSE = 0.2  # s between frames while there is only a scene to wait for,
 REST_SECONDS = 0.5  # between two looks around at rest; an event ends the rest at once
 NOWHERE = -3.4e38  # where Dear ImGui has the mouse when it is outside the window
 BUTTONS = {1: 0, 2: 1, 3: 2}  # left, right, middle: moderngl-window to Dear ImGui
-MODIFIERS = {
-    imgui.Key.mod_ctrl: (imgui.Key.left_ctrl, imgui.Key.right_ctrl),
-    imgui.Key.mod_shift: (imgui.Key.left_shift, imgui.Key.right_shift),
-    imgui.Key.mod_alt: (imgui.Key.left_alt, imgui.Key.right_alt),
-    imgui.Key.mod_super: (imgui.Key.left_super, imgui.Key.right_super),
-}
-# pyglet's name of a key, and Dear ImGui's
-NAMED_KEYS = """
-    RETURN:enter ESCAPE:escape BACKSPACE:backspace TAB:tab SPACE:space DELETE:delete INSERT:insert HOME:home END:end
-    PAGEUP:page_up PAGEDOWN:page_down LEFT:left_arrow RIGHT:right_arrow UP:up_arrow DOWN:down_arrow
-    MENU:menu PAUSE:pause
-    LCTRL:left_ctrl RCTRL:right_ctrl LSHIFT:left_shift RSHIFT:right_shift LALT:left_alt RALT:right_alt
-    LCOMMAND:left_super RCOMMAND:right_super LWINDOWS:left_super RWINDOWS:right_super
-    PERIOD:period COMMA:comma MINUS:minus EQUAL:equal SLASH:slash BACKSLASH:backslash SEMICOLON:semicolon
-    APOSTROPHE:apostrophe GRAVE:grave_accent BRACKETLEFT:left_bracket BRACKETRIGHT:right_bracket
-    CAPSLOCK:caps_lock NUMLOCK:num_lock SCROLLLOCK:scroll_lock PRINT:print_screen
-    NUM_ENTER:keypad_enter NUM_ADD:keypad_add NUM_SUBTRACT:keypad_subtract NUM_MULTIPLY:keypad_multiply
-    NUM_DIVIDE:keypad_divide NUM_DECIMAL:keypad_decimal NUM_EQUAL:keypad_equal
-"""
-KEY_NAMES = {
-    **dict(pair.split(":") for pair in NAMED_KEYS.split()),
-    **{f"NUM_{i}": f"keypad{i}" for i in range(10)},
-    **{f"_{i}": f"_{i}" for i in range(10)},
-    **{f"F{i}": f"f{i}" for i in range(1, 13)},
-    **{letter: letter.lower() for letter in string.ascii_uppercase},
-}
 # pyglet's events after which the window is drawn again
 EVENTS = """
     on_key_press on_key_release on_text on_mouse_motion on_mouse_drag on_mouse_press on_mouse_release on_mouse_scroll
@@ -196,10 +170,8 @@ class ViewerWindow(WindowConfig):
     ) -> None:
         super().__init__(ctx=window.ctx, wnd=window, timer=timer)
         self._view, self._session, self._frame, self._ui, self._frames_left = view, view.session, frame, ui, frames
-        self._keys, self._mouse = _keys(), Mouse(lambda: ui.io)
+        self._keyboard, self._mouse = Keyboard(pyglet_keys(), lambda: ui.io), Mouse(lambda: ui.io)
         self._pyglet = window._window
-        self._held: set[imgui.Key] = set()
-        self._let_go: set[imgui.Key] = set()
         self._cursor: int | None = None
         self._caption = ""
         self._turns, self._pictures = Turns(), Pictures(view, ui.state)
@@ -277,9 +249,7 @@ class ViewerWindow(WindowConfig):
         session.run.drawn()
         if self._mouse.frame():
             self._wake()
-        for known in self._let_go:
-            self._key(known, False)
-        self._let_go.clear()
+        self._keyboard.frame()
         self._show_cursor()
         self._show_name()
         for request in requests:
@@ -329,26 +299,11 @@ class ViewerWindow(WindowConfig):
 
     def on_key_event(self, key: Any, action: Any, modifiers: Any) -> None:
         """A key went down or up."""
-        known = self._keys.get(key)
-        if known is None:
-            return
-        down = action == self.wnd.keys.ACTION_PRESS
-        self._let_go.discard(known)
-        if not down and any(known in keys for keys in MODIFIERS.values()):
-            self._let_go.add(known)  # after this frame: it was held while the key beside it went down
-        else:
-            self._key(known, down)
-
-    def _key(self, known: imgui.Key, down: bool) -> None:
-        (self._held.add if down else self._held.discard)(known)
-        for modifier, keys in MODIFIERS.items():
-            if known in keys:
-                self._ui.io.add_key_event(modifier, any(k in self._held for k in keys))
-        self._ui.io.add_key_event(known, down)
+        self._keyboard.key(key, action == self.wnd.keys.ACTION_PRESS)
 
     def on_unicode_char_entered(self, char: str) -> None:
         """Text was typed."""
-        self._ui.io.add_input_characters_utf8(char)
+        self._keyboard.text(char)
 
     def on_mouse_position_event(self, x: int, y: int, dx: int, dy: int) -> None:
         """The mouse moved."""
@@ -386,13 +341,5 @@ class ViewerWindow(WindowConfig):
         self._wake()
 
     def _on_deactivate(self) -> None:
-        self._held.clear()
-        self._let_go.clear()
+        self._keyboard.forget()
         self._ui.io.add_focus_event(False)
-
-
-def _keys() -> dict[int, imgui.Key]:
-    """pyglet's key constants and what Dear ImGui calls them; needs a display, as everything of pyglet.window does."""
-    from pyglet.window import key
-
-    return {getattr(key, name): imgui.Key[ours] for name, ours in KEY_NAMES.items() if hasattr(key, name)}

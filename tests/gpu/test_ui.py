@@ -240,6 +240,22 @@ def test_the_loading_bar_stays_within_the_view(
     desk.release()
 
 
+def test_a_scene_on_its_way_is_not_no_scene(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is in the view already: panels and status bar say that it is being opened."""
+    said: list[str] = []
+    for name, which in (("text_colored", 1), ("text_unformatted", 0)):
+        real = getattr(imgui, name)
+        monkeypatch.setattr(imgui, name, lambda *a, real=real, which=which: said.append(a[which]) or real(*a))
+    session = FakeSession(opened=False)
+    desk = Desk(gpu, session, (1280, 720))
+    assert "no scene" in said and "opening" not in said
+    session.loading = SimpleNamespace(stage="unfolding", fraction=0.4, cancel=lambda: None)
+    said.clear()
+    desk.frames()
+    assert said.count("opening") > 3 and "no scene" not in said
+    desk.release()
+
+
 def test_the_pace_is_seen_and_changed(desk: Desk) -> None:
     """Auto: watch at first, then fast; a key takes the other."""
     desk.session.run.seconds = 0.5
@@ -486,7 +502,8 @@ def test_ticks_are_round(low: float, high: float, logarithmic: bool, expected: l
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(0, "0"), (1234567.8, "1,234,568"), (0.012345, "0.01235"), (1e-9, "1.000e-09"), (34.6, "34.60")]
+    ("value", "text"),
+    [(0, "0"), (17812345.6, "17,812,346"), (0.012345, "0.01235"), (1e-9, "1.000e-09"), (34.6, "34.60")],
 )
 def test_numbers_are_short(value: float, text: str) -> None:
     assert widgets.number(value) == text

@@ -63,7 +63,7 @@ def clipped(monkeypatch: pytest.MonkeyPatch) -> Iterator[Clipped]:
     for name in ("checkbox", "radio_button", "small_button"):
         looking(imgui, name, lambda label, *_: found.inside(label))
     looking(imgui, "button", lambda label, *_: found.within(label.split("##")[0], padding()))
-    looking(imgui, "combo", lambda _, now, names: found.within(names[now], padding() + imgui.get_frame_height()))
+    looking(imgui, "combo", lambda _, now, names, *__: found.within(names[now], padding() + imgui.get_frame_height()))
     looking(slider, "slide", lambda _, value, ends, text: found.within(text % value if "%" in text else text, 0.0))
     looking(
         widgets, "labelled", lambda text, **_: found.note(text, imgui.calc_text_size(text).x + padding(), _column())
