@@ -131,14 +131,15 @@ class _Grid:
 
     def __init__(self, surfaces: TexelSurfaces) -> None:
         covered = surfaces.area > 0
-        points = surfaces.position[covered]
-        self._low = points.min(0)
-        self.width = float(np.linalg.norm(np.ptp(points, axis=0)))  # diagonal [m]: what is farther is beyond all
+        along = np.ascontiguousarray(surfaces.position[covered].T)  # axes apart: three times as fast
+        self._low = along.min(1)
+        size = np.ptp(along, axis=1)
+        self.width = float(np.linalg.norm(size))  # diagonal [m]: what is farther is beyond all
         texel = float(np.sqrt(np.quantile(surfaces.area[covered], 0.9)))  # small charts' texels are covered in part
-        self.cell = max(float(np.ptp(points, axis=0).max()) / CELLS, TEXELS_PER_CELL * texel)
-        index = np.floor((points - self._low) / self.cell).astype(np.int64)
-        self._filled = np.zeros(index.max(0) + 1, bool)
-        self._filled[tuple(index.T)] = True
+        self.cell = max(float(size.max()) / CELLS, TEXELS_PER_CELL * texel)
+        index = ((along - self._low[:, None]) / self.cell).astype(np.int64)
+        self._filled = np.zeros(index.max(1) + 1, bool)
+        self._filled[tuple(index)] = True
 
     def free(self, start: F64, start_normal: F64, end: F64, end_normal: F64) -> NDArray[np.bool_]:
         """Whether nothing lies between the points of each pair, (n, 3) each; looked up cell by cell. What lies in the plane of

@@ -97,14 +97,20 @@ def _corners(t: TileTexels, facet: NDArray[np.int32]) -> F64:
 
 def _bounds(t: TileTexels, which: NDArray[np.bool_]) -> tuple[F64, F64]:
     """Tiles of any shape: a bounding sphere (n, 4), and the mean normal with the half thickness along it (n, 4)."""
-    covered = (t.facet[which] >= 0)[..., None]
-    position = np.where(covered, t.position[which], 0.0)
-    centre = position.sum((1, 2)) / np.maximum(covered.sum((1, 2)), 1)
-    offset = np.where(covered, position - centre[:, None, None], 0.0)
-    axis = np.where(covered, t.normal[which], 0.0).sum((1, 2))
-    axis /= np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-30)
-    aligned = np.where(covered[..., 0], np.einsum("tijc,tc->tij", t.normal[which], axis), 1.0).min((1, 2), initial=1.0)
-    thickness = np.abs(np.einsum("tijc,tc->tij", offset, axis)).max((1, 2), initial=0.0)
-    radius = np.linalg.norm(offset, axis=-1).max((1, 2), initial=0.0)
+    covered = t.facet[which] >= 0
+    position, normal = (_axes_apart(values[which], covered) for values in (t.position, t.normal))  # (3, n, t, t)
+    centre = position.sum((2, 3)) / np.maximum(covered.sum((1, 2)), 1)
+    offset = np.where(covered, position - centre[..., None, None], 0.0)
+    axis = normal.sum((2, 3))
+    axis /= np.maximum(np.linalg.norm(axis, axis=0), 1e-30)
+    along = axis[..., None, None]
+    aligned = np.where(covered, (normal * along).sum(0), 1.0).min((1, 2), initial=1.0)
+    thickness = np.abs((offset * along).sum(0)).max((1, 2), initial=0.0)
+    radius = np.sqrt((offset**2).sum(0).max((1, 2), initial=0.0))
     thickness = np.where(aligned > 1 - 1e-6, thickness, ANY_THICKNESS)
-    return np.column_stack([centre, radius]), np.column_stack([axis, thickness])
+    return np.column_stack([*centre, radius]), np.column_stack([*axis, thickness])
+
+
+def _axes_apart(vectors: NDArray[np.floating], covered: NDArray[np.bool_]) -> F64:
+    """(3, n, t, t) of vectors (n, t, t, 3), 0 where no texel is covered; sums along it are several times as fast."""
+    return np.where(covered, np.ascontiguousarray(np.moveaxis(vectors, -1, 0)), 0.0)
