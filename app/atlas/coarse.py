@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
+from app.atlas.enclosed import sides_with_texels
 from app.atlas.layout import density_for, measured, place, scaled
-from app.atlas.sides import distinct_rows, groups_of, lit_sides
+from app.atlas.sides import distinct_rows, groups_of
 from app.scene.model import F64, I32, Scene
 from app.util.background import Report
 
@@ -22,7 +23,7 @@ MOST_PIECES = 1 << 14  # beyond which placing them takes as long as better chart
 def coarse_charts(scene: Scene, tile: int, texels: int, report: Report) -> Charts | None:
     """Those of a scene's lit sides, of about so many texels; None where it falls apart into too many pieces. tile: texels along
     the edge of a leaf. report(share) is called now and then and may raise to cancel."""
-    lit = lit_sides(scene)
+    lit = sides_with_texels(scene)
     normals = scene.normals_areas[0]
     axis = np.abs(normals).argmax(axis=1)
     way = 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0)

@@ -10,21 +10,31 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from app.atlas.sides import FLAT, Sides, distinct_rows, groups_of, least, most, scene_size, totals
+from app.atlas.sides import FLAT, Sides, distinct_rows, groups_of, least, lit_sides, most, scene_size, totals, weld
 from app.scene.model import F64, I32, Scene
 
 Mask = NDArray[np.bool_]
 
 
+def sides_with_texels(scene: Scene) -> Sides:
+    """The sides of a scene that light can reach: those that have texels."""
+    lit = lit_sides(scene)
+    return without_enclosed(lit, scene, *weld(scene)) if _may_enclose(scene) else lit
+
+
 def without_enclosed(lit: Sides, scene: Scene, points: F64, corners: I32) -> Sides:
     """The lit sides that are not within such a body; all of them where there are lamps without area, or a sky. points (n, 3) [m],
     corners (m, 3) of the triangles: welded."""
-    if scene.open_to_lights or not scene.sides.any():
+    if not _may_enclose(scene):
         return lit
     within = _enclosed(scene, points, corners)[lit.triangle, lit.back.astype(np.int64)]
     if within.all():
         return lit
     return Sides(lit.triangle[~within], lit.back[~within], lit.dark + int(np.count_nonzero(within)))
+
+
+def _may_enclose(scene: Scene) -> bool:
+    return not scene.open_to_lights and bool(scene.sides.any())
 
 
 def _enclosed(scene: Scene, points: F64, corners: I32) -> Mask:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.contacts import hidden_points
-from app.atlas.sides import lit_sides
+from app.atlas.enclosed import sides_with_texels
 from app.scene.model import F64, Scene
 
 
@@ -58,7 +58,7 @@ class SideIndex:
 def random_points(scene: Scene, count: int, seed: int) -> Points:
     """Even in area on all sides that light can reach, less those that something lies on: ``count`` at most."""
     random = np.random.default_rng(seed)
-    sides = lit_sides(scene)
+    sides = sides_with_texels(scene)
     area = scene.normals_areas[1][sides.triangle]
     order = np.lexsort((sides.back, sides.triangle))
     side = random.choice(order, count, p=area[order] / area.sum())

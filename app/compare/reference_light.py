@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from app.atlas.enclosed import sides_with_texels
 from app.atlas.points import Points, SideIndex, barycentric, bilinear
-from app.atlas.sides import lit_sides, scene_size
+from app.atlas.sides import scene_size
 from app.bake.read import Bake
 from app.errors import UserError
 from app.lightmap.tile_pool import TilePool
@@ -108,7 +109,7 @@ class _Partners:
 def _partners(bake: Bake, scene: Scene) -> tuple[I32, NDArray[np.bool_], _Partners]:
     """Triangle and side of the scene (f,), and which triangles of the bake they are: with the same corners, in the same order as
     seen from that side. Raises UserError."""
-    lit = lit_sides(scene)
+    lit = sides_with_texels(scene)
     triangle, back = lit.triangle, lit.back
     order = np.where(back[:, None], [0, 2, 1], [0, 1, 2])
     mine = np.take_along_axis(scene.corners[triangle], order[..., None], axis=1)
@@ -124,7 +125,7 @@ def _partners(bake: Bake, scene: Scene) -> tuple[I32, NDArray[np.bool_], _Partne
             same = np.abs(corners - mine[left]).max(axis=(1, 2)) <= slack
             found[left[same]], turn[left[same]] = near[left[same], k], turns
     nearby = found < 0
-    area, their_area = (x.normals_areas[1][lit_sides(x).triangle] for x in (scene, bake.scene))
+    area, their_area = (x.normals_areas[1][sides_with_texels(x).triangle] for x in (scene, bake.scene))
     lost, total = area[nearby].sum(), area.sum()
     other = f"{bake.folder}: is of another scene"
     if lost > LOST_AREA * total:

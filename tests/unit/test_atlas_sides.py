@@ -9,6 +9,8 @@ import pytest
 from atlas_scenes import TURN, box_room, moved, scene_of, split_grid
 
 from app.atlas.enclosed import without_enclosed
+from app.atlas.parametrize import parametrize
+from app.atlas.points import SideIndex, random_points
 from app.atlas.rectangles import find_rectangles
 from app.atlas.sides import facets, lit_sides, scene_size, weld
 from app.scene import shapes
@@ -72,6 +74,12 @@ def test_insides_of_closed_bodies(mesh: Mesh, material: Material, more: dict[str
         middle = scene.corners[left.triangle].mean(1)
         centre = mesh.positions.mean(0) + 3.0 * (left.triangle >= len(mesh.triangles))[:, None] * [1, 0, 0]
         assert (((middle - centre) * out).sum(1) > 0).all()
+
+
+def test_random_points_lie_where_there_are_texels() -> None:
+    scene = scene_of([BOX, BOX.moved(3, 0, 0)], [BOTH])
+    points, charts = random_points(scene, 200, 1), parametrize(scene, texels=500)
+    assert (SideIndex(charts.face_triangle, charts.face_back).of(points) >= 0).all() and len(points) == 200
 
 
 def test_a_coplanar_neighbour_lights_nothing() -> None:

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.atlas.enclosed import sides_with_texels
 from app.atlas.materials import colours_at, look_up, texture_coordinates
 from app.atlas.points import Points, barycentric
-from app.atlas.sides import lit_sides
 from app.gpu import Gpu, Mesh, Pass
 from app.lightmap.tile_pool import SolverSpace
 from app.reference.irradiance import CACHE_FILES, ReferenceIrradiance
@@ -152,7 +152,7 @@ def _seen(gpu: Gpu, scene: Scene) -> tuple[NDArray[np.int64], Points]:
 
 def _reflecting(scene: Scene, points: Points) -> NDArray[np.bool_]:
     """(n,) whether they lie on sides that light can reach."""
-    sides = lit_sides(scene)
+    sides = sides_with_texels(scene)
     return np.isin(2 * points.triangle.astype(np.int64) + points.back, 2 * sides.triangle.astype(np.int64) + sides.back)
 
 
