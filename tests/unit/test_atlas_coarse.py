@@ -9,7 +9,7 @@ from atlas_scenes import TURN, box_room, face_areas, moved, scene_of
 from app.atlas import coarse
 from app.atlas.charts import Charts
 from app.atlas.coarse import coarse_charts
-from app.atlas.sides import lit_sides
+from app.atlas.enclosed import sides_with_texels
 from app.atlas.texels import texel_surfaces, uniform_leaves
 from app.scene import shapes
 from app.scene.model import Material, Scene
@@ -34,7 +34,7 @@ def charts_of(scene: Scene, texels: int = 4000) -> Charts:
 def test_all_lit_surface_has_texels_of_its_own(name: str) -> None:
     scene = SCENES[name]()
     charts = charts_of(scene)
-    lit = lit_sides(scene)
+    lit = sides_with_texels(scene)
     assert np.array_equal(charts.face_triangle, lit.triangle) and np.array_equal(charts.face_back, lit.back)
     surfaces = texel_surfaces(scene, charts, uniform_leaves(charts))
     assert surfaces.area.sum() == pytest.approx(face_areas(scene, charts).sum())
