@@ -45,7 +45,7 @@ def test_all_walls_show_their_light_from_the_first_batch_on(gpu: Gpu, adaptive: 
             break
     (first, _), (_, late) = pictures[0], pictures[-1]
     assert first[CEILING].max() < 0.01 * late[CEILING].min(), "the lamp alone has shot"
-    # 256 rays of a point and its neighbours are off by 1/√256 of how uneven the light is that they see, several times itself; and
+    # 576 rays of a point and its neighbours are off by 1/√576 of how uneven the light is that they see, several times itself; and
     # the rest of the lamp is taken to light what its first patches did
     for _, now in pictures:
         np.testing.assert_allclose(now[LIT], late[LIT], rtol=0.35)

@@ -30,7 +30,7 @@ POINTS_A_FRAME, POINTS_A_LOOK = 512, 2048
 SEEING, TRACING = 0.25, 8.0
 FIRST = 4  # times as many points of a frame where it is not known yet what their rays hit
 # Share of the light that is passed on until points look again: of that, what they foresaw is shown
-PASSED_ON = 1 / 32
+PASSED_ON = 1 / 16
 
 
 class Ambient:

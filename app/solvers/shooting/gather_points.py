@@ -16,7 +16,7 @@ from app.lightmap.lightmap import Lightmap
 from app.solvers.shooting.records import BLOCK_LEVEL
 from app.visibility.rays import RayScene
 
-RAY_EDGE = 8  # squared: rays of a point, where a texture holds what they hit of all; a texel has those of four
+RAY_EDGE = 12  # squared: rays of a point, where a texture holds what they hit of all; a texel has those of four
 PLACES = "t_position_area", "t_normal_ids"  # of the lightmap
 
 
