@@ -107,8 +107,6 @@ class DisplayTexels:
         of the lightmap's irradiance. offered: for layers that a solver must offer.
         """
         layer, lightmap = LAYER_SHADERS[layer_name], self._lightmap
-        if layer.light is not None:
-            lightmap.refresh_ambient(whole=whole)
         if self._version != lightmap.version:
             self._follow_leaves()
         shader, uniforms = curve(display, scale, exposed=layer.light is not None)

@@ -73,6 +73,8 @@ class Surfaces:
         """
         self._live = not whole
         self._scale = scale
+        if LAYER_SHADERS[layer_name].light is not None:
+            self.lightmap.refresh_ambient(whole=whole)
         wanted: dict[str, Any] = {"scale": scale, "reference": reference, "offered": offered}
         lit = self._textured is not None and layer_name in SHARP and LAYER_SHADERS[layer_name].light is not None
         left, right = _parts(layer_name, display, reference, size)

@@ -63,22 +63,30 @@ class Pacer:
         """No lap runs until the next advance."""
         self._last = self._start = self._end = 0.0
 
-    def advance(self, solver: Solver[Any], *, fast: bool, interactive: bool = False) -> int:
+    @property
+    def between(self) -> bool:
+        """Whether no piece of work is under way: what needs whole ones does not wait for the rest of one."""
+        return self._parts is None
+
+    def advance(self, solver: Solver[Any], *, fast: bool, interactive: bool = False, to_end: bool = False) -> int:
         """Do one unit of work, or a part of it; if ``fast``, as much as fits. How much is whole. interactive: a hand is at the
-        controls, which frames keep up with, fast or not."""
+        controls, which frames keep up with, fast or not. to_end: somebody waits until no piece is under way: begin none after one
+        that ends."""
         start = time.perf_counter()
         bands = self._pieces(start, INTERACTIVE_FRAME if interactive else LONG_FRAME)
         if interactive:
             whole = bands == 1 and 0 < self._unit <= self._left
-            made = self._whole(solver, start) if whole else self._some(solver, start, self._left, 1)
+            made = self._whole(solver, start) if whole else self._some(solver, start, self._left, 1, to_end)
         elif not fast:
             whole = bands == 1 and self._unit > 0  # it is not known yet how long the first one takes
-            made = self._whole(solver, start) if whole else self._some(solver, start, WATCH_BUDGET, 1)
+            made = self._whole(solver, start) if whole else self._some(solver, start, WATCH_BUDGET, 1, to_end)
         else:
             budget = self._fast_budget
             whole = bands == 1 and 0 < self._unit <= WHOLE * budget
             amount = MOST if self._unit else 1  # first one unit: light is there before much is tried for more
-            made = self._whole(solver, start, budget, MOST) if whole else self._some(solver, start, budget, amount)
+            made = (
+                self._whole(solver, start, budget, MOST) if whole else self._some(solver, start, budget, amount, to_end)
+            )
         self._end = time.perf_counter()
         return made
 
@@ -133,9 +141,9 @@ class Pacer:
             if amount == 1 or spent + self._unit > budget_ms or solver.poll().converged:
                 return made
 
-    def _some(self, solver: Solver[Any], start: float, budget_ms: float, amount: int) -> int:
+    def _some(self, solver: Solver[Any], start: float, budget_ms: float, amount: int, to_end: bool) -> int:
         """Parts of work, as many as the budget allows: of pieces of so much at once, and where that is one unit, of no more than
-        one that is begun here."""
+        one that is begun here; with ``to_end`` none after one that ends."""
         begun, made, anew, ended = start, 0, False, False
         while (begun - start) * 1e3 < budget_ms:
             if self._parts is None:
@@ -149,6 +157,8 @@ class Pacer:
             self._part, self._so_far = max(PART_STAYS * self._part, part), self._so_far + part
             if more is not None:
                 self._unit, made, ended = self._so_far, made + more, True
+                if to_end:
+                    break
         return made
 
     def _next_part(self) -> int | None:

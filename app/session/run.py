@@ -208,7 +208,7 @@ class Run:
     def advance(self, *, fast: bool, interactive: bool) -> int:
         """Do one unit of work, or as much as a frame has time for, see ``Pacer.advance``; how much was issued."""
         self.settled = False
-        made = self._pace.advance(self.solver, fast=fast, interactive=interactive)
+        made = self._pace.advance(self.solver, fast=fast, interactive=interactive, to_end=self._energy.due)
         self.seconds += self._pace.lap()
         return made
 
@@ -239,7 +239,7 @@ class Run:
             if wanted and not self.settled:
                 slow = True
                 self.settle()
-        elif wanted and self._energy.due:
+        elif wanted and self._energy.due and self._pace.between:
             slow = True
             self._energy.measure(self.solver)
         self.furthest = max(self.furthest, self.share_done(NEVER))

@@ -111,8 +111,8 @@ class UiFrame:
         size = target.size
         now = None if view.still is None else (view.still, scale, size)
         if now is None or now != self._still or fresh:
-            if look or fresh:
-                view.draw(target, size, scale=scale, whole=fresh)
+            if (look or fresh) and not view.draw(target, size, scale=scale, whole=False) and fresh:
+                target.clear(*theme.PANEL)
         elif look and view.samples < SAMPLES and not view.session.coarse:
             view.draw(target, size, scale=scale, add=True)
         self._still, self.unfinished = now, now is not None and view.samples < SAMPLES

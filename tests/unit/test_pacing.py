@@ -216,6 +216,17 @@ def test_a_fast_frame_ends_with_the_solve(clockwork: Clockwork) -> None:
         assert 24 <= solver.made <= 24 + 5 * 8, "one batch for each frame that asks once more"
 
 
+def test_a_frame_begins_no_piece_where_somebody_waits_for_the_end_of_one(clockwork: Clockwork) -> None:
+    pace, solver = pacer(), Batches(clockwork, 20.0)
+    pace.advance(solver, fast=True)  # type: ignore[arg-type]
+    assert not pace.between and solver.made == 0
+    for _ in range(8):
+        pace.advance(solver, fast=True, to_end=True)  # type: ignore[arg-type]
+        if pace.between:
+            break
+    assert pace.between and solver.made == 1, "the unit that comes first"
+
+
 def test_one_watches_first_and_then_it_is_fast() -> None:
     assert not Pace().is_fast(0.9 * WATCH_SECONDS) and Pace().is_fast(WATCH_SECONDS)
     assert Pace("fast").is_fast(0.0) and not Pace("watch").is_fast(100.0)

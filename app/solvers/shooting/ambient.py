@@ -29,6 +29,7 @@ POINTS_A_FRAME, POINTS_A_LOOK = 512, 2048
 # What a point takes, of the time of a look: to see what its texels have to pass on; to find what its rays hit
 SEEING, TRACING = 0.25, 8.0
 FIRST = 4  # times as many points of a frame where it is not known yet what their rays hit
+TRACED_AT_ONCE = 512  # points, at most: with ten thousands of triangles on a software rasteriser 50 ms
 # Share of the light that is passed on until points look again: of that, what they foresaw is shown
 PASSED_ON = 1 / 16
 
@@ -114,7 +115,7 @@ class Ambient:
         if self._next_row == 0 and self._passed_on < PASSED_ON:
             self._owed = 0.0
         elif first or self._owed >= min(POINTS_A_LOOK, points.rows * points.columns):
-            self._look(points, self._owed * (FIRST if first else 1))
+            self._look(points, min(FIRST * self._owed, TRACED_AT_ONCE * TRACING) if first else self._owed)
             self._owed = 0.0
 
     def _look(self, points: GatherPoints, budget: float) -> None:
