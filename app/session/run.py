@@ -196,7 +196,8 @@ class Run:
         """Of a solve: of the work or seconds asked for, or of the decades of what remains down to the threshold, 0 to 1."""
         threshold = min(float(getattr(self.solver.options, self.family.threshold)), 0.999999)
         remaining = min(max(self.progress.remaining, 1e-12), 1.0)
-        shares = [1.0 if self.converged else min(float(np.log(remaining) / np.log(threshold)), NEARLY)]
+        way = float(np.log(remaining) / np.log(threshold)) + 0.0  # not -0
+        shares = [1.0 if self.converged else min(way, NEARLY)]
         if stop.work is not None:
             shares.append(self.solver.issued / stop.work)
         if stop.seconds is not None:

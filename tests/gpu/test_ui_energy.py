@@ -99,6 +99,7 @@ def test_shares_are_of_one_moment(gpu: Gpu) -> None:
     """Half of the light leaves the scene with the first shots: they were in what had escaped, and still in what was unshot."""
     session = Session(gpu, atlas=AtlasOptions(texels=1500))
     session.open_now("cornell-box")
+    assert f"{session.run.share_done(Stop()):.0%}" == "0%", "not -0%"
     for _ in range(4):
         session.work(8)
         balance, progress = session.solver.energy(), session.solver.poll(wait=True)

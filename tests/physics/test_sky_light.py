@@ -250,6 +250,20 @@ def test_a_sun_that_is_dragged_leaves_light_there(gpu: Gpu) -> None:
     lit.release()
 
 
+def test_a_sun_moves_before_all_of_its_sky_has_come(gpu: Gpu) -> None:
+    """The first that is taken back is the sun that was, though there is more light to come than to be taken back."""
+    scene = quads_scene([FLOOR, WALL], [grey(0.5, double_sided=True)]).with_sky(Sky("clear", sun=Sun(60, 30)))
+    lit = begin(gpu, scene, density=8)
+    lit.step(8)  # the sun
+    lit.solver.set_sky(Sky("clear", sun=Sun(120, 30)))
+    outside = lit.solver.batch.outside
+    for _ in range(2):
+        lit.step(8)
+    suns = [source for source in outside._given_now() if source.name != "sky"]
+    assert len(suns) == 8 and all(shot.gives and shot.kind == "sky" for shot in outside._queue[16:])
+    lit.release()
+
+
 def test_light_of_the_sky_is_smoothed_by_as_much_as_it_is_noisy(gpu: Gpu) -> None:
     scene = quads_scene([FLOOR, WALL], [grey(0.0, double_sided=True)]).with_sky(Sky())
     off = []
