@@ -243,10 +243,10 @@ def test_a_bake_from_the_panel_is_stopped_and_goes_on(window: Driven, tmp_path: 
     window.until(lambda s: not s["running"] and "go on" in s["places"])
     folder = tmp_path / "Cornell box baked"
     assert [path.name for path in folder.iterdir()] == ["bake.checkpoint"]
-    (folder.parent / "enough").touch()  # the light that there is need not be good
     time.sleep(0.5)  # the panel has other buttons now
     click(window, window.state(), "go on")
-    state = window.until(lambda s: s["running"])
+    window.until(lambda s: s["running"])
+    (tmp_path / "enough").touch()  # of the light: it need not be good
     window.until(lambda s: "show" in s["places"])
     assert sorted(path.name for path in folder.iterdir()) == ["irradiance.exr", "report.json", "scene.glb"]
     report = json.loads((folder / "report.json").read_text())
