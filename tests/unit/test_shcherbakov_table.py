@@ -39,6 +39,7 @@ from app.util import cache
 from app.util.tables import Row
 
 SIZE, STEPS, EVERY = 64, 4, 2
+DENSITY = 0.5  # texels along a metre
 
 
 @pytest.fixture(scope="module")
@@ -58,8 +59,10 @@ def charts_are_kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing is left out because it takes long, however busy the machine is."""
+    """Nothing is left out because it takes long, however busy the machine is; patches of two metres, and few shadow rays."""
     monkeypatch.setattr(shcherbakov, "LONGEST", 1e9)
+    monkeypatch.setattr(shcherbakov, "DENSITY", DENSITY)
+    monkeypatch.setattr(shcherbakov, "SHADOW_RAYS", 4)
 
 
 def test_light_from_outside_as_its_mean_is_a_row_of_its_own(gpu: Gpu, small: Scene) -> None:
@@ -92,7 +95,7 @@ def test_shown_as_the_whole_solution_nothing_differs(gpu: Gpu, small: Scene) -> 
     """The light of the whole solution, written to the lightmap, is read in the same order; of the real one something differs,
     and where it takes too long nothing is compared."""
     options = LocalOptions(patches=SIZE, patch_level=0, shadow_rays=4)
-    with opened(gpu, small, AtlasOptions(density=1.0), LightmapOptions(), options, "local") as (lightmap, made):
+    with opened(gpu, small, AtlasOptions(density=DENSITY), LightmapOptions(), options, "local") as (lightmap, made):
         assert isinstance(made, Local)
         find_direct(made)
         whole = whole_solution(made)
@@ -115,7 +118,7 @@ def test_shown_as_the_whole_solution_nothing_differs(gpu: Gpu, small: Scene) -> 
 
 def test_patches_of_several_texels_have_no_whole_solution(gpu: Gpu, small: Scene) -> None:
     options = LocalOptions(patches=SIZE, patch_level=1, shadow_rays=4)
-    with opened(gpu, small, AtlasOptions(density=1.0), LightmapOptions(), options, "local") as (_, made):
+    with opened(gpu, small, AtlasOptions(density=DENSITY), LightmapOptions(), options, "local") as (_, made):
         assert isinstance(made, Local)
         find_direct(made)
         with pytest.raises(UserError, match="one texel each"):
