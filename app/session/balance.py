@@ -24,12 +24,13 @@ class Verdict:
     text: str | None = None
 
 
-def verdict_of(imbalance: float, family: Family, remaining: float = 0.0) -> Verdict:
+def verdict_of(imbalance: float, family: Family, remaining: float = 0.0, *, coarse: bool = False) -> Verdict:
     """imbalance: of the emitted power, above 0 where light is lost. family: of the solver. remaining: what is noise or missing
-    in a solution that goes on: where no light is shot, it is in the imbalance, of which less says nothing yet."""
+    in a solution that goes on: where no light is shot, it is in the imbalance, of which less says nothing yet. coarse: in
+    texels that better ones are about to replace, of which there is nothing to do about it."""
     if abs(imbalance) < FINE:
         return Verdict(0)
-    if not family.distributes and abs(imbalance) < remaining:
+    if coarse or (not family.distributes and abs(imbalance) < remaining):
         return Verdict(1)
     what = "is lost" if imbalance > 0 else "comes from nothing"
     return Verdict(

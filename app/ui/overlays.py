@@ -144,7 +144,7 @@ def _status(view: View, state: State) -> list[tuple[str, theme.RGBA]]:
         parts += [f"{widgets.number(stats.per_second, 3)} {stats.unit}/s"]
     if state.measured and state.live:
         parts += [f"{state.fps:.0f} fps"]
-    wrong = verdict_of(stats.imbalance, view.session.family, stats.remaining).level > 1
+    wrong = verdict_of(stats.imbalance, view.session.family, stats.remaining, coarse=view.session.coarse).level > 1
     imbalance = f"{ICONS.ICON_FA_CIRCLE_EXCLAMATION} imbalance {widgets.percent(abs(stats.imbalance))}"
     return [
         *((view.session.name, theme.TEXT), (word, colour), *((part, theme.DIM) for part in parts)),

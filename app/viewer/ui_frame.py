@@ -111,7 +111,8 @@ class UiFrame:
         size = target.size
         now = None if view.still is None else (view.still, scale, size)
         if now is None or now != self._still or fresh:
-            if (look or fresh) and not view.draw(target, size, scale=scale, whole=False) and fresh:
+            whole = now is not None and view.session.coarse  # its texels are few: at rest they are drawn once
+            if (look or fresh) and not view.draw(target, size, scale=scale, whole=whole) and fresh:
                 target.clear(*theme.PANEL)
         elif look and view.samples < SAMPLES and not view.session.coarse:
             view.draw(target, size, scale=scale, add=True)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from gl_objects import forgotten, held
 
@@ -17,6 +18,7 @@ from app.atlas.options import AtlasOptions
 from app.errors import UserError
 from app.gpu import Gpu
 from app.lightmap.options import LightmapOptions
+from app.render import resolve
 from app.scene.load import load_scene
 from app.scene.sky import Sky
 from app.session import loading, opening
@@ -24,8 +26,10 @@ from app.session import session as session_module
 from app.session.session import Session
 from app.session.view import View
 from app.solvers import ShootingOptions
+from app.ui.app import Ui
 from app.util import cache
 from app.viewer.picture import picture
+from app.viewer.ui_frame import UiFrame
 
 __all__ = ["forgotten"]
 
@@ -263,3 +267,35 @@ def test_nothing_stays_on_the_gpu(
         session.run.settle()
         counts.append(held(gpu))
     assert counts[1:] == counts[:1] * 2 and not forgotten()
+
+
+def test_a_picture_at_rest_shows_all_of_the_coarse_light(view: View, gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where a frame brings only a few of its texels up to date."""
+    session, size = view.session, (640, 360)
+    texture = gpu.texture(size, 4, "f1")
+    target, ui = gpu.target(texture), Ui(live=False)
+    frame = UiFrame(gpu, ui, whole=False)
+
+    def seen() -> np.ndarray:
+        frame.draw(view, target, size=size)
+        left, bottom, width, height = ui.view_rect
+        image = np.frombuffer(texture.read(), np.uint8).reshape(size[1], size[0], 4)
+        return image[bottom : bottom + height // 2, left : left + width].copy()  # below what says how far it is
+
+    monkeypatch.setattr(session_module, "COARSE_LEFT", 0.5)
+    session.open("cornell-box")
+    frames(session, lambda: session.opened)
+    for _ in range(4):
+        seen()  # the panels find their places
+    monkeypatch.setattr(resolve, "TEXELS_PER_FRAME", 1)
+    frames(session, lambda: session.run.resting)
+    at_rest = [seen() for _ in range(2)][-1]
+    frame._still = None
+    monkeypatch.setattr(resolve, "TEXELS_PER_FRAME", 1 << 20)
+    for _ in range(2):
+        all_of_it = seen()
+    frame.release()
+    ui.release()
+    gpu.release_all(target, texture)
+    assert session.coarse and all_of_it.std() > 10
+    assert np.array_equal(at_rest, all_of_it)

@@ -134,5 +134,5 @@ def test_progress_never_goes_back_but_for_an_edit(gpu: Gpu, monkeypatch: pytest.
 def test_what_is_still_noise_or_missing_is_no_verdict() -> None:
     """A solution that has hardly begun is not called wrong; what is shot too much stays wrong."""
     gathering, shooting = SOLVERS["gathering"], SOLVERS["shooting"]
-    assert verdict_of(-0.5, gathering, 0.9) == Verdict(1)
+    assert verdict_of(-0.5, gathering, 0.9) == verdict_of(-0.5, shooting, coarse=True) == Verdict(1)
     assert verdict_of(-0.5, gathering, 0.1).level == verdict_of(-0.5, shooting, 0.9).level == 2

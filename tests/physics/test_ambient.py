@@ -13,6 +13,7 @@ from solver_scenes import EVERY_LIGHTMAP, Solution, begin, grey, quads_scene, ro
 from app.errors import UserError
 from app.gpu import Gpu
 from app.scene.model import F64, Scene
+from app.solvers.shooting import ambient
 
 LIT, LAMP = slice(0, 6), 6  # objects: walls of the room with the lamp, floor and ceiling first
 CEILING, DARK = 1, slice(7, 13)
@@ -29,6 +30,25 @@ def shown(solution: Solution) -> F64:
     """(objects, 3) mean H + a [W/m²]."""
     covered = solution.lightmap.pool.surfaces.area > 0
     return solution.means(solution.lightmap.irradiance(ambient=True)[covered].astype(np.float64))
+
+
+def test_it_is_even_until_there_is_a_tree_to_gather_by(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a batch the mean of what is shown is within a fifth of what there will be, of which a third is not yet shot."""
+    monkeypatch.setattr(ambient, "tree_is_near", lambda pool: False)
+    lamp = [[0.3, 0.95, 0.3], [0.7, 0.95, 0.3], [0.7, 0.95, 0.7], [0.3, 0.95, 0.7]]
+    scene = quads_scene([*room((1.0, 1.0, 1.0)), lamp], [grey(0.6), grey(0.0, 10.0)], [0] * 6 + [1])
+    box = begin(gpu, scene, texels=800, residual=1e-2)
+
+    def mean() -> F64:
+        area = box.lightmap.pool.surfaces.area[..., None]
+        return np.asarray((box.lightmap.irradiance() * area).sum((0, 1, 2)) / area.sum())
+
+    box.step(16)
+    early, term = mean(), box.lightmap.ambient()
+    assert term.shape == (3,) and box.lightmap.texture("t_ambient").size == (1, 1)
+    box.settle()
+    assert (early < 0.8 * mean()).all()
+    np.testing.assert_allclose(early + term, mean(), rtol=0.2)
 
 
 @EVERY_LIGHTMAP

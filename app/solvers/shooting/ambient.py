@@ -2,7 +2,8 @@
 
 Of what surfaces have yet to shoot it is gathered by points that know what they see, see gather_points.py; of what lamps and
 sources outside have yet to give, it goes where such light came from the start. Where the storage can hold a residual below zero
-that of patches is overshot [Feda92]: a patch shoots, with its residual, what it will reflect of an even ambient term.
+that of patches is overshot [Feda92]: a patch shoots, with its residual, what it will reflect of an even ambient term. That one is
+shown, too, until there is a tree of the triangles that the rays of points walk.
 """
 
 from __future__ import annotations
@@ -42,7 +43,11 @@ class Ambient:
     passes on at most.
     """
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch, ledger: Ledger, *, shown: bool) -> None:
+    def __init__(
+        self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch, ledger: Ledger, *, shown: bool, gathers: bool
+    ) -> None:
+        """gathers: whether points gather it, once there is a tree that their rays walk; else it stays an even one."""
+        self._gathers = gathers
         self._gpu, self._lightmap, self._shooters, self._ledger = gpu, lightmap, shooters, ledger
         self.overshoot, self._lamps, self._to_come = (gpu.texture((n, 1), 4, "f4") for n in (1, 1, 2))
         self.overshoot_target = gpu.target(self.overshoot)
@@ -70,19 +75,21 @@ class Ambient:
         """Estimate what is overshot from what is unshot in the bins, and from so many shots of a batch since; None: anything may
         be other than it was. Points look that frames asked for while light was held."""
         self.changed(1.0 if shots is None else shots * self.strongest)
-        ledger = self._ledger
         if self._lightmap.storage != "fixed8":
-            self._estimate.draw(
-                self.overshoot_target,
-                textures={
-                    "t_unshot": bins.unshot,
-                    "t_ledger": ledger.texture,
-                    "t_shooters": self._shooters.texture,
-                },
-                uniforms={"u_shots": shots or 0, "u_albedo": ledger.albedo, "u_area": ledger.area},
-            )
+            self._find_even(self.overshoot_target, bins, shots or 0)
+            if self.shown and self.note is None and self._points is None:
+                self._find_even(self._lightmap.ambient_target, bins, shots or 0)
         if self._owed and self._points is not None:
             self._look_for_frames(self._points)
+
+    def _find_even(self, target: Framebuffer, bins: Bins, shots: int) -> None:
+        """The even ambient term, of one texel."""
+        ledger = self._ledger
+        self._estimate.draw(
+            target,
+            textures={"t_unshot": bins.unshot, "t_ledger": ledger.texture, "t_shooters": self._shooters.texture},
+            uniforms={"u_shots": shots, "u_albedo": ledger.albedo, "u_area": ledger.area},
+        )
 
     def changed(self, share: float = 1.0) -> None:
         """Other light is unshot than when the lightmap was given its ambient term. share: of all light, that was passed on."""
@@ -91,8 +98,8 @@ class Ambient:
 
     def refresh(self, whole: bool, wait: bool) -> None:
         """Give the lightmap the ambient term of the light as it is; if not ``whole``, POINTS_A_FRAME towards it. wait: for the
-        tree that rays walk, without which there is none."""
-        if not self.shown or self.note is not None or not self._sweeps:
+        tree that rays walk, without which it is an even one."""
+        if not self.shown or not self._gathers or self.note is not None or not self._sweeps:
             return
         try:
             points = self._points_now(wait)

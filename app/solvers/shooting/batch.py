@@ -57,7 +57,7 @@ class Batch:
         self.shooters, self.bins = ShooterBatch(gpu), Bins(gpu, lightmap)
         self.occluders, self.receivers = occluders_of(gpu, lightmap), Receivers(gpu, lightmap.pool)
         self.ledger = Ledger(gpu, lightmap, self.shooters)
-        self.ambient = Ambient(gpu, lightmap, self.shooters, self.ledger, shown=options.ambient and not hasty)
+        self.ambient = Ambient(gpu, lightmap, self.shooters, self.ledger, shown=options.ambient, gathers=not hasty)
         equipment = Equipment(gpu, lightmap, self.occluders, self.receivers, self.shooters)
         self.outside = Outside(equipment, self.ledger)
         self.marks = PatchMarks(gpu, lightmap)

@@ -47,7 +47,8 @@ class Shooting:
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, hasty: bool = False) -> None:
-        """hasty: for light that is soon replaced, neither try strong shots before they are made, nor gather the ambient term."""
+        """hasty: for light that is soon replaced, neither try strong shots before they are made, nor gather the ambient
+        term, which is even then."""
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
         self.batch = Batch(gpu, lightmap, options, hasty=hasty)
         self._reports, self._edits, self._picture = Reports(gpu), MaterialEdits(gpu, lightmap), ItemImage(gpu)
