@@ -72,6 +72,7 @@ def _made(
         cut.scene,
         ends=cut.ends,
         facet=cut.facet,
+        uncut=len(scene.triangles),
         density=atlas.density,
         texels=atlas.texels,
         tile=atlas.tile,

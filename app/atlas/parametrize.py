@@ -46,6 +46,7 @@ def parametrize(
     roots: bool = False,
     ends: NDArray[np.uint8] | None = None,
     facet: I32 | None = None,
+    uncut: int | None = None,
     progress: Progress | None = None,
     time_limit: float | None = None,
 ) -> Charts:
@@ -56,8 +57,9 @@ def parametrize(
     A material's ``lightmap_scale`` is so many times that density; where neither was given, others keep the density that they have
     without it. Rectangles are made of whole patches, so that a small number of texels is met only roughly. Charts that are
     smaller than a texel have one all the same: where there are so many that a large floor among them would be left with one, too,
-    more texels are made than were asked for. ends, facet: as in a Cut, if the scene was cut. tile: texels along the edge of a
-    leaf. time_limit [s] for xatlas. progress(stage, share) is called from time to time and may raise to cancel.
+    more texels are made than were asked for. ends, facet: as in a Cut, if the scene was cut; uncut: its triangles before that, for
+    which there are texels by default. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage, share) is
+    called from time to time and may raise to cancel.
     Raises UserError for a density or number out of range, or when more than 16 777 216 texels are needed.
     """
     check(density, texels)
@@ -80,7 +82,8 @@ def parametrize(
     report("placing pieces side by side", UNFOLDED)
     plain, layout = layout, scaled(layout, scene)
     if density is None:
-        aim = texels if texels is not None else default_texels(len(lit.triangle), roots)
+        share = 1.0 if uncut is None else uncut / len(scene.triangles)
+        aim = texels if texels is not None else default_texels(round(share * len(lit.triangle)), roots)
         density = density_for(plain if texels is None else layout, aim)
     need = texel_count(layout, density)
     if need > MAX_TEXELS:
