@@ -57,9 +57,9 @@ def parametrize(
     A material's ``lightmap_scale`` is so many times that density; where neither was given, others keep the density that they have
     without it. Rectangles are made of whole patches, so that a small number of texels is met only roughly. Charts that are
     smaller than a texel have one all the same: where there are so many that a large floor among them would be left with one, too,
-    more texels are made than were asked for. ends, facet: as in a Cut, if the scene was cut; uncut: its triangles before that, for
-    which there are texels by default. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage, share) is
-    called from time to time and may raise to cancel.
+    more texels are made than were asked for. ends, facet: as in a Cut, if the scene was cut; uncut: its triangles before that,
+    for which there are texels by default. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage,
+    share) is called now and then and may raise to cancel.
     Raises UserError for a density or number out of range, or when more than 16 777 216 texels are needed.
     """
     check(density, texels)
