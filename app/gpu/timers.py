@@ -59,6 +59,7 @@ class Timers:
 
     def reset(self) -> None:
         self.flush()
+        self._met.clear()
         self.total_ms.clear()
         self.calls.clear()
 
