@@ -1,7 +1,8 @@
 """Charts of many triangles are kept on disk, with the triangles that were cut for them: reading takes a tenth of making them.
 
-They are known by all that they follow from: the scene's geometry, how finely it is cut, and the program that does it. Those that
-come with warnings are not kept: a machine that was too busy for xatlas may not be the next time.
+They are known by all that they follow from: the scene's geometry, cameras that may be within closed bodies (see enclosed.py), how
+finely the scene is cut, and the program that does it. Those that come with warnings are not kept: a machine that was too busy for
+xatlas may not be the next time.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
 from app.atlas.cuts import cut_at_contacts
+from app.atlas.enclosed import cameras_inside
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
 from app.atlas.seams import Seams
@@ -93,7 +95,7 @@ def _given(scene: Scene, atlas: AtlasOptions, roots: bool) -> cache.Arrays:
     sides = np.array([(m.double_sided, m.opaque, m.lightmap_scale) for m in scene.materials])
     open_to = np.array([scene.sky is not None, bool(scene.lights)])
     asked = np.array([atlas.density or 0.0, atlas.texels or 0, atlas.tile, roots], np.float64)
-    return {**geometry, "sides": sides, "open_to": open_to, "asked": asked}
+    return {**geometry, "sides": sides, "open_to": open_to, "cameras": cameras_inside(scene), "asked": asked}
 
 
 def _content(scene: Scene, cut: Scene, charts: Charts) -> cache.Arrays:

@@ -1,7 +1,7 @@
 """The insides of closed bodies, which no light reaches and nobody sees: a box of a file whose materials all have two sides.
 
-A body is what its edges join. It is closed if each edge has two triangles, which run along it in opposite directions. What shares
-room with something, a lamp, another body, a camera, is left alone: a room is a closed body, too.
+A body is what its edges join. It is closed if each edge has two triangles, which run along it in opposite directions. A room is
+a closed body, too: a body whose bounding box holds anything else, a lamp, another body or a camera, keeps its inside.
 """
 
 from __future__ import annotations
@@ -31,6 +31,16 @@ def without_enclosed(lit: Sides, scene: Scene, points: F64, corners: I32) -> Sid
     if within.all():
         return lit
     return Sides(lit.triangle[~within], lit.back[~within], lit.dark + int(np.count_nonzero(within)))
+
+
+def cameras_inside(scene: Scene) -> F64:
+    """(k, 3) [m] places of the cameras that may be within a body: those in the scene's bounding box; none where no inside is left
+    out. On these the sides with texels depend."""
+    if not _may_enclose(scene):
+        return np.empty((0, 3))
+    eyes = np.array([camera.world_from_camera[:3, 3] for camera in scene.cameras]).reshape(-1, 3)
+    low, high = scene.positions.min(0), scene.positions.max(0)
+    return np.unique(eyes[((eyes > low) & (eyes < high)).all(1)], axis=0)
 
 
 def _may_enclose(scene: Scene) -> bool:
@@ -71,7 +81,7 @@ def _alone(
     x, y = np.argsort(-np.ptp(triangles.reshape(-1, 3), axis=0))[:2]
     lower, upper = low[asked] + near, high[asked] - near
     tree = shapely.STRtree(shapely.box(lower[:, x], lower[:, y], upper[:, x], upper[:, y]))
-    eyes = np.array([camera.world_from_camera[:3, 3] for camera in scene.cameras]).reshape(-1, 3)
+    eyes = cameras_inside(scene)
     first = np.concatenate([least(triangles), eyes])
     last = np.concatenate([most(triangles), eyes])
     owner = np.concatenate([body, np.full(len(eyes), -1)])

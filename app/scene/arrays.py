@@ -11,7 +11,8 @@ from app.scene.model import Scene
 
 
 def arrays_of(scene: Scene) -> dict[str, NDArray[Any]]:
-    """All of a scene that light depends on, by name; cameras, names and order of its objects are not."""
+    """All of a scene that light depends on, by name; cameras, names and order of its objects are not. But which sides have texels
+    also depends on cameras: see app/atlas/enclosed.py."""
     arrays: dict[str, NDArray[Any]] = {"corners": scene.corners, "material_ids": scene.material_ids}
     for name, values in (("uv0", scene.uv0), ("uv1", scene.uv1), ("colours", scene.colours)):
         if values is not None:

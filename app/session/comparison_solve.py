@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from app import __version__
+from app.atlas.enclosed import cameras_inside
 from app.atlas.options import AtlasOptions
 from app.compare.reference_light import ReferenceLight
 from app.errors import UserError
@@ -36,7 +37,7 @@ def solved_light(scene: Scene, atlas: AtlasOptions, residual: float, tell: Progr
     """From the cache or from a worker, which solves with closed forms and full storage until so little of the emitted power is
     unshot; ``tell`` may raise to stop it. Raises UserError."""
     knobs = repr((__version__, atlas, residual)).encode()
-    path = cache.entry("reference", cache.digest(FORMAT + knobs, arrays_of(scene)))
+    path = cache.entry("reference", cache.digest(FORMAT + knobs, arrays_of(scene) | {"cameras": cameras_inside(scene)}))
     found = cache.read(path)
     if found is None or not found.keys() >= ANSWER:
         with tempfile.TemporaryDirectory(prefix="glowtree-") as folder:

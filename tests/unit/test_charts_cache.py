@@ -17,7 +17,7 @@ from app.atlas.charts_cache import charts_of
 from app.atlas.options import AtlasOptions
 from app.atlas.seams import Seams
 from app.scene import shapes
-from app.scene.model import Material, Scene
+from app.scene.model import Camera, Material, Scene
 from app.scene.sky import Sky
 from app.util.background import CancelledError
 
@@ -59,7 +59,7 @@ def test_what_is_kept_is_the_same_again(scene: Scene, monkeypatch: pytest.Monkey
     assert charts_of(scene.with_materials((Material("red", albedo=(1, 0, 0)), scene.materials[1])), ATLAS)
 
 
-@pytest.mark.parametrize("other", ["density", "sides", "moved", "roots", "sky"])
+@pytest.mark.parametrize("other", ["density", "sides", "moved", "roots", "sky", "camera within"])
 def test_they_are_made_anew_where_they_would_differ(scene: Scene, other: str, monkeypatch: pytest.MonkeyPatch) -> None:
     charts_of(scene, ATLAS)
     monkeypatch.setattr(charts_cache, "parametrize", _refuse)
@@ -70,8 +70,22 @@ def test_they_are_made_anew_where_they_would_differ(scene: Scene, other: str, mo
         scene = dataclasses.replace(scene, positions=scene.positions + 1e-9)
     if other == "sky":
         scene = scene.with_sky(Sky())
+    if other == "camera within":
+        scene = dataclasses.replace(scene, cameras=(camera_at(0, 0, 0),))
     with pytest.raises(AssertionError, match="makes them"):
         charts_of(scene, atlas, roots=other == "roots")
+
+
+def camera_at(*place: float) -> Camera:
+    world_from_camera = np.eye(4)
+    world_from_camera[:3, 3] = place
+    return Camera("eye", world_from_camera, 1.0)
+
+
+def test_a_camera_outside_may_go_elsewhere(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = charts_of(dataclasses.replace(scene, cameras=(camera_at(0, 0, 9),)), ATLAS)
+    monkeypatch.setattr(charts_cache, "parametrize", _refuse)
+    assert _same(charts_of(dataclasses.replace(scene, cameras=(camera_at(0, 0, 8),)), ATLAS)[1], first[1])
 
 
 def test_a_damaged_file_is_made_again(scene: Scene) -> None:

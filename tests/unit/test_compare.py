@@ -13,6 +13,7 @@ import pytest
 from solver_scenes import quads_scene, room
 
 from app.atlas.charts import Charts
+from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
 from app.atlas.points import Points, barycentric, bilinear
 from app.bake import write_bake
@@ -23,7 +24,10 @@ from app.compare.reference_task import ReferenceTask
 from app.errors import UserError
 from app.lightmap.tile_pool import TilePool
 from app.reference.metrics import point_errors
-from app.scene.model import F32, Material, Scene
+from app.scene.model import F32, Camera, Material, Scene
+from app.session import comparison_solve
+from app.session.comparison_solve import solved_light
+from app.util import cache
 from app.util.background import Progress
 
 MATERIALS = (
@@ -80,6 +84,25 @@ def test_any_file_of_a_bake_stands_for_it(tmp_path: Path) -> None:
     image = written(tmp_path, sheet_in_a_room())
     np.testing.assert_array_equal(read_bake(tmp_path / "irradiance.exr").irradiance, image)
     assert read_bake(tmp_path / "report.json").report["pages"] == 1
+
+
+def test_a_finer_solve_is_kept_for_the_sides_that_have_texels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They depend on whether a camera is within a closed body of two-sided material; other cameras may be anywhere."""
+    calls = []
+
+    def solve(source: Path, target: Path, tell: Progress) -> None:
+        calls.append(source)
+        answer = {"triangle": np.zeros(1), "back": np.zeros(1), "uv": np.zeros((1, 3, 2)), "texels": np.array(4)}
+        target.write_bytes(cache.content({"image": np.zeros((2, 2, 3)), "unshot": np.array(0.0), **answer}))
+
+    monkeypatch.setattr(comparison_solve, "_run_worker", solve)
+    with cache.elsewhere(tmp_path):
+        for place, solves in (((5, 5, 5), 1), ((6, 5, 5), 1), ((0.5, 0.5, 0.5), 2)):
+            world_from_camera = np.eye(4)
+            world_from_camera[:3, 3] = place
+            scene = dataclasses.replace(sheet_in_a_room(), cameras=(Camera("eye", world_from_camera, 1.0),))
+            solved_light(scene, AtlasOptions(), 0.01, lambda stage, share: None)
+            assert len(calls) == solves
 
 
 def test_other_materials_are_named(tmp_path: Path) -> None:
