@@ -209,7 +209,8 @@ class Run:
     def advance(self, *, fast: bool, interactive: bool) -> int:
         """Do one unit of work, or as much as a frame has time for, see ``Pacer.advance``; how much was issued."""
         self.settled = False
-        made = self._pace.advance(self.solver, fast=fast, interactive=interactive, to_end=self._energy.due)
+        to_end = self._energy.due and self._energy.may_measure(interactive=interactive)
+        made = self._pace.advance(self.solver, fast=fast, interactive=interactive, to_end=to_end)
         self.seconds += self._pace.lap()
         return made
 

@@ -131,6 +131,21 @@ def test_history_has_all_that_was_heard_of_whoever_asked(session: Session) -> No
     assert len(work) > 4 and work[-1] == session.run.progress.done
 
 
+def test_a_piece_of_work_ends_its_frame_only_where_the_balance_is_then_measured(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After an edit it is due, but waits for the next one, which may follow at once."""
+    ended: list[bool] = []
+    monkeypatch.setattr(session.run._pace, "advance", lambda solver, **how: ended.append(how["to_end"]) or 0)
+    monkeypatch.setattr("app.session.energy.EDIT_SECONDS", 60.0)
+    session.run.flicker(session.materials)
+    session.advance()
+    monkeypatch.setattr("app.session.energy.EDIT_SECONDS", 0.0)
+    session.run.flicker(session.materials)
+    session.advance()
+    assert ended == [False, True]
+
+
 # -- what begins again -------------------------------------------------------------------------------------------------
 
 
