@@ -58,7 +58,7 @@ class LampLight(Kind[LampSet]):
 
     def reads(self, of: LampSet) -> dict[str, Texture]:
         """The triangles of a set of lamps, and their chances: those of near ones once a slot is looked at."""
-        more = {"t_unoccluded": self.gpu.texture(self.lightmap.size, 1, "f4")} if of.closed_form else {}
+        more = {"t_unoccluded": self._cleared(self.lightmap.size, 1)} if of.closed_form else {}
         return {
             "t_lamps": folded(self.gpu, of.rows.reshape(-1, 4)),
             "t_near": self._no_near(),
@@ -68,7 +68,14 @@ class LampLight(Kind[LampSet]):
     def _no_near(self) -> Texture:
         """Room for the near lamps of all cells."""
         pool = self.lightmap.pool
-        return self.gpu.texture((A_ROW, -(-pool.tiles * (pool.tile // CELL) ** 2 * NEAR // A_ROW)), 2, "f4")
+        return self._cleared((A_ROW, -(-pool.tiles * (pool.tile // CELL) ** 2 * NEAR // A_ROW)), 2)
+
+    def _cleared(self, size: tuple[int, int], components: int) -> Texture:
+        texture = self.gpu.texture(size, components, "f4")
+        target = self.gpu.target(texture)
+        target.clear()
+        self.gpu.release_all(target)
+        return texture
 
     def kept(self, lit: Lit[LampSet]) -> dict[str, Texture]:
         return lit.found | {"unoccluded": lit.reads["t_unoccluded"]} if lit.of.closed_form else lit.found

@@ -107,10 +107,9 @@ class DirectLight:
         on average, see allocate.py."""
         texels, each = self._lightmap.pool.slot_texels, max(count // PASS, 1)
         for lit in self.sets:
-            if not lit.passes.any():
-                yield from lit.kind.look(lit, np.flatnonzero(texels))
             known = np.zeros(len(texels)) if gain is None else gain
             more = allocate(lit.passes, known, texels, each)
+            yield from self._look(lit, np.flatnonzero(more))
             for nth in range(int(more.max(initial=0))):
                 self._shoot_at(lit, np.flatnonzero(more > nth), "add")
                 yield
@@ -118,9 +117,7 @@ class DirectLight:
     def shoot_from(self, slots: NDArray[np.int64]) -> Generator[None, None, None]:
         """One pass of shadow rays more from the texels of these slots to each set, in parts."""
         for lit in self.sets:
-            fresh = slots[lit.passes[slots] == 0]
-            if len(fresh):
-                yield from lit.kind.look(lit, fresh)
+            yield from self._look(lit, slots)
             self._shoot_at(lit, slots, "add")
             yield
 
@@ -131,6 +128,12 @@ class DirectLight:
         return (
             np.asarray(np.min(counts, axis=0)) if counts else np.full(self._lightmap.pool.tiles, np.iinfo(np.int64).max)
         )
+
+    def _look(self, lit: AnyLit, slots: NDArray[np.int64]) -> Generator[None, None, None]:
+        """Find out what shadow rays from these slots read, where they have had none, in parts."""
+        fresh = slots[lit.passes[slots] == 0]
+        if len(fresh):
+            yield from lit.kind.look(lit, fresh)
 
     def _shoot_at(self, lit: AnyLit, slots: NDArray[np.int64], blend: str | None) -> None:
         """One pass of shadow rays from the texels of these slots to a set."""
@@ -167,10 +170,11 @@ class DirectLight:
         """The shadow rays to sets that came later, until they have had so many on average, in parts."""
         texels = self._lightmap.pool.slot_texels
         for lit in self.sets:
-            if not lit.passes.any():
-                yield from lit.kind.look(lit, np.flatnonzero(texels))
             missing = wanted - PASS * float(lit.passes @ texels) / max(int(texels.sum()), 1)
-            for _ in range(max(int(missing // PASS), 0 if lit.passes.any() else 1)):
+            more = max(int(missing // PASS), 0 if lit.passes.any() else 1)
+            if more:
+                yield from self._look(lit, np.flatnonzero(texels))
+            for _ in range(more):
                 self._shoot_at(lit, np.flatnonzero(texels), "add")
                 yield
 

@@ -269,6 +269,31 @@ def test_another_albedo_ends_where_a_fresh_solve_ends(gpu: Gpu, whole: Solution)
     fresh.release()
 
 
+def test_an_edit_before_all_tiles_are_lit_loses_no_light(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tiles from which shadow rays come late are looked at, too. How many rays each had plays a small part."""
+    monkeypatch.setattr("app.solvers.local.tiles.AT_ONCE", 2)
+    monkeypatch.setattr("app.solvers.local.tiles.NEAR", 2)
+    edited, fresh = (
+        begin(gpu, table_room(), density=4, solver="local", patches=16, rays=16, shadow_rays=16) for _ in range(2)
+    )
+    settle(fresh)
+    while not matrix_of(edited).issued:
+        run_to_end(edited.solver.work(1))
+    (lit,) = matrix_of(edited).direct.sets
+    assert 0 < np.count_nonzero(lit.passes) < np.count_nonzero(edited.lightmap.pool.slot_texels)
+    for factor in (2, 1):
+        painted(edited, LAMP, emission=emission_of(LAMP, factor))
+        run_to_end(edited.solver.work(1))
+    settle(edited)
+    found, wanted = (
+        np.sum(one.lightmap.light_of(matrix_of(one).direct.light)[..., 0] * one.lightmap.pool.surfaces.area)
+        for one in (edited, fresh)
+    )
+    assert found == pytest.approx(wanted, rel=0.02)
+    edited.release()
+    fresh.release()
+
+
 # -- bad input ---------------------------------------------------------------------------------------------------------
 
 
