@@ -122,7 +122,8 @@ def _divided_once(
     left[chosen] = False
     side = (edge - edge[chosen][of]) % 3
     first = (side == 2) | (side == 0) & (share < at[of])
-    along = np.where(first, share / at[of], (share - at[of]) / (1 - at[of]))
-    along = np.where(side == 0, along, share)
+    on_it = side == 0  # the edge that is divided
+    along = share.copy()
+    along[on_it] = np.where(first, share / at[of], (share - at[of]) / (1 - at[of]))[on_it]
     remain = np.where(first, triangle, count + of)[left], side[left], node[left], along[left]
     return row, corners, weights, remain
