@@ -262,7 +262,7 @@ def begin(
     if solver == "gathering":
         gathering = GatheringOptions(noise=NOISE).replace(**gathers)
         return Solution(lightmap, Gathering(gpu, lightmap, gathering))  # type: ignore[arg-type]
-    return Solution(lightmap, Shooting(gpu, lightmap, shooting, hasty=not audits))
+    return Solution(lightmap, Shooting(gpu, lightmap, shooting, audits=audits))
 
 
 def _local(gpu: Gpu, pool: TilePool, options: Mapping[str, object]) -> tuple[Lightmap, Local]:

@@ -205,7 +205,8 @@ def _in_texels(
     that are not there for long, nothing of which is kept on disk."""
     local = SolverSpace.of(scene).local_from_world(scene.positions)
     exposure = None
-    with ThreadPoolExecutor(2) as beside:
+    beside = ThreadPoolExecutor(2)
+    try:
         mesh = beside.submit(visible_mesh if coarse else kept_mesh, scene, charts, local)
         seams = beside.submit(lambda: charts.seam_texels)
         pool = quadtree_pool(scene, charts, report) if options.adaptive else TilePool(scene, charts, report=report)
@@ -218,6 +219,8 @@ def _in_texels(
             camera = scene.cameras[0]
             exposure = first_exposure(pool, seen_texels(pool, camera.world_from_camera, camera.yfov))
         return pool, arrays.result(), exposure
+    finally:
+        beside.shutdown(wait=False, cancel_futures=True)  # who cancels does not wait for them
 
 
 class Loading(BackgroundTask[Loaded]):

@@ -143,6 +143,7 @@ class Session(EditableScene):
             self._then_reference = None
             stays = "it stays in coarse texels" if loading is self._coarse else f"{self.name} stays as it is"
             self.message = f"{loading.name}: stopped" + (f"; {stays}" if self._opened else "")
+            self._stays_coarse(loading)
             return
         try:
             ready = self._opening.part(self._choice.options)
@@ -150,6 +151,14 @@ class Session(EditableScene):
                 self._take_over(ready, loading)
         except UserError as error:
             self.message = str(error)
+            self._stays_coarse(loading)
+
+    def _stays_coarse(self, loading: Loading) -> None:
+        """No better texels come from there. A solver that took less care, since they would, gives way to one that takes all."""
+        if loading is self._coarse and self.loading is None:
+            self._coarse = None
+            if self.family.for_coarse is not None:
+                self._switch(self.solver_name)
 
     def _take_over(self, ready: Ready, loading: Loading | None = None) -> None:
         """Put what was opened, or a version of what is open, in its place. loading: where it was loaded in the background.

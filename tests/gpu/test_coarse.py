@@ -177,7 +177,10 @@ def test_stopped_it_stays_in_coarse_texels_and_goes_on(view: View) -> None:
     session.loading.cancel()
     session.poll()
     assert session.loading is None and not session.coarse and "coarse texels" in str(session.message)
+    assert session.solver.batch.auditor.wanted  # type: ignore[attr-defined]  # as much care as for any light that stays
     frames(session, lambda: session.run.converged)
+    session.lightmap.refresh_ambient(wait=True)
+    assert session.lightmap.texture("t_ambient").size == session.lightmap.size
 
 
 def test_coarse_texels_that_do_not_fit_leave_it_to_better_ones(

@@ -85,7 +85,7 @@ def bench_shots(flags: argparse.Namespace) -> int:
 def _measure(gpu: Gpu, name: str, texels: int, options: ShootingOptions, light: LightmapOptions) -> dict[str, Any]:
     pool = load(name, AtlasOptions(texels=texels)).pool
     lightmap = Lightmap(gpu, pool, light)
-    shooting = Shooting(gpu, lightmap, options, hasty=True)  # as later in a solve, when no shot is strong
+    shooting = Shooting(gpu, lightmap, options, audits=False)  # as later in a solve, when no shot is strong
     ms_per_shot(gpu, shooting, 1, WARM_UP)
     single_ms = ms_per_shot(gpu, shooting, 1, SECONDS)
     ms_per_shot(gpu, shooting, BATCH, WARM_UP)

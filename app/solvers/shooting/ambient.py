@@ -241,7 +241,8 @@ class Ambient:
         self.overshoot_target.clear()
 
     def release(self) -> None:
-        self._lightmap.ambient_of = None
+        if self._lightmap.ambient_of == self.refresh:  # not yet of another solver
+            self._lightmap.ambient_of = None
         if self._tree is not None:
             self._tree.cancel()
         if self._points is not None:

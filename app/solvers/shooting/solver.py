@@ -46,11 +46,13 @@ class Shooting:
     issued: shots given to the GPU. last_shot: the last that was reported. batch: the parts that make shots.
     """
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, hasty: bool = False) -> None:
-        """hasty: for light that is soon replaced, neither try strong shots before they are made, nor gather the ambient
-        term, which is even then."""
+    def __init__(
+        self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool = True, gathers: bool = True
+    ) -> None:
+        """audits: whether strong shots are tried before they are made; gathers: whether the ambient term is gathered, else it is
+        an even one."""
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
-        self.batch = Batch(gpu, lightmap, options, hasty=hasty)
+        self.batch = Batch(gpu, lightmap, options, audits=audits, gathers=gathers)
         self._reports, self._edits, self._picture = Reports(gpu), MaterialEdits(gpu, lightmap), ItemImage(gpu)
         self._under_way = UnderWay()
         self._leaves: Leaves | None = None
