@@ -1,6 +1,7 @@
 """The light of a reference at any point of an open scene's surfaces: a flat lightmap, and where each side lies in it.
 
 A bake belongs to a scene if its triangles are those of the scene; how both are unfolded and how finely they are cut may differ.
+It may also hold insides of closed bodies that have no texels in the scene.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from app.atlas.enclosed import sides_with_texels
 from app.atlas.points import Points, SideIndex, barycentric, bilinear
-from app.atlas.sides import scene_size
+from app.atlas.sides import lit_sides, scene_size
 from app.bake.read import Bake
 from app.errors import UserError
 from app.lightmap.tile_pool import TilePool
@@ -125,12 +126,13 @@ def _partners(bake: Bake, scene: Scene) -> tuple[I32, NDArray[np.bool_], _Partne
             same = np.abs(corners - mine[left]).max(axis=(1, 2)) <= slack
             found[left[same]], turn[left[same]] = near[left[same], k], turns
     nearby = found < 0
-    area, their_area = (x.normals_areas[1][sides_with_texels(x).triangle] for x in (scene, bake.scene))
+    area = scene.normals_areas[1][triangle]
     lost, total = area[nearby].sum(), area.sum()
+    most, given = (x.normals_areas[1][lit_sides(x).triangle].sum() for x in (scene, bake.scene))
     other = f"{bake.folder}: is of another scene"
     if lost > LOST_AREA * total:
         raise UserError(f"{other}: {lost / total:.1%} of the surfaces of {scene.name} are not in it")
-    if their_area.sum() - total > LOST_AREA * total:
+    if given - most > LOST_AREA * total:
         raise UserError(f"{other}: it has surfaces that {scene.name} has not")
     return triangle, back, _Partners(np.where(nearby, near[:, 0], found), turn, nearby)
 

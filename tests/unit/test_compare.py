@@ -42,6 +42,13 @@ def sheet_in_a_room(centre: tuple[float, float, float] = (0, 0, 0)) -> Scene:
     return quads_scene(np.concatenate([room(), SHEET[None]]) + centre, MATERIALS, [0] * 6 + [1])
 
 
+def camera_at(place: float) -> Camera:
+    """On the room's diagonal, whose ends are at 0 and 1."""
+    world_from_camera = np.eye(4)
+    world_from_camera[:3, 3] = place
+    return Camera("eye", world_from_camera, 1.0)
+
+
 def charts_of(scene: Scene) -> Charts:
     return parametrize(scene, texels=900)
 
@@ -97,10 +104,8 @@ def test_a_finer_solve_is_kept_for_the_sides_that_have_texels(tmp_path: Path, mo
 
     monkeypatch.setattr(comparison_solve, "_run_worker", solve)
     with cache.elsewhere(tmp_path):
-        for place, solves in (((5, 5, 5), 1), ((6, 5, 5), 1), ((0.5, 0.5, 0.5), 2)):
-            world_from_camera = np.eye(4)
-            world_from_camera[:3, 3] = place
-            scene = dataclasses.replace(sheet_in_a_room(), cameras=(Camera("eye", world_from_camera, 1.0),))
+        for place, solves in ((5.0, 1), (6.0, 1), (0.5, 2)):
+            scene = dataclasses.replace(sheet_in_a_room(), cameras=(camera_at(place),))
             solved_light(scene, AtlasOptions(), 0.01, lambda stage, share: None)
             assert len(calls) == solves
 
@@ -128,6 +133,19 @@ def test_a_bake_of_another_scene_is_refused(tmp_path: Path) -> None:
     written(tmp_path, quads_scene(room(), MATERIALS, [0] * 6))
     with pytest.raises(UserError, match="are not in it"):
         light_of_bake(read_bake(tmp_path), scene)
+
+
+def test_a_bake_may_have_insides_that_the_scene_leaves_out(tmp_path: Path) -> None:
+    """That of a box of two-sided material: while a camera was in it, its inside had texels. Not other surfaces beside them."""
+    quads = np.concatenate([room(), 0.3 + 0.4 * room()])
+    scene = quads_scene(quads, MATERIALS, [0] * 6 + [1] * 6)
+    watched = dataclasses.replace(scene, cameras=(camera_at(0.5),))
+    image = written(tmp_path, watched)
+    assert len(charts_of(watched).face_back) == len(charts_of(scene).face_back) + 12
+    light = light_of_bake(read_bake(tmp_path), scene)
+    assert light.image.shape == image.shape and len(light.triangle) == 24
+    with pytest.raises(UserError, match="it has surfaces that quads has not"):
+        light_of_bake(read_bake(tmp_path), quads_scene(room(), MATERIALS, [0] * 6))
 
 
 def test_what_cannot_be_read_is_said(tmp_path: Path) -> None:
