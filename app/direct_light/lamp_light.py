@@ -20,7 +20,6 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import QUAD_FORMAT, quads
 from app.lightmap.tile_pool import Moves
 from app.scene.model import Scene
-from app.util.parts import run_to_end
 from app.visibility.origins import Origins
 
 SLOTS_AT_ONCE = 256  # of which near lamps are looked up
@@ -134,7 +133,7 @@ class LampLight(Kind[LampSet]):
         super().resized(lit, moves)
         self.gpu.release_all(lit.reads["t_near"])
         lit.reads["t_near"] = self._no_near()
-        run_to_end(self.look_again(lit, np.flatnonzero(lit.passes)))
+        lit.looked[:] = False
         if lit.of.closed_form:
             lit.reads["t_unoccluded"] = self.lightmap.moved(lit.reads["t_unoccluded"], moves)
 

@@ -38,7 +38,8 @@ class Draw(NamedTuple):
 @dataclass(eq=False)
 class Lit(Generic[SetT]):
     """of: the set. kind: what it is one of. found: what shadow rays have found, by name, as ``target`` has it. stream: of random
-    numbers. passes: of each slot, of PASS shadow rays from each texel. reads: what its shadow rays read, its own."""
+    numbers. passes: of each slot, of PASS shadow rays from each texel. reads: what its shadow rays read, its own. looked: at each
+    slot, for what they read of it."""
 
     of: SetT
     kind: Kind[SetT]
@@ -47,6 +48,7 @@ class Lit(Generic[SetT]):
     stream: int
     passes: NDArray[np.int64]
     passes_table: Texture
+    looked: NDArray[np.bool_]
     reads: dict[str, Texture] = field(default_factory=dict)
 
 
@@ -68,7 +70,7 @@ class Kind(ABC, Generic[SetT]):
         target = self.gpu.target(*found.values())
         target.clear()
         passes = np.zeros(self.lightmap.pool.tiles, np.int64)
-        return Lit(of, self, found, target, stream, passes, self._passes_table(), self.reads(of))
+        return Lit(of, self, found, target, stream, passes, self._passes_table(), passes > 0, self.reads(of))
 
     def _passes_table(self) -> Texture:
         return self.gpu.texture((self.lightmap.columns, self.lightmap.rows), 1, "f4")
@@ -84,6 +86,7 @@ class Kind(ABC, Generic[SetT]):
         lit.found = {name: self.lightmap.moved(texture, moves) for name, texture in lit.found.items()}
         lit.target = self.gpu.target(*lit.found.values())
         lit.passes, lit.passes_table = moves.array(lit.passes, 0), self._passes_table()
+        lit.looked = moves.array(lit.looked, False)
         self.write_passes(lit)
 
     def kept(self, lit: Lit[SetT]) -> dict[str, Texture]:

@@ -23,7 +23,6 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import QUAD_FORMAT, quads
 from app.lightmap.tile_pool import Moves
 from app.scene.model import F32, F64, Scene
-from app.util.parts import run_to_end
 from app.util.state import State, StateError
 from app.visibility.origins import Origins
 from app.visibility.rays import RayScene
@@ -130,10 +129,14 @@ class DirectLight:
         )
 
     def _look(self, lit: AnyLit, slots: NDArray[np.int64]) -> Generator[None, None, None]:
-        """Find out what shadow rays from these slots read, where they have had none, in parts."""
-        fresh = slots[lit.passes[slots] == 0]
-        if len(fresh):
-            yield from lit.kind.look(lit, fresh)
+        """Find out what shadow rays from these slots read, where that is not known, in parts."""
+        new = slots[~lit.looked[slots]]
+        fresh = lit.passes[new] == 0
+        if fresh.any():
+            yield from lit.kind.look(lit, new[fresh])
+        if not fresh.all():
+            yield from lit.kind.look_again(lit, new[~fresh])
+        lit.looked[new] = True
 
     def _shoot_at(self, lit: AnyLit, slots: NDArray[np.int64], blend: str | None) -> None:
         """One pass of shadow rays from the texels of these slots to a set."""
@@ -158,6 +161,7 @@ class DirectLight:
         others = np.setdiff1d(np.flatnonzero(self._lightmap.pool.used), slots)
         for lit in self.sets:
             yield from lit.kind.look(lit, slots)
+            lit.looked[slots] = True
             known = lit.passes[others] if len(others) else lit.passes[slots]
             wanted = max(int(np.rint(known.mean())), 1)
             lit.passes[slots] = 0
@@ -283,7 +287,6 @@ class DirectLight:
             part = state.part(str(nth))
             lit.passes = part.array("passes", np.int64, self._lightmap.pool.tiles).copy()
             kind.write_passes(lit)
-            run_to_end(kind.look_again(lit, np.flatnonzero(lit.passes)))
             take_over(part, **kind.kept(lit))
         self._streams, self.traced = int(state.values["streams"]), int(state.values["traced"])
 

@@ -7,14 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from solver_scenes import EVERY_LIGHTMAP, Solution, begin, grey, quads_scene, room, table_room
 
 from app.atlas.options import AtlasOptions
-from app.direct_light.lamps import ALONE
-from app.direct_light.lit import folded
+from app.direct_light.lamps import ALONE, NearLamps
+from app.direct_light.lit import PASS, folded
 from app.gpu import Gpu
 from app.lightmap.options import STORAGE
-from app.scene.model import F64, Material, Scene, Texture
+from app.lightmap.tile_pool import Moves
+from app.scene.model import F32, F64, Material, Scene, Texture
 from app.scene.shapes import box, merged
 from app.session.run import Stop
 from app.session.session import Session
@@ -279,6 +281,29 @@ def test_many_lamps_cost_no_more_rays_and_lose_no_light(gpu: Gpu, count: int, ma
     lit.rays.settle()
     assert (lit.H * lit.area[:, None]).sum() == pytest.approx(flux, rel=noise + 2 * SOLVED)
     assert (lit.H != H).any()
+    lit.release()
+
+
+def test_near_lamps_are_looked_up_before_the_next_shadow_rays(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """When the tile pool gets another number of slots, that of all at once would make a frame stand still."""
+    looked: list[int] = []
+    known = NearLamps.of
+
+    def spied(lamps: NearLamps, slots: NDArray[np.int64]) -> F32:
+        looked.extend(slots.tolist())
+        return known(lamps, slots)
+
+    monkeypatch.setattr(NearLamps, "of", spied)
+    lit = gathered(gpu, lamps_at_the_ceiling(64, 1), 4, density=1)
+    direct, slots, none = lit.rays.direct, lit.lightmap.pool.tiles, np.zeros(0, np.int64)
+    (of,) = direct.sets
+    near, whole = of.reads["t_near"].read(), sorted(looked)
+    assert looked
+    looked.clear()
+    direct.resized(Moves(slots, slots, none, none))
+    assert not looked
+    run_to_end(direct.shoot(PASS))
+    assert sorted(looked) == whole and of.reads["t_near"].read() == near
     lit.release()
 
 
