@@ -26,7 +26,7 @@ LONGEST = ("desktop", "screenshots", "web")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--gl41", action="store_true", help="run in an OpenGL 4.1 context, as macOS has it")
-    parser.addoption("--kills", type=int, default=2, help="random moments at which each bake is killed and resumed")
+    parser.addoption("--kills", type=int, default=1, help="random moments at which each bake is killed and resumed")
     parser.addoption("--regenerate-screenshots", action="store_true", help="write the goldens instead of comparing")
 
 

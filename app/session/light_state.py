@@ -38,7 +38,7 @@ def restore_light(session: Session, state: State) -> None:
         why = _difference(state.values[OF], _light_of(session))
     if why is not None:
         raise UserError(why)
-    session.solver.reset()
+    session.restart()
     try:
         with fitting():
             session.lightmap.restore(state.part("lightmap"))

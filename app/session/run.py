@@ -124,13 +124,17 @@ class Run:
         return State({"seconds": self.seconds}, {"history": self.history.rows})
 
     def restore(self, state: State) -> None:
-        """Count on from a ``state``, with the light that was restored. Raises StateError."""
+        """Count on from a ``state``, with the light that was restored. Waits for no report of it: they arrive when they would
+        have. Raises StateError."""
         rows = state.array("history", np.float64, -1, len(COLUMNS))
         if len(rows) > CAPACITY:
             raise StateError(f"a history of {len(rows)} rows")
         self.history.rows = rows
         self.seconds = self.earlier = float(state.values["seconds"])
+        self.progress = self.solver.poll()
+        self._noted = self.progress.done
         self.effort.options_changed()
+        self._energy.edited()
         self.settled = False
 
     # -- edits ---------------------------------------------------------------------------------------------------------

@@ -130,8 +130,8 @@ class SolvedScene:
 
     def light_restored(self, state: State) -> None:
         """Lightmap and solver hold light that was kept, see light_state.py; and the run was there. Raises StateError."""
-        self._begin()
         self.run.restore(state)
+        self._light_begins()
 
     def _begin(self) -> None:
         """Begin a run with a solver that has done no work."""

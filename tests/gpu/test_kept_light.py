@@ -77,19 +77,22 @@ def kept(session: Session) -> State:
 def stopped_and_resumed(
     gpu: Gpu, scene: Scene, solver: str, stops: list[int], pieces: int, known: str | None = None, **how: Any
 ) -> F32:
-    """H after so many pieces of work, with another session from each of the stops on. known: an array of the state that each of
-    them has to know again, and that is not empty at all of the stops."""
+    """H after so many pieces of work, with another session from each of the stops on, which has to know again all that decides
+    what follows. known: an array of that which is not empty at all of the stops."""
     session, done, most = opened(gpu, scene, solver, **how), 0, 0
     for stop in stops:
         work(session, stop - done)
+        session.run.poll(energy=False)
         state, done = kept(session), stop
         session.release()
         session = opened(gpu, scene, solver, **how)
         session.lightmap.refresh_ambient(wait=True)  # as in a window that has drawn: kept light knows none
         restore_light(session, state)
-        if known is not None:  # the light may be the same without it: it is looked at itself
-            held, most = state.arrays[known], max(most, len(state.arrays[known]))
-            np.testing.assert_array_equal(kept(session).arrays[known], held)
+        again = kept(session)  # the light may be the same without some of it: it is looked at itself
+        assert again.part("solver").values == state.part("solver").values
+        for name, array in state.part("solver").arrays.items():
+            np.testing.assert_array_equal(again.arrays[f"solver/{name}"], array, err_msg=name)
+        most = max(most, 0 if known is None else len(state.arrays[known]))
     assert known is None or not stops or most > 0, "nothing was to be known at any stop"
     work(session, pieces - done)
     light = session.lightmap.irradiance()
