@@ -123,7 +123,7 @@ def _divided_once(
     side = (edge - edge[chosen][of]) % 3
     first = (side == 2) | (side == 0) & (share < at[of])
     on_it = side == 0  # the edge that is divided
-    along = share.copy()
-    along[on_it] = np.where(first, share / at[of], (share - at[of]) / (1 - at[of]))[on_it]
+    begins, length = np.where(first, 0.0, at[of]), np.where(first, at[of], 1 - at[of])
+    along = np.where(on_it, (share - begins) / np.where(on_it, length, 1.0), share)
     remain = np.where(first, triangle, count + of)[left], side[left], node[left], along[left]
     return row, corners, weights, remain
