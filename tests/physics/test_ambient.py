@@ -14,6 +14,7 @@ from app.errors import UserError
 from app.gpu import Gpu
 from app.scene.model import F64, Scene
 from app.solvers.shooting import ambient
+from app.solvers.shooting.gather_points import GatherPoints
 
 LIT, LAMP = slice(0, 6), 6  # objects: walls of the room with the lamp, floor and ceiling first
 CEILING, DARK = 1, slice(7, 13)
@@ -85,6 +86,34 @@ def test_light_that_has_arrived_is_no_more_to_come(gpu: Gpu) -> None:
     arrived = rooms.lightmap.irradiance().sum(-1)
     np.testing.assert_allclose(now, np.maximum(foreseen, arrived), rtol=1e-4, atol=1e-6 * foreseen.max())
     assert (arrived > before).mean() > 0.1, "more has arrived"
+    rooms.release()
+
+
+def test_points_that_have_not_looked_yet_tell_nothing(gpu: Gpu) -> None:
+    """Beside points that looked stand others that did not: texels between them are not darker for it, nor as bright as what
+    points of other leaves saw. But for a few, whose own points have not looked yet."""
+    rooms = begin(gpu, two_closed_rooms(), texels=2000)
+    rooms.step(8)
+    lightmap, nothing_to_come = rooms.lightmap, gpu.texture((2, 1), 4, "f4", bytes(32))
+    lightmap.hold_ambient()
+    points = GatherPoints(gpu, lightmap)
+
+    def foreseen(rows: int, each: int) -> F64:
+        for row in range(0, rows, each):
+            points.look(nothing_to_come, row, each)
+        return lightmap.light_of(lightmap.texture("t_ambient")).sum(-1, dtype=np.float64)
+
+    points.see_light(0, points.rows)
+    in_bands, whole = foreseen(points.rows, 1), foreseen(points.rows, points.rows)
+    bright = whole > 0.1 * whole.max()
+    assert bright.mean() > 0.2 and np.quantile(in_bands[bright] / whole[bright], 0.05) > 0.9
+    lightmap.clear()
+    points.leaves_changed()
+    lightmap.ambient_target.clear()
+    points.see_light(0, points.rows)
+    assert foreseen(1, 1).max() == 0.0
+    points.release()
+    gpu.release_all(nothing_to_come)
     rooms.release()
 
 

@@ -57,7 +57,6 @@ class GatherPoints:
         self._gathered, self._smoothed = gpu.texture(points, 4, "f4"), gpu.texture(points, 4, "f4")
         self._textures = self._hits, self._around, self._to_pass_on, self._gathered, self._smoothed
         self._targets = {texture: gpu.target(texture) for texture in self._textures}
-        self._targets[self._gathered].clear()
         self.leaves_changed()
 
     @property
@@ -69,6 +68,8 @@ class GatherPoints:
     def leaves_changed(self) -> None:
         """Points are elsewhere, and what rays hit is."""
         self._traced = np.zeros(self.rows, bool)
+        for known in (self._gathered, self._smoothed):
+            self._targets[known].clear()
 
     def knows(self, row: int) -> bool:
         """Whether it is known what the rays of points in a row hit."""

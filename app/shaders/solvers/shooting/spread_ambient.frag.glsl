@@ -4,7 +4,7 @@
 #include "solvers/shooting/block.glsl"
 
 uniform usampler2D t_around;
-uniform sampler2D t_gathered;  // of gather points
+uniform sampler2D t_gathered;  // of gather points, see smooth_ambient.frag.glsl: a is 0 of those that have not looked yet
 uniform sampler2D t_irradiance;
 uniform sampler2D t_to_come;   // see to_come.frag.glsl
 
@@ -21,8 +21,8 @@ void main() {
     for (int i = 0; i < 4; ++i) {
         vec2 weight = mix(1.0 - share, share, vec2(i & 1, i >> 1));
         uint point = around[i];
-        vec3 one = texelFetch(t_gathered, ivec2(point & 0xFFFFu, point >> 16) * int(point != NO_POINT), 0).rgb;
-        sum += weight.x * weight.y * float(point != NO_POINT) * vec4(one, 1.0);
+        vec4 one = texelFetch(t_gathered, ivec2(point & 0xFFFFu, point >> 16) * int(point != NO_POINT), 0);
+        sum += weight.x * weight.y * float(point != NO_POINT && one.a > 0.0) * vec4(one.rgb, 1.0);
     }
     // a piece of a chart beside the gather point of another one: that sees other things
     vec3 gathered = sum.a > 0.0 ? sum.rgb / sum.a : clamp(texelFetch(t_gathered, px / BLOCK, 0).rgb, -abs(H), abs(H));
