@@ -118,6 +118,17 @@ def test_a_grey_control_does_nothing_and_tells(
     assert any(call[0] == "set_light" for call in desk.session.calls)
 
 
+def test_quadtrees_can_be_set_before_surfaces_are_cut_into_them(
+    desk: Desk, where: dict[str, tuple[float, float]]
+) -> None:
+    desk.frames()
+    desk.click(*where["adaptive"])
+    x, y = where["gradient"]
+    desk.drag((x, y), (x + 40, y))
+    assert desk.session.light.gradient > 0.5
+    assert not desk.session.light.adaptive  # which would cut at once
+
+
 @pytest.mark.parametrize(
     ("display", "grey"),
     [

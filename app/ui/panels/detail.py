@@ -25,16 +25,9 @@ def draw(view: View, state: State) -> None:
     """The whole section."""
     widgets.section("Detail")
     _cut(view, state)
-    session = view.session
-    light = session.light
-    if light.adaptive:
+    if view.session.light.adaptive:
         _leaves(view, state)
-    light = widgets.edit_options(light, only=FIRST)
-    if imgui.tree_node("More###more detail"):
-        light = widgets.edit_options(light, only=MORE)
-        imgui.tree_pop()
-    if light is not session.light:
-        state.act(lambda: session.set_light(light))
+    _quadtree(view, state)
 
 
 def _cut(view: View, state: State) -> None:
@@ -58,6 +51,19 @@ def _cut(view: View, state: State) -> None:
     widgets.tooltip(
         f"Cut all surfaces into texels as it says above, in the background; then light begins again{reason}"
     )
+
+
+def _quadtree(view: View, state: State) -> None:
+    """Where quadtrees refine texels; this can be set before surfaces are cut into quadtrees, too, once Adaptive is ticked."""
+    session = view.session
+    adaptive = session.light.adaptive
+    light = edited = session.light.replace(adaptive=adaptive or bool(state.adaptive))
+    edited = widgets.edit_options(edited, only=FIRST)
+    if imgui.tree_node("More###more detail"):
+        edited = widgets.edit_options(edited, only=MORE)
+        imgui.tree_pop()
+    if edited is not light:
+        state.act(lambda: session.set_light(edited.replace(adaptive=adaptive)))
 
 
 def _leaves(view: View, state: State) -> None:
