@@ -1,4 +1,7 @@
-"""The visible mesh of many triangles is kept on disk: reading takes a tenth of making it."""
+"""The visible mesh of many triangles is kept on disk: reading takes a tenth of making it.
+
+Its weights are in the file only for rows that are a part of a triangle; those of a whole one are the identity.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +16,9 @@ from app.scene.model import F64, Scene
 from app.util import cache
 
 FEWEST = 1 << 16  # triangles that a file is worth: they take a third of a second
-CACHE_FILES = 4  # kept, newest first: of a million triangles a file takes 50 MB
+CACHE_FILES = 4  # kept, newest first: of a million triangles with shared corners a file takes 40 MB
 CLUSTERS = "clusters_"  # before the names of what is theirs
+PARTS = "parts"  # the rows (k,) whose weights (k, 3, 3) are kept
 
 
 def kept_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
@@ -32,7 +36,10 @@ def kept_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
 
 
 def _content(mesh: VisibleMesh) -> cache.Arrays:
-    own = {name: value for name, value in vars(mesh).items() if name != "clusters" and value is not None}
+    own = {name: value for name, value in vars(mesh).items() if name not in ("weights", "clusters")}
+    if mesh.weights is not None:
+        own[PARTS] = np.flatnonzero((mesh.weights != np.eye(3)).any((1, 2)))
+        own["weights"] = mesh.weights[own[PARTS]]
     clusters = {} if mesh.clusters is None else {CLUSTERS + name: value for name, value in vars(mesh.clusters).items()}
     return {name: np.asarray(value) for name, value in (own | clusters).items()}
 
@@ -46,4 +53,13 @@ def _read(data: cache.Arrays | None) -> VisibleMesh | None:
     if clusters:
         clusters["fixed"] = int(clusters["fixed"])  # type: ignore[assignment]
     own = {name: data[name] for name in names}
-    return VisibleMesh(**own, weights=data.get("weights"), clusters=Clusters(**clusters) if clusters else None)  # type: ignore[arg-type]
+    return VisibleMesh(**own, weights=_weights(data), clusters=Clusters(**clusters) if clusters else None)  # type: ignore[arg-type]
+
+
+def _weights(data: cache.Arrays) -> F64 | None:
+    """Those of all rows (n, 3, 3) of the mesh that a file holds; None where no triangle was divided."""
+    if PARTS not in data:
+        return None
+    weights = np.tile(np.eye(3), (len(data["triangle"]), 1, 1))
+    weights[data[PARTS]] = data["weights"]
+    return weights

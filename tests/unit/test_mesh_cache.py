@@ -21,12 +21,18 @@ from app.util import cache
 def test_what_is_kept_is_the_same_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, clustered: bool) -> None:
     monkeypatch.setattr(mesh_cache, "FEWEST", 0)
     monkeypatch.setattr(visible_mesh, "CLUSTERED", 0 if clustered else 1 << 20)
-    shelf = shapes.quad((-1.0, -2.0, 0.3), (1.7, 0, 0), (0, 1, 0))  # its ends lie on edges of the room: T-junctions
-    scene = scene_of([box_room(), shapes.cylinder(0.41, 1.07, 14).moved(1, 0, 1), shelf])
+    shelf = shapes.quad((-1.0, 0.0, 0.3), (1.7, 0, 0), (0, 1, 0))
+    half = shapes.quad((-1.0, 1.0, 0.3), (0.85, 0, 0), (0, 0.3, 0))  # a corner lies on the shelf's edge: a T-junction
+    scene = scene_of([box_room(), shapes.cylinder(0.41, 1.07, 14).moved(1, 0, 1), shelf, half])
     charts = parametrize(scene, texels=2000)
     with cache.elsewhere(tmp_path):
         first = kept_mesh(scene, charts, scene.positions)
         assert (first.clusters is not None) == clustered
+        [kept] = (tmp_path / "mesh").glob("*.npz")
+        with np.load(kept) as data:
+            whole = np.bincount(first.triangle)[first.triangle] == 1  # those that are not divided have no weights
+            np.testing.assert_array_equal(data["parts"], np.flatnonzero(~whole))
+            assert whole.any() and len(data["weights"]) == np.count_nonzero(~whole) > 0
         monkeypatch.setattr(mesh_cache, "visible_mesh", lambda *_: first_again)
         first_again = dataclasses.replace(first, triangle=first.triangle[::-1])
         assert same(kept_mesh(scene, charts, scene.positions), first)
