@@ -127,10 +127,8 @@ class Ledger:
     def balance(self) -> EnergyBalance:
         """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
         absorbed, unshot, reflectance = self.tile_sums()
-        rows = np.frombuffer(self.texture.read(), np.float32).reshape(LEDGER.rows, BATCH, 4).swapaxes(0, 1)
-        entries = LEDGER.read(np.ascontiguousarray(rows))
-        names = "escaped", "blackened", "directions"
-        escaped, blackened, self.directions = (entries[name].astype(np.float64).sum(0) * self.watt for name in names)
+        entered = self._entered("escaped", "blackened", "directions")
+        escaped, blackened, self.directions = (power * self.watt for power in entered)
         return EnergyBalance(
             self.emitted,
             absorbed[:3] + blackened,
@@ -139,6 +137,16 @@ class Ledger:
             reflectance[:3] / max(absorbed[3], 1e-300),
             float(absorbed[3] / self._lightmap.unit),
         )
+
+    def escaped(self) -> F64:
+        """What has left the scene, RGB [stored units · solver area]. Waits for the GPU."""
+        return self._entered("escaped")[0]
+
+    def _entered(self, *names: str) -> list[F64]:
+        """Sums of powers in LEDGER, each RGB [stored units · solver area]. Waits for the GPU."""
+        rows = np.frombuffer(self.texture.read(), np.float32).reshape(LEDGER.rows, BATCH, 4).swapaxes(0, 1)
+        entries = LEDGER.read(np.ascontiguousarray(rows))
+        return [entries[name].astype(np.float64).sum(0) for name in names]
 
     def clear(self) -> None:
         """Nothing has been shot."""

@@ -125,7 +125,7 @@ class Shooting:
         batch.weigh()
         batch.phases.begin()
         batch.auditor.begin()
-        self._progress = replace(self._progress, remaining=self._unshot_share())
+        self._measure()
 
     # -- leaves of quadtrees -------------------------------------------------------------------------------------------
 
@@ -162,7 +162,7 @@ class Shooting:
         """Fresh leaves have got their light: less or more is unshot now, and what was judged is gone."""
         assert self.lightmap.refinement is not None
         self.poll(wait=True)  # or an older report would follow
-        self._progress = replace(self._progress, remaining=self._unshot_share())
+        self._measure()
         self.batch.phases.even = False
         self.lightmap.refinement.drop_judgement()
         self.lightmap.refinement.stable = False
@@ -213,11 +213,13 @@ class Shooting:
         if batch.replay is not None and choice is batch.phases.now:
             batch.replay.follow_power(ledger.share(float(powers_of(report.shooter))), unshot)
 
-    def _unshot_share(self) -> float:
-        """What is unshot now, as a share of the emitted power. Waits for the GPU."""
+    def _measure(self) -> None:
+        """See what is unshot now, and what has escaped by now. All reports must have arrived. Waits for the GPU."""
         self._under_way.finish()
-        unshot = self.batch.ledger.share(self.batch.unshot())
-        return self.batch.ledger.capped(unshot) if self.batch.outside.left else unshot
+        ledger = self.batch.ledger
+        unshot, self._reports.escaped = ledger.share(self.batch.unshot()), ledger.escaped()
+        remaining = ledger.capped(unshot) if self.batch.outside.left else unshot
+        self._progress = replace(self._progress, remaining=remaining, escaped=self._reports.escaped * ledger.watt)
 
     @property
     def _all_shot(self) -> bool:
@@ -238,8 +240,7 @@ class Shooting:
     def settle(self) -> Progress:
         """End the work under way, and measure what is unshot."""
         self.poll(wait=True)
-        escaped = self._reports.escaped * self.batch.ledger.watt
-        self._progress = replace(self._progress, remaining=self._unshot_share(), escaped=escaped)
+        self._measure()
         return self.poll()
 
     def energy(self) -> EnergyBalance:
@@ -301,7 +302,7 @@ class Shooting:
         batch.weigh(at_least=batch.groups.settled * float(factor.max()))
         if not np.allclose([m.emission for m in materials], [m.emission * factor for m in before]):
             batch.groups.divide(batch.phases)
-        self._progress = replace(self._progress, remaining=self._unshot_share())
+        self._measure()
         batch.ambient.update(batch.bins)
 
     # -- kept for later ------------------------------------------------------------------------------------------------
