@@ -78,7 +78,7 @@ class Reports:
             self._sent.popleft()[1].take()
 
     def state(self, choices: list[Choice]) -> State:
-        """Those on their way, each of one of the choices, or of none of them."""
+        """Those on their way, each of one of the choices, or of none of them; and what had left the scene after the last."""
         number = [-1 if choice is None or choice not in choices else choices.index(choice) for choice, *_ in self._sent]
         rows = [np.frombuffer(readback.look(), np.float32) for _, readback, _ in self._sent]
         return State(
@@ -86,12 +86,14 @@ class Reports:
             {
                 "choices": np.array(number, np.int64),
                 "texels": np.array(rows, np.float32).reshape(-1, 4 * self._texture.width),
+                "escaped": self.escaped.copy(),
             },
         )
 
     def restore(self, state: State, choices: list[Choice]) -> None:
         """Have those of a ``state`` on their way. Raises StateError."""
         self.drop()
+        self.escaped = state.array("escaped", np.float64, 3)
         rows = state.array("texels", np.float32, -1, 4 * self._texture.width)
         numbers, outside = state.array("choices", np.int64, len(rows)).tolist(), state.values["outside"]
         for number, row, values in zip(numbers, rows, outside, strict=True):

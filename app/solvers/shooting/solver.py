@@ -322,7 +322,6 @@ class Shooting:
         self._reports.restore(state.part("reports"), self.batch.phases.choices)
         self._progress, self.issued = Progress.of(state.values["progress"]), int(state.values["issued"])
         self._look_at, self._strongest = int(state.values["look_at"]), float(state.values["strongest"])
-        self._reports.escaped = self._progress.escaped / self.batch.ledger.watt
 
     # -- what there is to see ------------------------------------------------------------------------------------------
 
