@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from app.atlas.parametrize import parametrize
 from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
+from app.render.flat import MATERIAL, POSITION, TINT, FlatScene
 from app.render.frame import FrameRenderer
 from app.render.options import DisplayOptions
 from app.session import loading
@@ -85,6 +87,16 @@ def test_a_scene_in_which_nothing_emits_light_is_shown_flat(gpu: Gpu) -> None:
     renderer.release()
     gpu.release_all(target, texture)
     lightmap.release()
+
+
+def test_triangles_that_share_corners_keep_colours_of_their_own(rng: np.random.Generator) -> None:
+    scene = replace(quads_scene([room()[0]], [grey(0.1), grey(0.9)]), material_ids=np.array([0, 1], np.int32))
+    for colours in (None, rng.uniform(0, 1, (2, 3, 3)).astype(np.float32)):
+        flat = FlatScene.of(replace(scene, colours=colours))
+        corners = flat.vertices[flat.indices]
+        np.testing.assert_allclose(corners[..., POSITION], flat.space.local_from_world(scene.corners), atol=1e-6)
+        np.testing.assert_array_equal(corners[..., MATERIAL], [[0] * 3, [1] * 3])
+        np.testing.assert_array_equal(corners[..., TINT], np.ones((2, 3, 3)) if colours is None else colours)
 
 
 def test_nothing_is_seen_of_what_was_stopped(gpu: Gpu, view: View, monkeypatch: pytest.MonkeyPatch) -> None:
