@@ -57,7 +57,7 @@ class FlatScene:
 
     def same_triangles(self, scene: Scene) -> bool:
         """Whether another scene differs from this one at most in what its materials and lamps are."""
-        return all(
+        return len(scene.materials) == len(self.scene.materials) and all(
             getattr(scene, name) is getattr(self.scene, name)
             for name in ("positions", "triangles", "material_ids", "colours")
         )

@@ -56,7 +56,8 @@ class FrameRenderer:
         self._prepared: Surfaces | None = None
         self._picture: _Picture | None = None
         self._asked: Scene | None = None  # of the last picture of light
-        self._flat: FlatMesh | None = None  # of that scene, where nothing in it emits light
+        self._dark = False  # whether nothing in it emits any
+        self._flat: FlatMesh | None = None  # of its triangles, once it has been dark
         self._last: tuple[Lightmap, CameraView, tuple[int, int]] | None = None
 
     def prepare(self, lightmap: Lightmap, interpolation: str) -> None:
@@ -150,10 +151,15 @@ class FrameRenderer:
     def _unlit(self, scene: Scene) -> FlatMesh | None:
         """What is drawn of a scene in which nothing emits light, where all would be black; None of others."""
         if scene is not self._asked:
-            if self._flat is not None:
+            self._asked, self._dark = scene, not scene.emits
+            if self._flat is not None and not self._flat.scene.same_triangles(scene):
                 self._flat.release()
-            self._asked, self._flat = scene, None if scene.emits else FlatMesh(self._gpu, FlatScene.of(scene))
-        return self._flat
+                self._flat = None
+            if self._dark and self._flat is None:
+                self._flat = FlatMesh(self._gpu, FlatScene.of(scene))
+            elif self._dark and self._flat is not None:
+                self._flat.paint(scene.materials)
+        return self._flat if self._dark else None
 
     @contextlib.contextmanager
     def _depth_clamp(self) -> Iterator[None]:

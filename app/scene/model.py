@@ -150,9 +150,8 @@ class Scene:
     @property
     def emits(self) -> bool:
         """Whether any triangle has an emitting material, or light comes from the sky or a lamp without area."""
-        return (
-            self.lit_by_sky or self.lit_by_lights or any(self.materials[i].emits for i in np.unique(self.material_ids))
-        )
+        of_materials = np.array([material.emits for material in self.materials], bool)
+        return self.lit_by_sky or self.lit_by_lights or bool(of_materials[self.material_ids].any())
 
     @property
     def lit_by_sky(self) -> bool:

@@ -63,7 +63,7 @@ def test_a_scene_is_seen_before_it_is_unfolded_in_the_colours_of_its_materials(g
     gpu.release_all(target, texture)
 
 
-def test_a_scene_in_which_nothing_emits_light_is_shown_flat(gpu: Gpu) -> None:
+def test_a_scene_in_which_nothing_emits_light_is_shown_flat(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     """And as it is lit once something does, and in layers that are no light."""
     texture, renderer = gpu.texture(SIZE, 4, "f1"), FrameRenderer(gpu)
     target = gpu.target(texture)
@@ -83,7 +83,10 @@ def test_a_scene_in_which_nothing_emits_light_is_shown_flat(gpu: Gpu) -> None:
     lightmap.set_materials((grey(0.5, 1e-9),))
     assert picture()[..., 0].max() < 8, "lit, if dimly"
     lightmap.set_materials((grey(0.5),))
+    monkeypatch.setattr(FlatScene, "of", None)  # made once, whatever its materials are
     assert (picture() == unlit).all()
+    lightmap.set_materials((grey(0.2),))
+    assert picture()[64, 64, 0] == pytest.approx(124, abs=1)
     renderer.release()
     gpu.release_all(target, texture)
     lightmap.release()
