@@ -115,8 +115,7 @@ class FrameRenderer:
         ):
             return False
         sky = lightmap.scene.sky if layer == "combined" else None
-        plain = layer == "combined" and display.show == "solution" and not display.grid and scale is None
-        unlit = self._unlit(lightmap.scene) if plain and not self._linear else None
+        unlit = self._unlit(lightmap.scene) if display.plain and not self._linear else None
 
         def draw(picture: _Picture, aside_px: F64) -> None:
             aside = np.eye(4)

@@ -97,3 +97,8 @@ class DisplayOptions(Options):
         label="Top of the scale",
         tip="The end of the scale: what is above it has its last colour. Found from the light, unless it is given",
     )
+
+    @property
+    def plain(self) -> bool:
+        """Whether the picture is shown and nothing else: where nothing emits light, it is flat."""
+        return (self.layer, self.show, self.false_colour) == ("combined", "solution", "off") and not self.grid

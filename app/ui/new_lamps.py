@@ -65,6 +65,11 @@ def is_lit(view: View, state: State) -> bool:
     return shines or scene.lit_by_sky or scene.lit_by_lights
 
 
+def dark_in_words(view: View) -> str:
+    """Of a scene in which nothing shines, and how it is shown."""
+    return f"{DARK}, shown unlit" if view.shown.plain else DARK
+
+
 def why_not(view: View, kind: Kind) -> str | None:
     """Why a lamp of that kind cannot be added now."""
     session = view.session
@@ -226,4 +231,14 @@ KINDS = (
     ),
 )
 
-__all__ = ["DARK", "KINDS", "add_light", "buttons", "is_lit", "light_beside", "pair_of_buttons", "why_not"]
+__all__ = [
+    "DARK",
+    "KINDS",
+    "add_light",
+    "buttons",
+    "dark_in_words",
+    "is_lit",
+    "light_beside",
+    "pair_of_buttons",
+    "why_not",
+]

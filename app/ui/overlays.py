@@ -206,7 +206,7 @@ def _in_the_middle(text: str, state: State) -> None:
 
 
 def no_lamps(view: View, state: State) -> None:
-    """What to do where nothing shines: a button for each kind of lamp, at the foot of the view, which shows the scene unlit."""
+    """What to do where nothing shines: a button for each kind of lamp, at the foot of the view."""
     session = view.session
     if not (session.opened and state.show_ui) or session.on_its_way is not None or new_lamps.is_lit(view, state):
         return
@@ -216,7 +216,7 @@ def no_lamps(view: View, state: State) -> None:
     imgui.set_next_window_pos(foot, imgui.Cond_.always, imgui.ImVec2(0.5, 1.0))
     imgui.set_next_window_size(imgui.ImVec2(min(NO_LAMPS_EM * em, width), 0))
     imgui.begin("##no lamps", None, FLOATING & ~int(imgui.WindowFlags_.always_auto_resize))
-    widgets.wrapped(f"{new_lamps.DARK}, shown unlit: add a lamp")
+    widgets.wrapped(f"{new_lamps.dark_in_words(view)}: add a lamp")
     new_lamps.buttons(view, state)
     imgui.end()
 

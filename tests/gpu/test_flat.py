@@ -80,6 +80,7 @@ def test_a_scene_in_which_nothing_emits_light_is_shown_flat(gpu: Gpu, monkeypatc
     assert unlit[64, 64, 0] == pytest.approx(188, abs=1)  # sRGB of 0.5, seen straight on
     assert 80 < unlit[64, 2, 0] < 175, "a wall, seen askew"
     assert np.ptp(albedo[..., 0]) <= 1
+    assert picture(false_colour="luminance")[64, 64, 0] < 100, "the colour of none"
     lightmap.set_materials((grey(0.5, 1e-9),))
     assert picture()[..., 0].max() < 8, "lit, if dimly"
     lightmap.set_materials((grey(0.5),))

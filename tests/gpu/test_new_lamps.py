@@ -86,6 +86,14 @@ def test_each_lamp_lights_a_dark_room(gpu: Gpu, solver: str, kind: Kind) -> None
     dark.release()
 
 
+def test_only_a_flat_picture_is_said_to_be_shown_unlit(dark: Dark) -> None:
+    display = dark.view.display
+    assert "unlit" in new_lamps.dark_in_words(dark.view)
+    for change in ({"grid": True}, {"layer": "irradiance"}, {"false_colour": "luminance"}):
+        dark.view.display = display.replace(**change)
+        assert new_lamps.dark_in_words(dark.view) == new_lamps.DARK
+
+
 @pytest.mark.parametrize("kind", SURFACES, ids=lambda kind: kind.label)
 def test_surfaces_come_and_go_and_edits_stay(dark: Dark, kind: Kind) -> None:
     session = dark.session
