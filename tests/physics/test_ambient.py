@@ -34,22 +34,29 @@ def shown(solution: Solution) -> F64:
 
 
 def test_it_is_even_until_there_is_a_tree_to_gather_by(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After a batch the mean of what is shown is within a fifth of what there will be, of which a third is not yet shot."""
+    """After a batch the mean of what is shown is within a fifth of what there will be, of which a third is not yet shot. It is
+    what is overshot, but where no residual below zero is held, which that takes: 8 bits lose a part of the light later."""
     monkeypatch.setattr(ambient, "tree_is_near", lambda pool: False)
     lamp = [[0.3, 0.95, 0.3], [0.7, 0.95, 0.3], [0.7, 0.95, 0.7], [0.3, 0.95, 0.7]]
     scene = quads_scene([*room((1.0, 1.0, 1.0)), lamp], [grey(0.6), grey(0.0, 10.0)], [0] * 6 + [1])
-    box = begin(gpu, scene, texels=800, residual=1e-2)
 
-    def mean() -> F64:
+    def mean(box: Solution) -> F64:
         area = box.lightmap.pool.surfaces.area[..., None]
         return np.asarray((box.lightmap.irradiance() * area).sum((0, 1, 2)) / area.sum())
 
-    box.step(16)
-    early, term = mean(), box.lightmap.ambient()
-    assert term.shape == (3,) and box.lightmap.texture("t_ambient").size == (1, 1)
+    early = {}
+    for storage in ("fixed8", "rgba32f"):
+        box = begin(gpu, scene, texels=800, residual=1e-2, storage=storage)
+        box.step(16)
+        term = box.lightmap.ambient()
+        assert term.shape == (3,) and box.lightmap.texture("t_ambient").size == (1, 1)
+        overshot = box.solver.batch.ambient.overshoot.read()
+        assert overshot == (bytes(16) if storage == "fixed8" else box.lightmap.texture("t_ambient").read())
+        early[storage] = mean(box), mean(box) + term
     box.settle()
-    assert (early < 0.8 * mean()).all()
-    np.testing.assert_allclose(early + term, mean(), rtol=0.2)
+    for arrived, shown in early.values():
+        assert (arrived < 0.8 * mean(box)).all()
+        np.testing.assert_allclose(shown, mean(box), rtol=0.2)
 
 
 @EVERY_LIGHTMAP

@@ -3,7 +3,7 @@
 Of what surfaces have yet to shoot it is gathered by points that know what they see, see gather_points.py; of what lamps and
 sources outside have yet to give, it goes where such light came from the start. Where the storage can hold a residual below zero
 that of patches is overshot [Feda92]: a patch shoots, with its residual, what it will reflect of an even ambient term. That one is
-shown, too, until there is a tree of the triangles that the rays of points walk.
+shown, with any storage, until there is a tree of the triangles that the rays of points walk.
 """
 
 from __future__ import annotations
@@ -75,10 +75,13 @@ class Ambient:
         """Estimate what is overshot from what is unshot in the bins, and from so many shots of a batch since; None: anything may
         be other than it was. Points look that frames asked for while light was held."""
         self.changed(1.0 if shots is None else shots * self.strongest)
-        if self._lightmap.storage != "fixed8":
+        lightmap, shows = self._lightmap, self.shown and self.note is None and self._points is None
+        if lightmap.storage != "fixed8":
             self._find_even(self.overshoot_target, bins, shots or 0)
-            if self.shown and self.note is None and self._points is None:
-                self._find_even(self._lightmap.ambient_target, bins, shots or 0)
+            if shows:
+                self._gpu.ctx.copy_framebuffer(lightmap.ambient_target, self.overshoot_target)
+        elif shows:
+            self._find_even(lightmap.ambient_target, bins, shots or 0)
         if self._owed and self._points is not None:
             self._look_for_frames(self._points)
 
