@@ -73,10 +73,12 @@ def test_all_walls_show_their_light_from_the_first_batch_on(gpu: Gpu, adaptive: 
             break
     (first, _), (_, late) = pictures[0], pictures[-1]
     assert first[CEILING].max() < 0.01 * late[CEILING].min(), "the lamp alone has shot"
-    # 576 rays of a point and its neighbours are off by 1/√576 of how uneven the light is that they see, several times itself; and
-    # the rest of the lamp is taken to light what its first patches did
+    # The rest of the lamp is taken to light what its first patches did: up to 31 % too little on a wall, too much on another,
+    # and 6 % too little on all together. To that comes noise: 576 rays of a point and its neighbours are off by 1/√576, 4 %,
+    # where light varies by as much as its mean; of all walls by less
     for _, now in pictures:
         np.testing.assert_allclose(now[LIT], late[LIT], rtol=0.35)
+        np.testing.assert_allclose(now[LIT].mean(0), late[LIT].mean(0), rtol=0.08)
         assert now[DARK].max() <= 1e-4 * late[LIT].mean(), "maps leak less through corners"
     np.testing.assert_allclose(pictures[-1][0][LIT], late[LIT], rtol=0.1)  # 3 % are unshot, and those unevenly
     rooms.release()

@@ -270,11 +270,11 @@ def test_cornell_box_with_an_audit_per_shot(gpu: Gpu, adaptive: bool, projection
 @EACH_WAY
 def test_cornell_box_book(gpu: Gpu, adaptive: bool, projection: str) -> None:
     """At 4000 texels a block's foot is a texel wide (2 cm), and a patch whose middle lies close to it sees too much or too
-    little: the solve loses 1 % of the light, 1.5 % is allowed. The open front is a sixth of the box."""
+    little: the solve loses 0.1 to 0.3 % of the light, by map; 0.5 % is allowed. The open front is a sixth of the box."""
     options = {"residual": 2e-2, "resolution": 128, "adaptive": adaptive, "projection": projection}
     box = solve(gpu, load_scene("cornell-box"), texels=4000, **options)
     s = shares(box)
-    assert abs(s["imbalance"]) < 0.015
+    assert abs(s["imbalance"]) < 0.005
     assert 0.2 < s["escaped"] < 0.4
     box.release()
 
