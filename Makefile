@@ -3,16 +3,19 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 PYTEST := $(BIN)/python -m pytest -n 2 --dist worksteal
+SOLVE  := tests/physics/test_energy.py::test_light_is_conserved_around_a_table
+BAKE   := tests/gpu/test_baking.py::test_the_scene_as_edited_is_written_with_its_light
 
 .PHONY: run test setup lint
 
 run: $(VENV)/.run
 	$(BIN)/glowtree view
 
-# What OpenGL 4.1 lacks is found in such a context, and what newer drivers refuse by the whole application in their own
+# What OpenGL 4.1 lacks is found in such a context, and what newer drivers refuse by the whole application in their own; also
+# where there is no screen, by a solve and a bake
 test: $(VENV)/.dev lint
 	$(PYTEST) tests/unit tests/gpu tests/physics --gl41
-	$(PYTEST) tests/desktop tests/screenshots tests/web tests/gpu/test_shaders.py
+	$(PYTEST) tests/desktop tests/screenshots tests/web tests/gpu/test_shaders.py $(SOLVE) $(BAKE)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
