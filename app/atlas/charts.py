@@ -35,8 +35,8 @@ class Charts:
     face_uv (f, 3, 2) f64: atlas position [texels] of the triangle's corners, in the triangle's own corner order.
     face_chart (f,) i32 in [0, chart_count); face_facet (f,) i32 in [0, facet_count).
     chart_rects (c, 4) i32: x, y, width, height of each chart in whole texels.
-    dark_faces: number of sides left out because nothing in the scene lies in front of them, or since they are within a closed
-    body.
+    dark_faces: number of sides left out: nothing in the scene lies in front of them, or they are the inside of a closed body,
+    see enclosed.py.
     method: how the charts were made, e.g. ``12 rectangles, 932 xatlas charts``.
     seams: edges across which a surface goes on in another chart.
     hidden_uv (k, 3, 2) f64, hidden_face (k,): pieces of faces that something lies on, no part of any texel, see contacts.py.

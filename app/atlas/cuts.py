@@ -12,12 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.flat_pieces import MOST_PIECES, Piece, on_rims, parted_pieces
+from app.atlas.flat_pieces import MOST_ENDS, MOST_PIECES, Piece, on_rims, parted_pieces
 from app.atlas.intersections import Contacts, contacts, surfaces
 from app.atlas.sides import facets, scene_size, weld
 from app.atlas.triangle_cuts import CutTriangles, cut_pieces
 from app.scene.model import F32, F64, I32, Scene
 from app.util.background import Report
+
+# where triangles are not cut, for people
+BLEEDS = "light and shadow may reach a texel too far there; finer texels make that less"
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,15 +52,18 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
     pieces: list[Piece] = []
     loose = 0
     if crowded:
-        notes.append("too many surfaces meet to cut them: charts do not end where they do")
+        notes.append(f"too many surfaces meet to cut each where others meet it: {BLEEDS}")
     elif len(found.triangle):
         largest, left = _largest(facet, scene.normals_areas[1], found)
         if left:
-            notes.append(f"{left:,} more surfaces meet others than the {MOST_PIECES:,} largest, where charts end there")
+            few = f"{left:,} small surfaces are not cut where others meet them, only the {MOST_PIECES:,} largest are"
+            notes.append(f"{few}: {BLEEDS}")
         found = found.only(largest)
         pieces, loose = parted_pieces(scene, places, corners, facet, found, lambda share: tell(0.5 + 0.4 * share))
     if loose:
-        notes.append(f"{loose} thin things end on surfaces that thousands share: charts do not end where they stand")
+        notes.append(
+            f"{loose:,} thin things stand on surfaces with more than {MOST_ENDS} such, not cut there: {BLEEDS}"
+        )
     if notes:
         scene = dataclasses.replace(scene, warnings=(*scene.warnings, *notes))
     if not pieces:

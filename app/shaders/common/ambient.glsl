@@ -1,7 +1,7 @@
 // The ambient light of a texel: about the irradiance that it will still receive, see app/solvers/shooting/ambient.py. Where less
 // light is to be there than was shot, residual and ambient are negative.
 //
-// It was found a while ago: of it, what has arrived since then is no more to come.
+// It is gathered anew now and then. What has arrived since it was last gathered is taken off, or would be shown twice.
 uniform sampler2D t_ambient;  // irradiance, stored units; of one texel, where all have the same. w: -(Σ H then), 0: as it is
 
 // H: irradiance of the texel now
