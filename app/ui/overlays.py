@@ -167,13 +167,14 @@ def _pace(view: View, state: State) -> None:
 
 
 def help_overlay(state: State) -> None:
-    """All keys, while F1 is on."""
+    """All keys, while F1 is on: in the middle of the window, to be scrolled where it is too small for them."""
     if not state.show_help:
         return
-    left, top, width, height = state.view_px
-    middle = imgui.ImVec2(left + width / 2, top + height / 2)
+    room = imgui.get_io().display_size
+    middle = imgui.ImVec2(room.x / 2, room.y / 2)
     imgui.set_next_window_pos(middle, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
-    imgui.begin("##help", None, FLOATING)
+    imgui.set_next_window_size_constraints(imgui.ImVec2(0, 0), room)
+    imgui.begin("##help", None, FLOATING & ~imgui.WindowFlags_.no_scrollbar)
     if imgui.begin_table("keys", 2, imgui.TableFlags_.sizing_fixed_fit):
         for label, meaning in (*((s.label, s.help) for s in SHORTCUTS), *bookmarks.KEYS, *text_size.KEYS, *POINTER):
             imgui.table_next_row()

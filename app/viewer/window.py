@@ -148,11 +148,17 @@ def _open(size: tuple[int, int], vsync: bool) -> Any:
         raise UserError(f"no window with OpenGL {GL_VERSION[0]}.{GL_VERSION[1]}: {_reason(error)}; {hint}") from None
     window.exit_key = None  # Esc closes what lies over the view
     window.fullscreen_key = None
-    if (scale := _text_scale(window)) > 1:
-        screen = window._window.screen
-        window._window.set_size(min(round(size[0] * scale), screen.width), min(round(size[1] * scale), screen.height))
+    screen = window._window.screen
+    fitting = size_on_screen(size, _text_scale(window), (screen.width, screen.height))
+    if fitting != size:
+        window._window.set_size(*fitting)
     activate_context(window=window)
     return window
+
+
+def size_on_screen(size: tuple[int, int], scale: float, screen: tuple[int, int]) -> tuple[int, int]:
+    """The size to open with, of one for ordinary text: larger as text is, and nowhere larger than the screen."""
+    return min(round(size[0] * scale), screen[0]), min(round(size[1] * scale), screen[1])
 
 
 def _text_scale(window: Any) -> float:

@@ -60,6 +60,17 @@ EFFECTS: dict[str, Callable[[Desk], bool]] = {
 }
 
 
+def test_help_stays_within_a_small_window(gpu: Gpu, session: FakeSession) -> None:
+    desk = Desk(gpu, session, (900, 500))
+    desk.ui.state.show_help = True
+    desk.frames(3)
+    help_window = imgui.internal.find_window_by_name("##help")
+    assert help_window.pos.x >= 0 and help_window.pos.x + help_window.size.x <= 900
+    assert help_window.pos.y >= 0 and help_window.pos.y + help_window.size.y <= 500
+    assert help_window.scroll_max.y > 0, "the rest is reached by the wheel"
+    desk.release()
+
+
 @pytest.mark.parametrize("shortcut", SHORTCUTS, ids=lambda s: s.label)
 def test_every_key_does_what_the_help_says(desk: Desk, shortcut: Any) -> None:
     desk.session.compare()
