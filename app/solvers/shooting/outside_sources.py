@@ -157,16 +157,21 @@ def shots_of(sources: Sources, box: F64) -> list[OutsideShot]:
 
 def in_turns(shots: list[OutsideShot]) -> list[OutsideShot]:
     """Shots of a difference in turns, some that give light and some that take it back, each the strongest first: until either
-    ends, the sum of all that is given stays within a batch of what it was. Else a sky would be taken away before another one is
-    there, and where the sun is dragged, which changes both again and again, all would be dark until it is let go."""
+    ends, the sum of all that is given stays within a batch of what it is to be. Else a sky would be taken away before another one
+    is there, and where a lamp is dragged, which changes both again and again, all would be dark, or brighter with each move,
+    until it is let go."""
     gives, takes = ([shot for shot in shots[::-1] if shot.gives is wanted] for wanted in (True, False))
-    more, queue = 0.0, list[OutsideShot]()
+    more, queue = max(0.0, -sum(float(shot.flux.sum()) for shot in shots)), list[OutsideShot]()
     while gives and takes:
         of = gives if more <= 0 else takes
         run = [of.pop()]
-        while of and run[0].is_like(of[-1]) and (len(run) < BATCH or of[-1].source is run[-1].source):
+        more += float(run[0].flux.sum())
+        while of and run[0].is_like(of[-1]):
+            whole = of[-1].source is not run[-1].source
+            if whole and (len(run) >= BATCH or (of is takes and more <= 0)):
+                break
             run.append(of.pop())
-        more += sum(float(shot.flux.sum()) for shot in run)
+            more += float(run[-1].flux.sum())
         queue += run
     return queue + gives[::-1] + takes[::-1]
 
