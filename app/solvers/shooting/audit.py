@@ -2,6 +2,9 @@
 
 Σ_j A_j F_ji V_ji plus what leaves the scene should be A_i. Where a patch sees from its middle what its edges do not, in a coffer
 or beside a box, it is not. Most light is shot by few patches, so only strong ones are audited, each once.
+
+What dividing does not mend is no fault of the patch: maps are coarse for a scene of many small triangles, and all shots lose as
+much. So quarters of a patch are tried before it is divided, and what all of them lose as well is allowed to patches of its chart.
 """
 
 from __future__ import annotations
@@ -25,6 +28,10 @@ from app.util.state import State
 # patch is divided: a hall under skylights in coffers gains 5.8 % without. A patch of two texels along its edge sees what its
 # texels see.
 AUDITED, SOUND, SMALL = 0.005, 0.02, 2
+# What a patch makes or loses because of its extent falls as its edge, to half in its quarters: where more than this share of it
+# is left in all of them, it has other causes.
+MENDED = 0.75
+
 Patch = tuple[int, int, int]  # column, row, edge
 
 
@@ -60,22 +67,25 @@ class AuditTargets:
 
 
 class Found:
-    """What audits found: by how much of its power each patch is off."""
+    """What audits found: by how much of its power each patch is off, and what dividing does not mend in a chart."""
 
     def __init__(self) -> None:
-        self._off = dict[Patch, float]()
+        self._off, self._unmended = dict[Patch, float](), dict[int, float]()
 
     def clear(self) -> None:
         self._off.clear()
+        self._unmended.clear()
 
     def state(self) -> State:
         off = [[*patch, off] for patch, off in self._off.items()]
-        return State(arrays={"off": np.array(off).reshape(-1, 4)})
+        unmended = [[chart, left] for chart, left in self._unmended.items()]
+        return State(arrays={"off": np.array(off).reshape(-1, 4), "unmended": np.array(unmended).reshape(-1, 2)})
 
     def restore(self, state: State) -> None:
         """Know what is in a ``state``. Raises StateError."""
         patches = state.array("off", np.float64, -1, 4).tolist()
         self._off = {(int(x), int(y), int(edge)): off for x, y, edge, off in patches}
+        self._unmended = {int(chart): left for chart, left in state.array("unmended", np.float64, -1, 2).tolist()}
 
     def enter(self, shooter: np.void, off: float) -> None:
         """A patch, SHOOTER, makes that share of its power, or loses it."""
@@ -85,8 +95,15 @@ class Found:
         return _patch_of(shooter) in self._off
 
     def fails(self, shooter: np.void) -> bool:
-        """Whether a known patch is off by too much."""
-        return abs(self._off[_patch_of(shooter)]) > SOUND
+        """Whether a known patch is off by more than dividing leaves."""
+        off, allowed = self._off[_patch_of(shooter)], self._unmended.get(int(shooter["chart"]), 0.0)
+        return max(off - max(allowed, 0.0), min(allowed, 0.0) - off) > SOUND
+
+    def learn(self, shooter: np.void, quarters: list[np.void]) -> None:
+        """See whether a known patch is off as much in quarters of it, which are known, too."""
+        left = min((self._off[_patch_of(quarter)] for quarter in quarters), key=abs, default=0.0)
+        if abs(left) > MENDED * abs(self._off[_patch_of(shooter)]):
+            self._unmended[int(shooter["chart"])] = left
 
 
 class Auditor:

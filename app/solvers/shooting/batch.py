@@ -108,10 +108,29 @@ class Batch:
         """The strongest patches; those that fail their audit are divided, and others chosen. [Coombe03, 3.4]"""
         yield from self.choose_once(choice, shots, bands)
         while self.auditor.wanted and (failed := (yield from self.auditor.failed(self.see, self.receive, shots))):
+            yield from self._try_quarters(failed[0])
+            failed = [shooter for shooter in failed if self.auditor.found.fails(shooter)]
             self.marks.divide_patches(self._patch_of(shot_of(self._lightmap, shooter)) for shooter in failed)
             yield from self.choose_once(choice, shots, bands)
         if self.replay is not None and not self.outside.left:
             self.replay.keep_strong()
+
+    def _try_quarters(self, shooter: np.void) -> Generator[None, None, None]:
+        """Audit two quarters of a patch that failed, across from each other: does it help to divide it?"""
+        shot, quarters = shot_of(self._lightmap, shooter), list[np.void]()
+        half = shot.size // 2
+        for off in (0, half):
+            quarter = self._shooter_at((shot.corner[0] + off, shot.corner[1] + off), half.bit_length() - 1)
+            if powers_of(quarter) > 0:
+                yield from self.auditor.audit(self.see, self.receive, [0], self.shooters.read(1))
+                quarters.append(quarter)
+        self.auditor.found.learn(shooter, quarters)
+
+    def _shooter_at(self, corner: tuple[int, int], level: int) -> np.void:
+        """Let the batch be one patch, with this lower corner [texels of the tile pool]; what it would shoot now, SHOOTER."""
+        self.bins.fill(corner, level)
+        self._write_shooters(self.phases.choices[0] if self.phases.now.settles else self.phases.now, 1)
+        return self.shooters.read(1)[0]  # type: ignore[no-any-return]
 
     def choose_once(self, choice: Choice, shots: int, bands: int = 1) -> Generator[None, None, None]:
         """The strongest patches, all texels read in so many bands."""
@@ -266,9 +285,7 @@ class Batch:
         """What becomes of a shot from the patch with this lower corner [texels of the tile pool] if it shot now. Changes no
         light. The patch must hold some residual."""
         level = self.phases.patch_edge(corner, self.marks).bit_length() - 1
-        self.bins.fill(corner, level)
-        self._write_shooters(self.phases.choices[0] if self.phases.now.settles else self.phases.now, 1)
-        shooter = self.shooters.read(1)[0]
+        shooter = self._shooter_at(corner, level)
         shares = self.auditor.once(self.see, self.receive, 0, float(powers_of(shooter)))
         return Audit(*shares, shot_of(self._lightmap, shooter))
 
