@@ -61,6 +61,9 @@ class View:
         self._look_due = 0.0
         self._flat: FlatMesh | None = None  # of the scene that is loading
         self._flat_drawn: object = None
+        self._opened_as: tuple[CameraView, DisplayOptions] | None = (
+            None  # camera and display, while its first light is awaited
+        )
         self._renderer, self._rays = FrameRenderer(session.gpu, linear=linear), RayPicture(session.gpu)
         self._seams = SeamJumps(session.gpu)
         self._texel_note: tuple[object, str | None] = (None, None)  # and of which light
@@ -75,6 +78,7 @@ class View:
 
     def _opened(self, exposure: float | None, *, same_scene: bool, reference_gone: bool) -> None:
         """Another lightmap is open. exposure: that its light will need [EV], where it is known."""
+        shows_it = same_scene or self._flat is not None
         self._drop_flat()
         if not same_scene:
             self.look_through(self.session.scene.cameras[0])
@@ -83,6 +87,19 @@ class View:
             self.display = self.display.replace(exposure=exposure)
         if reference_gone:
             self.display = self._without_reference
+        self._opened_as = (self.camera, self.display) if shows_it else None
+
+    @property
+    def waits_for_light(self) -> bool:
+        """Whether what has just been opened has no light yet, and is looked at as then: the picture of it from before, flat or in
+        other texels, says more than a black one."""
+        session, seen = self.session, self._opened_as
+        if seen is None:
+            return False
+        same = seen[0] is self.camera and seen[1] is self.display
+        if not same or session.solver.issued or not session.run.running or not session.edited_scene.emits:
+            self._opened_as = None
+        return self._opened_as is not None
 
     # -- the camera ----------------------------------------------------------------------------------------------------
 

@@ -108,6 +108,9 @@ class UiFrame:
     def _look(self, view: View, target: Framebuffer, scale: Scale | None, *, fresh: bool, look: bool) -> None:
         """Draw the view within the time of a frame: where nothing moves, one more sample of it, until there are enough. fresh:
         nothing was drawn into ``target`` yet."""
+        if view.waits_for_light and not fresh:
+            self._still, self.unfinished = None, False
+            return
         size = target.size
         now = None if view.still is None else (view.still, scale, size)
         if now is None or now != self._still or fresh:

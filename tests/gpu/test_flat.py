@@ -22,7 +22,8 @@ from app.render.options import DisplayOptions
 from app.session import loading
 from app.session.session import Session
 from app.session.view import View
-from app.viewer.ui_frame import pixels
+from app.ui.app import Ui
+from app.viewer.ui_frame import UiFrame, pixels
 
 SIZE = (128, 128)
 
@@ -60,6 +61,37 @@ def test_a_scene_is_seen_before_it_is_unfolded_in_the_colours_of_its_materials(g
         view.session.poll()
         time.sleep(0.001)
     assert view.session.opened and not view.draw_flat(target, SIZE)
+    gpu.release_all(target, texture)
+
+
+def test_it_stays_flat_until_there_is_light(gpu: Gpu, view: View) -> None:
+    """A window does not turn black between; from elsewhere, and while nothing shoots, it shows what there is."""
+    session, size = view.session, (640, 360)
+    texture, ui = gpu.texture(size, 4, "f1"), Ui(live=False)
+    target, frame = gpu.target(texture), UiFrame(gpu, ui, whole=False)
+
+    def seen() -> float:
+        frame.draw(view, target, size=size)
+        left, bottom, width, height = ui.view_rect
+        image = np.frombuffer(texture.read(), np.uint8).reshape(size[1], size[0], 4)
+        return float(
+            image[bottom : bottom + height // 2, left : left + width, :3].mean()
+        )  # below what says how far it is
+
+    session.open("cornell-box")
+    wait_for_flat(session)
+    flat = [seen() for _ in range(4)][-1]
+    while session.loading is not None:
+        session.poll()
+        time.sleep(0.001)
+    assert view.waits_for_light and seen() == pytest.approx(flat, abs=5) and flat > 30  # but for what stands over it
+    session.run.running = False
+    dark = [seen() for _ in range(4)][-1]
+    assert not view.waits_for_light and dark < flat / 3
+    session.work(8)
+    assert [seen() for _ in range(4)][-1] != dark
+    frame.release()
+    ui.release()
     gpu.release_all(target, texture)
 
 
