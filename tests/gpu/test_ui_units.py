@@ -141,7 +141,7 @@ def test_false_colours_are_called_what_they_show(
 ) -> None:
     offered: list[list[str]] = []
 
-    def combo(label: str, now: int, items: list[str], shown: int) -> tuple[bool, int]:
+    def combo(label: str, now: int, items: list[str], shown: int = -1) -> tuple[bool, int]:
         offered.append(items)
         return False, now
 
