@@ -104,12 +104,13 @@ def test_points_that_have_not_looked_yet_tell_nothing(gpu: Gpu) -> None:
     rooms = begin(gpu, two_closed_rooms(), texels=2000)
     rooms.step(8)
     lightmap, nothing_to_come = rooms.lightmap, gpu.texture((2, 1), 4, "f4", bytes(32))
+    even = gpu.texture((1, 1), 4, "f4", bytes(16))
     lightmap.hold_ambient()
     points = GatherPoints(gpu, lightmap)
 
     def foreseen(rows: int, each: int) -> F64:
         for row in range(0, rows, each):
-            points.look(nothing_to_come, row, each)
+            points.look(nothing_to_come, even, row, each)
         return lightmap.light_of(lightmap.texture("t_ambient")).sum(-1, dtype=np.float64)
 
     points.see_light(0, points.rows)
@@ -122,8 +123,34 @@ def test_points_that_have_not_looked_yet_tell_nothing(gpu: Gpu) -> None:
     points.see_light(0, points.rows)
     assert foreseen(1, 1).max() == 0.0
     points.release()
-    gpu.release_all(nothing_to_come)
+    gpu.release_all(nothing_to_come, even)
     rooms.release()
+
+
+def test_what_few_rays_find_makes_no_spots(gpu: Gpu) -> None:
+    """A small bright panel on the floor, which most points of the ceiling see with none of their 144 rays, the others with one or
+    two: each adds an eighth of the even term at most, where it would add a thousand."""
+    panel = [[0.47, 0.01, 0.47], [0.47, 0.01, 0.53], [0.53, 0.01, 0.53], [0.53, 0.01, 0.47]]
+    box = begin(gpu, quads_scene([*room((1.0, 1.0, 1.0)), panel], [grey(0.5)], [0] * 7), texels=4000, storage="rgba32f")
+    lightmap = box.lightmap
+    pool, surfaces = lightmap.pool, lightmap.pool.surfaces
+    of = np.where(surfaces.face >= 0, pool.scene.object_ids[lightmap.charts.face_triangle[surfaces.face]], -1)
+    light = np.zeros((*of.shape, 4), np.float32)
+    light[of == 6, :3] = 144e3
+    lightmap.texture("t_residual").write(pool.image_from_tiles(light).tobytes())
+    even = gpu.texture((1, 1), 4, "f4", np.ones(4, np.float32).tobytes())
+    nothing_to_come = gpu.texture((2, 1), 4, "f4", bytes(32))
+    lightmap.hold_ambient()
+    points = GatherPoints(gpu, lightmap)
+    points.see_light(0, points.rows)
+    points.look(nothing_to_come, even, 0, points.rows)
+    found = pool.tiles_from_image(
+        np.frombuffer(lightmap.texture("t_ambient").read(), np.float32).reshape(*lightmap.size[::-1], 4)
+    )[of == CEILING, 0]
+    points.release()
+    gpu.release_all(even, nothing_to_come)
+    box.release()
+    assert 0.0 < found.max() <= 2 / 8 * (1 + 1e-5)
 
 
 def test_points_have_fewer_rays_where_a_texture_holds_no_more(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -139,7 +139,7 @@ class Ambient:
             if half == 0:
                 points.see_light(row, some)
             else:
-                points.look(self._to_come, row, some)
+                points.look(self._to_come, self.overshoot, row, some)
             budget -= cost * some * points.columns
             self._next_row = (self._next_row + some) % (2 * points.rows)
             if self._next_row == 0:

@@ -80,9 +80,9 @@ class GatherPoints:
         reads = "t_normal_ids", "t_materials", "t_albedo", "t_irradiance", "t_residual", "t_ambient"
         self._draw(self._see_light, self._to_pass_on, self._lightmap.textures(*reads), (first, rows), 1 << BLOCK_LEVEL)
 
-    def look(self, to_come: Texture, first: int, rows: int) -> None:
+    def look(self, to_come: Texture, even: Texture, first: int, rows: int) -> None:
         """Let points in so many rows look around at the light that was seen, and the texels there have the ambient light that
-        they find. to_come: see to_come.frag.glsl."""
+        they find. to_come: see to_come.frag.glsl; even: even_ambient.frag.glsl."""
         lightmap, band, edge = self._lightmap, (first, rows), 1 << BLOCK_LEVEL
         places = lightmap.textures("t_facets", *PLACES)
         pages = lightmap.textures("t_pages", "t_leaves")
@@ -93,7 +93,7 @@ class GatherPoints:
             self._draw(self._trace, self._hits, reads, band, self._ray_edge, rays | beside)
             self._draw(self._find_around, self._around, places | pages, band, edge, beside)
             self._traced[first : first + rows] = True
-        found = {"t_hits": self._hits, "t_to_pass_on": self._to_pass_on}
+        found = {"t_hits": self._hits, "t_to_pass_on": self._to_pass_on, "t_even": even}
         self._draw(self._gather, self._gathered, found | places, band, 1, rays)
         self._draw(self._smooth, self._smoothed, {"t_gathered": self._gathered} | pages, band, 1, beside)
         found = {"t_around": self._around, "t_gathered": self._smoothed, "t_to_come": to_come}
