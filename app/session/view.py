@@ -61,9 +61,7 @@ class View:
         self._look_due = 0.0
         self._flat: FlatMesh | None = None  # of the scene that is loading
         self._flat_drawn: object = None
-        self._opened_as: tuple[CameraView, DisplayOptions] | None = (
-            None  # camera and display, while its first light is awaited
-        )
+        self._opened_as: tuple[CameraView, DisplayOptions] | None = None  # until what was opened is drawn
         self._renderer, self._rays = FrameRenderer(session.gpu, linear=linear), RayPicture(session.gpu)
         self._seams = SeamJumps(session.gpu)
         self._texel_note: tuple[object, str | None] = (None, None)  # and of which light
@@ -94,12 +92,9 @@ class View:
         """Whether what has just been opened has no light yet, and is looked at as then: the picture of it from before, flat or in
         other texels, says more than a black one."""
         session, seen = self.session, self._opened_as
-        if seen is None:
+        if seen is None or seen[0] is not self.camera or seen[1] is not self.display:
             return False
-        same = seen[0] is self.camera and seen[1] is self.display
-        if not same or session.solver.issued or not session.run.running or not session.edited_scene.emits:
-            self._opened_as = None
-        return self._opened_as is not None
+        return session.solver.issued == 0 and session.run.running and session.edited_scene.emits
 
     # -- the camera ----------------------------------------------------------------------------------------------------
 
@@ -124,6 +119,7 @@ class View:
     def draw(self, target: Framebuffer, size: tuple[int, int], **look: Unpack[Look]) -> bool:
         """The picture of the solution as it is now; whether it was drawn, see ``FrameRenderer.render``."""
         self._size, whole = size, look.get("whole", True)
+        self._opened_as = None  # once it is drawn, it follows all that happens
         return self._renderer.render(
             target,
             size,
