@@ -12,7 +12,7 @@ from app.gpu import Gpu, Texture
 from app.lightmap.lightmap import Lightmap
 from app.options import Options, option
 from app.scene.lights import Light
-from app.scene.model import Material
+from app.scene.model import F64, Material
 from app.scene.sky import Sky
 from app.solvers import EnergyBalance, Family, Inspection, Progress
 from app.util.state import State
@@ -50,6 +50,9 @@ class Constant:
     def set_lights(self, lights: tuple[Light, ...]) -> None:
         self._lightmap.set_lights(lights)
         self.reset()
+
+    def set_observer(self, position: F64) -> None:
+        """The light is the same wherever it is seen from."""
 
     def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
         self._lightmap.light_target.clear(*[self.options.irradiance / self._lightmap.unit] * 3, 0.0)

@@ -138,8 +138,8 @@ def _error_flags(error: Parser, family: Family) -> None:
         type=_method_names,
         default="uniform,adaptive,gathering,disc,item-id,level-1,level-3",
         metavar="A,B",
-        help="all, or some of uniform, adaptive, gathering, gathering-adaptive, disc, item-id, depth, stereographic, nonlinear, "
-        "rgba16f, fixed8, level-1, level-3 (default %(default)s)",
+        help="all, or some of uniform, adaptive, gathering, gathering-adaptive, local, pairs, disc, item-id, depth, "
+        "stereographic, nonlinear, rgba16f, fixed8, level-1, level-3 (default %(default)s)",
     )
     error.add_argument(
         "--peers",

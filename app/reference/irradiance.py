@@ -38,7 +38,7 @@ SAMPLES = 16384  # paths from each point: in a Cornell box 0.6 % of noise
 # of the dense matrix: in a Cornell box 0.8 % RMS from a path tracer's with 0.5 % of noise; of 3000 2.9 %
 PATCHES = 6000
 DENSE_TRIANGLES = 60  # most for which it takes minutes
-FORMAT = b"glowtree truth 1"  # changes when a reference or its file does
+FORMAT = b"glowtree truth 2"  # changes when a reference or its file does
 CACHE_FILES = 64  # kept, newest first
 
 

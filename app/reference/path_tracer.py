@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from app.atlas.materials import look_up, texture_coordinates
 from app.atlas.sides import scene_size
 from app.errors import UserError
+from app.scene.lights import Light
 from app.scene.model import F64, RGB, Material, Scene, Texture
 
 __all__ = ["GAP", "Tracer", "description"]
@@ -58,7 +59,8 @@ class Tracer:
         ]
         parts = {f"shape{i}": shape for i, shape in enumerate(shapes)} | _sky(scene)
         self._scene = mi.load_dict({"type": "scene"} | parts)
-        self._lights = _Lights(scene, self._centre, self._scale) if scene.lit_by_lights else None
+        lights = [light for light in scene.lights_and_sun if light.emits]
+        self._lights = _Lights(lights, self._centre, self._scale) if lights else None
         self._sampler = mi.load_dict({"type": "independent"})
         self._sheer = not all(scene.materials[k].opaque for k in np.unique(scene.material_ids))
 
@@ -133,12 +135,10 @@ class Tracer:
 
 
 class _Lights:
-    """Lamps without area, as the scene is traced: arrays of ``count``. No dataclass, or a loop would take it for its state. away:
-    1 without a place; spread: radius, or cosine of half the angle; slope: see Light."""
+    """Lamps without area, and the sun, as the scene is traced: arrays of ``count``. No dataclass, or a loop would take it for its
+    state. away: 1 without a place; spread: radius, or cosine of half the angle; slope: see Light."""
 
-    def __init__(self, scene: Scene, centre: F64, scale: float) -> None:
-        lights = [light for light in scene.lights if light.emits]
-
+    def __init__(self, lights: list[Light], centre: F64, scale: float) -> None:
         def column(values: list[Any]) -> Any:
             return np.array(values, np.float32).T
 
@@ -168,21 +168,14 @@ def _variant() -> str:
 
 
 def _sky(scene: Scene) -> dict[str, Any]:
-    """Emitters that lie beyond all surfaces; the sun is a point there."""
-    if scene.sky is None or not scene.lit_by_sky:
+    """The emitter that lies beyond all surfaces, without the sun; none where it is dark."""
+    if scene.sky is None or not scene.sky.radiance.any():
         return {}
     radiance = scene.sky.radiance
     if radiance.shape[:2] == (1, 1):
-        emitters: dict[str, Any] = {"sky": {"type": "constant", "radiance": _colours(scene.sky.scale.tolist(), None)}}
-    else:
-        emitters = {
-            "sky": {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(radiance)), "mis_compensation": False}
-        }
-    if scene.sky.sun is not None:
-        away = (-scene.sky.sun.direction).tolist()
-        irradiance = _colours(scene.sky.sun_irradiance.tolist(), None)
-        emitters["sun"] = {"type": "directional", "direction": away, "irradiance": irradiance}
-    return emitters
+        return {"sky": {"type": "constant", "radiance": _colours(scene.sky.scale.tolist(), None)}}
+    bitmap = mi.Bitmap(np.ascontiguousarray(radiance))
+    return {"sky": {"type": "envmap", "bitmap": bitmap, "mis_compensation": False}}
 
 
 def _colours(factor: RGB, texture: Texture | None) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from constant_solver import FAMILY, SWEEPS
+from constant_solver import FAMILY, SWEEPS, Constant
 from processes import started
 from solver_scenes import grey, quads_scene, room
 
@@ -203,7 +203,9 @@ def test_points_lie_on_the_triangles_that_methods_see(tmp_path: Path, monkeypatc
 def test_any_family_of_solvers_is_a_method(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Its work and what remains by its own names, beside those of another family."""
+    """Its work and what remains by its own names, beside those of another family; its observer is the first camera."""
+    observers: list[Any] = []
+    monkeypatch.setattr(Constant, "set_observer", lambda _, position: observers.append(position))
     monkeypatch.setitem(SOLVERS, "constant", FAMILY)
     monkeypatch.setitem(METHODS, "constant", Method("solver", solver="constant", options={"irradiance": 3.0}))
     arguments = "furnace --methods constant,uniform --texels 600 --seconds 5 --residual 0.1 -o".split()
@@ -217,6 +219,7 @@ def test_any_family_of_solvers_is_a_method(
     first, last = found["samples"][0], found["samples"][-1]
     assert (first["sweeps"], first["rest"]) == (1, 0.5) and (last["sweeps"], last["rest"]) == (SWEEPS, 0.5**SWEEPS)
     assert first["bias"] == last["bias"], "as bright as it says from the first sweep on"
+    assert observers[0] == pytest.approx(load_scene("furnace").cameras[0].world_from_camera[:3, 3])
 
 
 def test_a_plot_has_a_line_for_each_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

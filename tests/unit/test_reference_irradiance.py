@@ -20,6 +20,7 @@ from app.reference.patches import texture_at
 from app.scene.arrays import arrays_of
 from app.scene.load import load_scene
 from app.scene.model import Material, Scene, Texture
+from app.scene.sky import SUN_ANGLE, Sky, Sun
 from app.util import cache
 
 
@@ -148,6 +149,20 @@ def test_a_lamp_that_shines_both_ways(tracer: Any) -> None:
     # C-11's element in the middle: 4 / 2π · 2 · (x / √(1 + x²)) atan(x / √(1 + x²)), x = 1/2
     x = 0.5 / np.sqrt(1.25)
     assert E == pytest.approx(4 / np.pi * x * np.arctan(x), rel=0.02)
+
+
+def test_the_sun_is_a_disc(tracer: Any) -> None:
+    """A straight edge 10 m above a floor, the sun overhead: half of its disc is seen from below the edge, from half its radius
+    beside that the share beyond a chord, as of any disc."""
+    edge = [[0.0, 10, -5], [-9, 10, -5], [-9, 10, 5], [0, 10, 5]]
+    dark = np.zeros((2, 4, 3), np.float32)
+    sky = Sky("image", sun=Sun(0.0, 90.0), image=dark)
+    scene = quads_scene([edge], [grey(0.0, double_sided=True)]).with_sky(sky)
+    x = np.array([-1.1, -0.5, 0.0, 0.5, 1.1])  # radii from the middle
+    place = np.outer(x * 10 * np.tan(SUN_ANGLE / 2), [1.0, 0, 0]), np.tile([0.0, 1, 0], (5, 1))
+    E = tracer.Tracer(scene).irradiance(*place, 16384, 1)
+    beyond = (np.arccos(0.5) - 0.5 * np.sqrt(0.75)) / np.pi
+    assert E / sky.sun_irradiance == pytest.approx(np.outer([0, beyond, 0.5, 1 - beyond, 1], np.ones(3)), abs=0.02)
 
 
 @pytest.mark.parametrize("cutoff", [None, 0.6])

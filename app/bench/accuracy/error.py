@@ -151,9 +151,10 @@ def _measure(gpu: Gpu, one: SceneCurves, plan: Plan, console: Console, tell: Tel
 
 
 def _curve(gpu: Gpu, one: SceneCurves, reference: ReferenceIrradiance, name: str, plan: Plan) -> list[Row]:
-    """Of a method. Raises UserError."""
+    """Of a method; the observer of what lights the surroundings of one is the first camera. Raises UserError."""
     setup = plan.setup(name)
     with opened(gpu, one.scene, setup.atlas, setup.light, setup.options, setup.solver) as (lightmap, solver):
+        solver.set_observer(one.scene.cameras[0].world_from_camera[:3, 3])
         estimator, looks = ErrorEstimator(gpu, lightmap, NODES), itertools.count()
 
         def estimate() -> Row:

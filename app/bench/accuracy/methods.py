@@ -70,6 +70,8 @@ METHODS = {
     "adaptive": Method("lightmap", light={"adaptive": True}),
     "gathering": Method("solver", solver="gathering", texels=RAY_TEXELS),
     "gathering-adaptive": Method("solver", solver="gathering", light={"adaptive": True}),
+    "local": Method("solver", solver="local", texels=RAY_TEXELS),
+    "pairs": Method("solver", solver="pairs"),
     "disc": Method("form factor", options={"form_factor": "disc"}),
     "item-id": Method("visibility", options={"visibility": "item-id"}),
     "depth": Method("visibility", options={"visibility": "depth"}),
