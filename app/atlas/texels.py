@@ -20,7 +20,7 @@ from app.atlas.unit_square import SLIVER, area_and_centroid, edge_distances
 from app.scene.model import F32, F64, I32, Scene
 from app.util.ahead import ahead
 
-BLOCK = 1 << 16  # candidate texels in work at a time
+BLOCK = 1 << 14  # candidate texels in work at a time: a processor's cache holds them
 LEAST_SEEN = 1e-3  # of a texel, that is not hidden: less is no place to look from
 PIECES = 1.5  # of triangles in a texel, about
 PLACES = 8  # along the edge of a texel: where else to look from, when something lies on its middle
