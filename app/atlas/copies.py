@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.sides import SPREAD, distinct_rows, groups_of, middle, totals
+from app.atlas.sides import SPREAD, distinct_rows, groups_of, middle, rows_by, totals
 from app.scene.model import F64, I32
 
 LEAST = 32  # triangles of a surface that is looked for: fewer cost no time to unfold
@@ -36,9 +36,8 @@ def find_surfaces(points: F64, triangles: I32, groups: I32) -> Surfaces:
     """Of triangles (m, 3) into welded points (n, 3); those of different groups (m,) are not connected."""
     vertices = _vertices(triangles, groups)
     surface = _connected(vertices)
-    order = np.argsort(surface, kind="stable")
-    count = np.bincount(surface)
-    first = np.cumsum(count) - count
+    order, first = rows_by(surface, int(surface.max()) + 1)
+    first, count = first[:-1], np.diff(first)
     original = np.arange(len(triangles))
     corners, named = points[triangles[order]], _names(vertices[order], first, count)
     kind = distinct_rows(count, _digest(named, first), _sizes(corners, first, count))[1]

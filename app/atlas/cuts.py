@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from app.atlas.flat_pieces import MOST_ENDS, MOST_PIECES, Piece, on_rims, parted_pieces
 from app.atlas.intersections import Contacts, contacts, surfaces
-from app.atlas.sides import facets, scene_size, weld
+from app.atlas.sides import Edges, facets, numbered, scene_size, weld
 from app.atlas.triangle_cuts import CutTriangles, cut_pieces
 from app.scene.model import F32, F64, I32, Scene
 from app.util.background import Report
@@ -43,9 +43,10 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
     tell(0.1)
     size, origin = scene_size(scene), points.min(0)
     places = (points - origin) / size
-    found, crowded = contacts(places[corners], surfaces(corners), lambda share: tell(0.1 + 0.4 * share))
+    edges = Edges.of(corners)
+    found, crowded = contacts(places[corners], surfaces(edges), lambda share: tell(0.1 + 0.4 * share))
     tell(0.5)
-    facet = facets(points, corners, scene.material_ids, size)
+    facet = facets(points, corners, scene.material_ids, size, edges)
     if len(found.triangle):
         found = found.only(~on_rims(places[corners], corners, facet, found))
     notes: list[str] = []
@@ -120,5 +121,5 @@ def _joined(scene: Scene, corners: I32, facet: I32, made: CutTriangles, origin: 
         colours=shared(scene.colours),
         normals=normals,
     )
-    pieces = np.unique(facet[source], return_inverse=True)[1].astype(np.int32)  # slivers may have been a piece
+    pieces = numbered(facet[source]).astype(np.int32)  # slivers may have been a piece
     return Cut(cut, np.concatenate([np.zeros((len(kept), 3), np.uint8), ends])[order], pieces)

@@ -12,11 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from app.atlas.sides import FLAT, FLAT_ANGLE, least, most
-from app.scene.model import F64, I32
+from app.atlas.sides import FLAT, FLAT_ANGLE, Edges, groups_of, least, most, numbered, rows_by
+from app.scene.model import F64
 from app.util.background import Report
 
 NEAR = 4 * FLAT  # what is no farther apart is in one place
@@ -42,27 +40,24 @@ class Contacts:
         return Contacts(self.triangle[which], self.ends[which], self.front[which], self.back[which])
 
 
-def surfaces(triangles: I32) -> I64:
+def surfaces(edges: Edges) -> I64:
     """(m,) the number of the surface of each triangle: those that share an edge, two and no more, are of one."""
-    count = len(triangles)
-    start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
-    order = np.lexsort((np.maximum(start, end), np.minimum(start, end)))
-    low, high = np.minimum(start, end)[order], np.maximum(start, end)[order]
-    first = np.flatnonzero(np.r_[True, (low[1:] != low[:-1]) | (high[1:] != high[:-1])])
-    two = first[np.diff(np.r_[first, 3 * count]) == 2]
-    pairs = order[two] // 3, order[two + 1] // 3
-    graph = coo_array((np.ones(len(two), bool), pairs), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    two = edges.first[:-1][edges.uses == 2]
+    pairs = np.stack([edges.order[two] // 3, edges.order[two + 1] // 3], axis=1)
+    return groups_of(len(edges.edge) // 3, pairs)[1]
 
 
 def contacts(corners: F64, surface: I64, report: Report) -> tuple[Contacts, bool]:
     """Where triangles (m, 3, 3) of different surfaces meet; whether there are too many to say. report(share) is called for each
     block, and may raise."""
+    low, high = least(corners) - FLAT, most(corners) + FLAT
+    some = _near_others(low, high, surface)
+    corners = corners[some]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
     found = [Contacts(np.empty(0, np.int64), np.empty((0, 2, 3)), np.empty(0, bool), np.empty(0, bool))]
     pairs = 0
-    for one, other in _pairs_that_meet(least(corners) - FLAT, most(corners) + FLAT, surface, report):
+    for one, other in _pairs_that_meet(low[some], high[some], numbered(surface[some]), report):
         pairs += len(one)
         if pairs > MOST_PAIRS:
             return found[0], True
@@ -70,18 +65,40 @@ def contacts(corners: F64, surface: I64, report: Report) -> tuple[Contacts, bool
             report(0.5 + 0.5 * pairs / MOST_PAIRS)
             block = slice(first, first + BLOCK)
             found += _meeting(corners, normals, one[block], other[block])
-    return Contacts(
-        *(np.concatenate([getattr(f, name.name) for f in found]) for name in dataclasses.fields(Contacts))
-    ), False
+    triangle, *rest = (np.concatenate([getattr(f, name.name) for f in found]) for name in dataclasses.fields(Contacts))
+    return Contacts(some[triangle], *rest), False
+
+
+def _near_others(low: F64, high: F64, surface: I64) -> I64:
+    """The triangles, of boxes low to high (m, 3), that may meet another surface: their boxes meet what its box shares with that
+    of their own."""
+    lows, highs = _around(low, high, surface)
+    x, y, z = np.argsort(-np.ptp(np.concatenate([lows, highs]), axis=0))
+    boxes = shapely.box(lows[:, x], lows[:, y], highs[:, x], highs[:, y])
+    one, other = shapely.STRtree(boxes).query(boxes)
+    meets = (one != other) & (lows[one, z] <= highs[other, z]) & (highs[one, z] >= lows[other, z])
+    one, other = one[meets], other[meets]
+    least_shared, most_shared = np.full(lows.shape, np.inf), np.full(lows.shape, -np.inf)
+    np.minimum.at(least_shared, one, np.maximum(lows[one], lows[other]))
+    np.maximum.at(most_shared, one, np.minimum(highs[one], highs[other]))
+    meets = np.ones(len(surface), bool)
+    for k in range(3):
+        meets &= (low[:, k] <= most_shared[surface, k]) & (high[:, k] >= least_shared[surface, k])
+    return np.flatnonzero(meets)
+
+
+def _around(low: F64, high: F64, surface: I64) -> tuple[F64, F64]:
+    """The boxes of surfaces, (s, 3) each, around those of their triangles."""
+    order, first = rows_by(surface, int(surface.max(initial=-1)) + 1)
+    return np.minimum.reduceat(low[order], first[:-1]), np.maximum.reduceat(high[order], first[:-1])
 
 
 def _pairs_that_meet(low: F64, high: F64, surface: I64, report: Report) -> Iterator[tuple[I64, I64]]:
     """Pairs of triangles of different surfaces whose boxes meet, in blocks."""
-    order = np.argsort(surface, kind="stable")
-    first = np.flatnonzero(np.diff(surface[order], prepend=-1))
-    if len(first) < 2:
+    count = np.bincount(surface)
+    if len(count) < 2:
         return
-    lows, highs = np.minimum.reduceat(low[order], first), np.maximum.reduceat(high[order], first)
+    lows, highs = _around(low, high, surface)
     x, y, z = np.argsort(-np.ptp(np.concatenate([low, high]), axis=0))
     boxes = shapely.box(low[:, x], low[:, y], high[:, x], high[:, y])
     whole = shapely.STRtree(shapely.box(lows[:, x], lows[:, y], highs[:, x], highs[:, y]))
@@ -94,7 +111,7 @@ def _pairs_that_meet(low: F64, high: F64, surface: I64, report: Report) -> Itera
         near.append(one[meets])
         beside.append(other[meets])
     # a surface of many triangles is looked at by itself, or most pairs would be its own neighbours
-    group = np.where(np.diff(np.append(first, len(low))) > DENSE, np.arange(len(first)), -1)
+    group = np.where(count > DENSE, np.arange(len(count)), -1)
     mine, theirs = np.concatenate(near), group[np.concatenate(beside)]
     at = np.argsort(theirs, kind="stable")
     for those in np.split(at, np.flatnonzero(np.diff(theirs[at])) + 1) if len(at) else ():

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.sides import distinct_rows, least, most, totals
+from app.atlas.sides import distinct_rows, least, most, numbered, totals
 from app.scene.model import F64, I32
 
 SAME = 1e-4  # relative: area against the bounding rectangle's; width against height of a square
@@ -38,6 +38,9 @@ def find_rectangles(points: F64, triangles: I32, materials: I32, facet: I32) -> 
     points (n, 3) [m], triangles (m, 3), materials (m,), facet (m,) as from ``sides.facets``. u runs along the longer
     side.
     """
+    some = _of_whole_or_beside(triangles, facet)
+    triangles, materials, given = triangles[some], materials[some], facet[some]
+    facet = numbered(given).astype(np.int32)
     count = int(facet.max(initial=-1)) + 1
     corners = points[triangles]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -61,7 +64,17 @@ def find_rectangles(points: F64, triangles: I32, materials: I32, facet: I32) -> 
     index = np.flatnonzero(found & ~curved)
     heights = totals(facet, np.einsum("mck,mk->mc", corners, normal[facet]).mean(axis=1), count)
     heights /= np.maximum(np.bincount(facet, minlength=count), 1)
-    return _oriented(index, normal[index], heights[index], axes[index], lows[index], highs[index])
+    name = np.empty(count, np.int32)
+    name[facet] = given
+    return _oriented(name[index], normal[index], heights[index], axes[index], lows[index], highs[index])
+
+
+def _of_whole_or_beside(triangles: I32, facet: I32) -> NDArray[np.int64]:
+    """Triangles of facets with more than one, for a triangle is no rectangle; and those that share an edge with these."""
+    whole = np.bincount(facet)[facet] > 1
+    met = np.zeros(int(triangles.max(initial=-1)) + 1, np.int8)
+    met[triangles[whole]] = 1
+    return np.flatnonzero(whole | (met[triangles[:, 0]] + met[triangles[:, 1]] + met[triangles[:, 2]] >= 2))
 
 
 def _ranked_boundary(
@@ -111,7 +124,7 @@ def _extents(
     return low, high
 
 
-def _oriented(index: NDArray[np.int64], normal: F64, height: F64, axis: F64, low: F64, high: F64) -> Rectangles:
+def _oriented(facet: I32, normal: F64, height: F64, axis: F64, low: F64, high: F64) -> Rectangles:
     """Choose origin and axes from the four corners, the same for every way the rectangle may have been given."""
     side = np.cross(normal, axis)
     # re-orthogonalise: the edge lies in the plane only as well as the vertices do
@@ -125,9 +138,9 @@ def _oriented(index: NDArray[np.int64], normal: F64, height: F64, axis: F64, low
     allowed = lengths >= (1 - SAME) * lengths.max(axis=1, keepdims=True)
     score = np.where(allowed, corners @ GENERIC, np.inf)
     first = np.argmin(score, axis=1)
-    rows = np.arange(len(index))
+    rows = np.arange(len(facet))
     corner = corners[rows, first]
     to_u = corners[rows, (first + 1) % 4] - corner
     to_v = corners[rows, (first + 3) % 4] - corner
     w, h = np.linalg.norm(to_u, axis=1), np.linalg.norm(to_v, axis=1)
-    return Rectangles(index.astype(np.int32), corner, to_u / w[:, None], to_v / h[:, None], np.stack([w, h], axis=1))
+    return Rectangles(facet, corner, to_u / w[:, None], to_v / h[:, None], np.stack([w, h], axis=1))

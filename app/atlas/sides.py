@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
@@ -28,6 +28,9 @@ FLAT = 1e-6  # distance from a plane that still counts as on it
 # Radians between two normals of one plane: what FLAT allows over a triangle a thousandth of the scene high.
 FLAT_ANGLE = 1e-3
 BLOCK = 1 << 22  # numbers in a temporary array
+COUNTED = 4  # times as many kinds of numbers as there are numbers, at most, are sorted by counting
+FEW = 4096  # rows, from which on that is faster
+NEAR_PLANES = 2e-4  # apart: more than planes are whose normals and lines are the same when rounded to 10 FLAT
 # Odd multiplier that spreads bits [Knuth, multiplicative hashing by the golden ratio].
 SPREAD = np.uint64(0x9E3779B97F4A7C15)
 
@@ -104,36 +107,105 @@ def _hull_points(points: F64) -> F64:
     return np.asarray(points[vertices])
 
 
+def rows_by(label: NDArray[np.integer], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The rows that bear each of some labels: of label k, ``order`` from ``first[k]`` up to ``first[k + 1]``, in the order in
+    which they are given.
+
+    label (n,) in [0, count). By counting, as sparse matrices are transposed: many times faster than np.argsort.
+    """
+    rows = np.arange(len(label) + 1)
+    by_label = csr_array((np.ones(len(label), bool), label, rows), shape=(len(label), count)).tocsc()
+    return by_label.indices.astype(np.int64), by_label.indptr.astype(np.int64)
+
+
+def numbered(label: NDArray[np.integer]) -> NDArray[np.int64]:
+    """(n,) the labels (n,), which are not negative, numbered from 0 with none missing, in their order."""
+    used = np.zeros(int(label.max(initial=-1)) + 1, bool)
+    used[label] = True
+    return np.asarray((np.cumsum(used) - 1)[label], np.int64)
+
+
 def distinct_rows(*columns: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """One row of each kind, in sorted order: its index (d,), the kind of each row (n,), rows of each kind (d,).
 
     columns (n,) each; many times faster than np.unique(axis=0).
     """
-    columns = _packed(columns)
-    order = np.lexsort(columns[::-1])
-    fresh = np.zeros(len(order), bool)
-    fresh[:1] = True
-    for column in columns:
-        in_order = column[order]
-        fresh[1:] |= in_order[1:] != in_order[:-1]
+    order, fresh = _in_order(columns)
     kind = np.empty(len(order), np.int64)
     kind[order] = np.cumsum(fresh) - 1
     return order[fresh], kind, np.diff(np.append(np.flatnonzero(fresh), len(order)))
 
 
-def _packed(columns: tuple[NDArray[Any], ...]) -> tuple[NDArray[Any], ...]:
-    """Columns of whole numbers in one of the same order, that is sorted once, where that holds them."""
-    if not len(columns[0]) or any(column.dtype.kind not in "biu" for column in columns):
-        return columns
+def _in_order(columns: tuple[NDArray[Any], ...]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Rows in sorted order, those that are alike as they are given, and whether each differs from the one before it (n,)."""
+    count = len(columns[0])
+    columns, spans = _packed(columns)
+    if spans:
+        order = rows_by(columns[-1], spans[-1])[0]
+        for column, span in zip(columns[-2::-1], spans[-2::-1], strict=True):
+            order = order[rows_by(column[order], span)[0]]
+    else:
+        order = np.lexsort(columns[::-1])
+    fresh = np.zeros(count, bool)
+    fresh[:1] = True
+    for column in columns:
+        in_order = column[order]
+        fresh[1:] |= in_order[1:] != in_order[:-1]
+    return order, fresh
+
+
+def _packed(columns: tuple[NDArray[Any], ...]) -> tuple[tuple[NDArray[Any], ...], list[int]]:
+    """Columns in few of the same order; of whole numbers from 0, how many each may hold, if they are sorted fast by counting."""
+    count = len(columns[0])
+    if not count or any(column.dtype.kind not in "biu" for column in columns):
+        return columns, []
     least = [int(column.min()) for column in columns]
     spans = [int(column.max()) - low + 1 for column, low in zip(columns, least, strict=True)]
-    if math.prod(spans) >= 1 << 63 or max(map(abs, least)) >= 1 << 62:
-        return columns
-    key = np.zeros(len(columns[0]), np.int64)
+    counted = count >= FEW and max(spans) <= COUNTED * count
+    most = COUNTED * count if counted else (1 << 63) - 1
+    if max(map(abs, least)) >= 1 << 62 or (not counted and math.prod(spans) > most):
+        return columns, []
+    keys: list[NDArray[Any]] = []
+    sizes: list[int] = []
     for column, low, span in zip(columns, least, spans, strict=True):
-        key *= span
-        key += column.astype(np.int64) - low
-    return (key,)
+        key = column.astype(np.int64) - low
+        if keys and sizes[-1] * span <= most:
+            keys[-1] = keys[-1] * span + key
+            sizes[-1] *= span
+        else:
+            keys.append(key)
+            sizes.append(span)
+    return tuple(keys), sizes if counted else []
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """The edges of triangles. Half-edge 3 m + k runs from corner k to k + 1 of triangle m. edge (3 m,): the number of its edge,
+    by the lower and then by the higher of its corners; order (3 m,): the half-edges of one edge after those of another, of edge e
+    from first[e] up to first[e + 1]."""
+
+    edge: NDArray[np.int64]
+    order: NDArray[np.int64]
+    first: NDArray[np.int64]
+
+    @staticmethod
+    def of(triangles: I32) -> Edges:
+        start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
+        order, fresh = _in_order((np.minimum(start, end), np.maximum(start, end)))
+        edge = np.empty(len(order), np.int64)
+        edge[order] = np.cumsum(fresh) - 1
+        return Edges(edge, order, np.append(np.flatnonzero(fresh), len(order)))
+
+    @property
+    def uses(self) -> NDArray[np.int64]:
+        """(edges,) how many half-edges each has."""
+        return np.diff(self.first)
+
+    def pairs(self, shift: int = 1) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Half-edges of one edge so far apart in ``order``, the earlier ones and the later ones."""
+        in_order = self.edge[self.order]
+        at = np.flatnonzero(in_order[shift:] == in_order[:-shift])
+        return self.order[at], self.order[at + shift]
 
 
 def totals(label: NDArray[np.integer], values: F64, count: int) -> F64:
@@ -148,38 +220,75 @@ def weld(scene: Scene) -> tuple[F64, I32]:
     used = np.zeros(len(scene.positions), bool)
     used[scene.triangles] = True
     vertices = scene.positions[used]
-    index, kind, _ = distinct_rows(*vertices.T)
-    points = vertices[index]
-    pairs = cKDTree(points).query_pairs(WELD * scene_size(scene), output_type="ndarray")
-    count, label = groups_of(len(points), pairs)
+    order = _by_place(vertices)
+    places = vertices[order]
+    fresh = np.append(True, (places[1:] != places[:-1]).any(1))
+    kind = np.empty(len(order), np.int64)
+    kind[order] = np.cumsum(fresh) - 1
+    points = places[fresh]
+    count, label = groups_of(len(points), _pairs_within(points, WELD * scene_size(scene)))
     first = np.zeros(count, np.int64)
     first[label[::-1]] = np.arange(len(points))[::-1]
     return points[first], label[kind[np.cumsum(used)[scene.triangles] - 1]].astype(np.int32)
 
 
-def facets(points: F64, triangles: I32, materials: I32, size: float) -> I32:
+def _by_place(points: F64) -> NDArray[np.int64]:
+    """(n,) points (n, 3) in the order of x, then y, then z, those that coincide as they are given."""
+    order = np.argsort(points[:, 0])
+    x = points[order, 0]
+    same = x[1:] == x[:-1]
+    tied = np.flatnonzero(np.append(same, False) | np.append(False, same))
+    rows = np.sort(order[tied])
+    order[tied] = rows[np.lexsort(points[rows].T[::-1])]
+    return order
+
+
+def _pairs_within(points: F64, reach: float) -> NDArray[np.int64]:
+    """Pairs (p, 2) of points (n, 3), which are in the order of x, that are no farther apart. Most are alone along an axis."""
+    some = np.arange(len(points))
+    run = np.zeros(len(points), np.int64)
+    for axis in range(3):
+        if axis:
+            order = np.lexsort((points[some, axis], run))
+            some, run = some[order], run[order]
+        near = (np.diff(points[some, axis]) <= reach * (1 + 1e-9)) & (run[1:] == run[:-1])
+        run = np.cumsum(np.append(True, ~near)[: len(some)])
+        kept = np.append(near, False)[: len(some)] | np.append(False, near)[: len(some)]
+        some, run = some[kept], run[kept]
+    pairs = cKDTree(points[some]).query_pairs(reach, output_type="ndarray") if len(some) else np.empty((0, 2), np.int64)
+    return np.asarray(some[pairs], np.int64)
+
+
+def facets(points: F64, triangles: I32, materials: I32, size: float, edges: Edges | None = None) -> I32:
     """Number the connected flat pieces of one material.
 
-    points (n, 3) [m], triangles (m, 3) into them (welded), materials (m,), size: the scene's diagonal [m].
+    points (n, 3) [m], triangles (m, 3) into them (welded), materials (m,), size: the scene's diagonal [m]; edges of the
+    triangles, if they are known.
     Returns (m,) i32. A piece that bends little by little, edge after edge, falls back to its single triangles.
     """
     corners = (points[triangles] - points.mean(axis=0)) / size
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     doubled = np.linalg.norm(normals, axis=1)
     normals /= np.maximum(doubled, np.finfo(float).tiny)[:, None]
-    edges = _flat_edges(corners, triangles, materials, normals)
-    joins = np.concatenate([edges[0], _t_junctions(corners, normals, materials, edges[1])])
+    pairs, left = _flat_edges(corners, triangles, materials, normals, edges or Edges.of(triangles))
+    joins = np.concatenate([pairs, _t_junctions(corners, normals, materials, left)])
     count, label = groups_of(len(triangles), joins)
-    # plane of each piece, and how far the piece strays from it
-    mean = totals(label, normals * doubled[:, None], count)
+    some = np.flatnonzero(np.bincount(label)[label] > 1)
+    bent = some[_bent(corners[some], normals[some] * doubled[some, None], numbered(label[some]))]
+    label[bent] = count + np.arange(len(bent))
+    return numbered(label).astype(np.int32)
+
+
+def _bent(corners: F64, normals: F64, label: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(m,) whether pieces, of triangles (m, 3, 3) with such labels, stray from their planes. normals (m, 3): times area."""
+    count = int(label.max(initial=-1)) + 1
+    mean = totals(label, normals, count)
     mean /= np.maximum(np.linalg.norm(mean, axis=1), np.finfo(float).tiny)[:, None]
     centre = totals(label, middle(corners), count) / np.bincount(label, minlength=count)[:, None]
     stray = np.abs(np.einsum("mck,mk->mc", corners - centre[label][:, None], mean[label])).max(axis=1)
     bent = np.zeros(count, bool)
     bent[label[stray > 4 * FLAT]] = True  # an honest plane strays by FLAT from its neighbour, a few from the mean
-    alone = bent[label]
-    label[alone] = count + np.arange(np.count_nonzero(alone))
-    return np.unique(label, return_inverse=True)[1].astype(np.int32)
+    return np.asarray(bent[label])
 
 
 def groups_of(count: int, pairs: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
@@ -190,41 +299,54 @@ def groups_of(count: int, pairs: NDArray[np.int64]) -> tuple[int, NDArray[np.int
 
 
 def _flat_edges(
-    corners: F64, triangles: I32, materials: I32, normals: F64
+    corners: F64, triangles: I32, materials: I32, normals: F64, edges: Edges
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs (p, 2) of triangles that continue each other across a whole edge, and the half-edges (h,) left without one.
 
-    Half-edge 3·m + k runs from corner k to corner k + 1 of triangle m. One with two possible partners (sheets that
-    coincide) gets none, and is not listed as left either.
+    One with two possible partners (sheets that coincide) gets none, and is not listed as left either.
     """
     start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    order = np.lexsort((high, low, np.repeat(materials, 3)))
-    key = np.stack([np.repeat(materials, 3)[order], low[order], high[order]], axis=1)
     firsts, seconds = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
-    for shift in range(1, len(order)):
-        same = np.flatnonzero((key[shift:] == key[:-shift]).all(axis=1))
-        if not len(same):
-            break
-        i, j = order[same], order[same + shift]
-        fits = (start[i] == end[j]) & (start[i] != end[i])
-        fits[fits] = _coplanar(corners, normals, i[fits], j[fits])
-        firsts.append(i[fits])
-        seconds.append(j[fits])
+    for shift in range(1, int(edges.uses.max(initial=1))):
+        i, j = edges.pairs(shift)
+        fits = (materials[i // 3] == materials[j // 3]) & (start[i] == end[j]) & (start[i] != end[i])
+        i, j = i[fits], j[fits]
+        flat = _coplanar(corners, normals, i, j)
+        firsts.append(i[flat])
+        seconds.append(j[flat])
     i, j = np.concatenate(firsts), np.concatenate(seconds)
     partners = np.bincount(np.concatenate([i, j]), minlength=3 * len(triangles))
     clear = (partners[i] == 1) & (partners[j] == 1)
     return np.stack([i[clear] // 3, j[clear] // 3], axis=1), np.flatnonzero((partners == 0) & (start != end))
 
 
-def _coplanar(corners: F64, normals: F64, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether the triangles of half-edges i and j lie in one plane and face the same way."""
+def _coplanar(corners: F64, normals: F64, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Which triangles of half-edges i and j lie in one plane and face the same way."""
+    turn = np.linalg.norm(normals[i // 3] - normals[j // 3], axis=1)
+    some = np.flatnonzero(turn < FLAT_ANGLE)
+    i, j = i[some], j[some]
     ti, tj = i // 3, j // 3
     far_i, far_j = corners[ti, (i % 3 + 2) % 3], corners[tj, (j % 3 + 2) % 3]
     off_i = np.einsum("ek,ek->e", far_j - corners[ti, i % 3], normals[ti])
     off_j = np.einsum("ek,ek->e", far_i - corners[tj, j % 3], normals[tj])
-    turn = np.linalg.norm(normals[ti] - normals[tj], axis=1)
-    return np.asarray((np.maximum(np.abs(off_i), np.abs(off_j)) < FLAT) & (turn < FLAT_ANGLE))
+    return np.asarray(some[np.maximum(np.abs(off_i), np.abs(off_j)) < FLAT])
+
+
+def _in_near_planes(corners: F64, normals: F64, half: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The half-edges (h,) of triangles whose plane may be that of another one: their normals are the same when rounded, and they
+    are about as far from the origin."""
+    owns = np.zeros(len(corners), bool)
+    owns[half // 3] = True
+    some = np.flatnonzero(owns)
+    rounded = np.round(normals[some] / (10 * FLAT)).astype(np.int64).astype(np.uint64)
+    mixed = (rounded * np.cumprod(np.full(3, SPREAD))).sum(axis=1)
+    mixed = (mixed ^ (mixed >> np.uint64(29))) * SPREAD
+    far = np.einsum("mk,mk->m", corners[some, 0], normals[some])
+    key = (mixed >> np.uint64(16) << np.uint64(16)) + ((far + 2) / NEAR_PLANES).astype(np.uint64)
+    order = np.argsort(key)
+    near = np.diff(key[order]) <= 1
+    owns[some[order]] = np.append(near, False)[: len(some)] | np.append(False, near)[: len(some)]
+    return half[owns[half // 3]]
 
 
 def _not_alone(rows: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -240,6 +362,7 @@ def _t_junctions(corners: F64, normals: F64, materials: I32, half: NDArray[np.in
     Half-edges of one plane and line are found by rounding both; along each line, runs of overlapping intervals join.
     A line on which two edges of the same direction overlap belongs to sheets that coincide, and is left alone.
     """
+    half = _in_near_planes(corners, normals, half)
     t = half // 3
     p, q = corners[t, half % 3], corners[t, (half + 1) % 3]
     along = q - p
