@@ -159,7 +159,9 @@ def test_concave_faces_are_not_walled_up(tmp_path: Path, name: str, turned: bool
     lines = [f"v {x} 1 {y}\nvt {x} {y}" for x, y in ring]
     face = " ".join(f"{k}/{k}" for k in range(1, len(ring) + 1))
     square = "v 9 0 0\nv 9 1 0\nv 9 1 1\nv 9 0 1\nf -4 -3 -2 -1\nf -3 -2 -1"
-    text = "\n".join([*lines, f"o before\n{square}\no wall\nusemtl paint\nf {face}\no after\n{square}"])
+    text = "\n".join(
+        [*lines, f"o before\n{square}\no wall\nusemtl paint\nf {face}\no after\n{square.replace('9', '8')}"]
+    )
     scene = load(tmp_path, text)
     wall = scene.object_ids == 1
     normals, areas = scene.normals_areas
@@ -200,7 +202,7 @@ def test_lists_of_material_libraries(tmp_path: Path, line: str) -> None:
     (tmp_path / "sub").mkdir()
     written(tmp_path, "a.mtl", "newmtl one\nKd 0.1 0.1 0.1\n")
     written(tmp_path, "b b.mtl", "newmtl two\nKd 0.2 0.2 0.2\n")
-    scene = load(tmp_path, f"mtllib {line}\n{TRIANGLE}usemtl one\nf 1 2 3\nusemtl two\nf 1 3 2\n")
+    scene = load(tmp_path, f"mtllib {line}\n{TRIANGLE}usemtl one\nf 1 2 3\nusemtl two\nv 0 0 5\nf 1 3 4\n")
     assert [m.albedo[0] for m in scene.materials] == [0.1, 0.2] and scene.warnings == ()
 
 
