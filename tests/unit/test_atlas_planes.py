@@ -33,7 +33,7 @@ def _planes() -> tuple[Planes, F64]:
     triangles = np.arange(3 * len(normal), dtype=np.int32).reshape(-1, 3)
     facet = np.arange(len(normal), dtype=np.int32)
     points = corners.reshape(-1, 3)
-    planes = Planes.of(points, triangles, facet, np.zeros(len(facet), bool), 1e-6, Edges.of(triangles))
+    planes = Planes.of(points, triangles, facet, np.ones(len(facet), bool), 1e-6, Edges.of(triangles))
     units = np.array([FLAT_ANGLE, FLAT_ANGLE, FLAT_ANGLE, WITHIN])
     rows = np.column_stack([planes.normal, (planes.normal * planes.point).sum(1)]) / units
     near_each = [((rows[:, None] - side * rows) ** 2).sum(2) <= 1 for side in (1, -1)]
