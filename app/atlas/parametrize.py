@@ -188,8 +188,13 @@ def _unfold(
         progress=lambda stage, share: report(stage, 0.3 + (UNFOLDED - 0.3) * share),
     )
     chart[rest], uv[rest] = count + unfolded.chart, unfolded.uv
-    flat = int(unfolded.chart.max(initial=-1)) + 1 - unfolded.by_xatlas
-    kinds = ((count, "rectangles"), (unfolded.by_xatlas, "xatlas charts"), (flat, "flat pieces"))
+    flat = int(unfolded.chart.max(initial=-1)) + 1 - unfolded.by_xatlas - unfolded.seen_whole
+    kinds = (
+        (count, "rectangles"),
+        (unfolded.by_xatlas, "xatlas charts"),
+        (unfolded.seen_whole, "pieces seen whole from one side"),
+        (flat, "flat pieces"),
+    )
     method = ", ".join(f"{number} {kind}" for number, kind in kinds if number)
     size = rectangles.size
     if ends is not None:
