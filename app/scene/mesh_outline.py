@@ -17,6 +17,7 @@ from app.scene.model import F64, Material
 from app.scene.mtl import read_materials, unquoted
 from app.scene.outline import Outline, colour_textures
 from app.scene.ply import COLOURS, ORDERS, Element, header
+from app.scene.text import decoded
 
 COLOUR_NAMES = [names[0] for names in COLOURS]
 SOME = 4096  # faces and vertices that are looked at, of each
@@ -111,7 +112,7 @@ def _obj(path: Path, data: Bytes, most: int) -> Outline | None:
 def _names(data: Bytes, starts: Ints, key: str) -> Iterator[str]:
     """What stands behind a key in the lines that begin with it."""
     for at in starts.tolist():
-        word, _, name = _line(data, at).decode("utf-8", "replace").partition(" ")
+        word, _, name = decoded(_line(data, at)).partition(" ")
         if word == key:
             yield unquoted(name)
 

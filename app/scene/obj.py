@@ -18,6 +18,7 @@ from app.scene.images import linear_from_srgb
 from app.scene.model import Scene
 from app.scene.mtl import read_materials, unquoted
 from app.scene.polygons import with_ears_clipped
+from app.scene.text import decoded
 from app.scene.validate import Part, check_triangle_count, validate
 from app.util.background import Report, share_of, unheard
 
@@ -44,7 +45,7 @@ class _Mesh:
 def load_obj(path: Path, report: Report = unheard) -> Scene:
     """Read an .obj file with its .mtl files. report: as of ``load_meshfile``. SceneError for anything that makes it unusable."""
     try:
-        text = path.read_text("utf-8-sig", errors="replace")
+        text = decoded(path.read_bytes())
     except OSError as error:
         raise SceneError(path, f"cannot be read: {error.strerror}") from error
     mesh = _read_lines(path, text, share_of(report, 0.0, 0.5))
@@ -92,7 +93,7 @@ def load_obj(path: Path, report: Report = unheard) -> Scene:
 def _read_lines(path: Path, text: str, report: Report) -> _Mesh:
     mesh = _Mesh()
     object_name, material_name = path.stem, ""
-    lines = text.replace("\\\n", " ").splitlines()
+    lines = text.replace("\\\n", " ").split("\n")
     for number, line in enumerate(lines, 1):
         if number % OFTEN == 1:
             report(number / len(lines))

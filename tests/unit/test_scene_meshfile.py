@@ -284,3 +284,32 @@ def test_stl_as_text_with_several_solids_and_a_mark(tmp_path: Path) -> None:
     facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 {z}\nvertex 1 0 {z}\nvertex 0 1 {z}\nendloop\nendfacet\n"
     text = "".join(f"solid {name}\n{facet.format(z=z)}endsolid {name}\n" for z, name in enumerate("ab"))
     assert len(load(tmp_path, "\ufeff" + text, "a.stl").triangles) == 2
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
+def test_names_in_other_encodings(tmp_path: Path, encoding: str) -> None:
+    """Two names that differ in letters beyond ASCII stay two; lines end as on Windows, some go on in the next."""
+    mtl = "newmtl W\u00e4nde\nKd 0.2 0.2 0.2\nnewmtl W\u00f6nde\nKd 0.3 0.3 0.3\n"
+    written(tmp_path, "a.mtl", mtl.encode(encoding))
+    text = f"mtllib a.mtl\n{TRIANGLE}usemtl W\u00e4nde\nf 1 2 \\\n3\nusemtl W\u00f6nde\nv 0 0 5\nf 1 3 4\n"
+    scene = load(tmp_path, text.replace("\n", "\r\n").encode(encoding))
+    assert [(m.name, m.albedo[0]) for m in scene.materials] == [("W\u00e4nde", 0.2), ("W\u00f6nde", 0.3)]
+    assert scene.warnings == ()
+
+
+def test_maps_with_options_and_of_emission(tmp_path: Path) -> None:
+    lines = "newmtl a\nmap_Kd -s 2 3 1 -o 0.5 0.25 0 -clamp on -bm 0.2 a.png\nmap_Ke -imfchan r b b.png\n"
+    written(tmp_path, "a.mtl", lines + "newmtl b\nKe 2 2 2\nmap_Ke a.png\nTf 0.5 0.5 0.5\n")
+    for name in ("a.png", "b b.png"):
+        written(tmp_path, name, png([[[188, 188, 188]]]))
+    scene = load(
+        tmp_path, f"mtllib a.mtl\n{TRIANGLE}vt 0 0\nusemtl a\nf 1/1 2/1 3/1\nv 0 0 5\nusemtl b\nf 1/1 3/1 4/1\n"
+    )
+    one, other = scene.materials
+    assert one.emission == (1, 1, 1) and one.emission_texture is not None and one.emission_texture.name == "b b.png"
+    assert other.emission == (2, 2, 2) and other.emission_texture is not None and other.albedo_texture is None
+    texture = one.albedo_texture
+    assert texture is not None and texture.wrap == ("clamp", "clamp")
+    u, v = 0.3, 0.9  # v from the bottom, as in the file
+    assert np.allclose(texture.uv_transform @ [u, 1 - v, 1], [2 * u + 0.5, 1 - (3 * v + 0.25)])
+    assert scene.warnings == ("1 material with a filter (Tf) and without opacity (d, Tr): opaque",)
