@@ -17,14 +17,13 @@ from pathlib import Path
 import numpy as np
 
 from app.errors import SceneError
-from app.scene.images import ImageError, read_channel, read_image
+from app.scene.images import ImageError, file_inside, read_channel, read_image, without_pictures
 from app.scene.model import F32, RGB, Material, Texture
 from app.scene.text import decoded
 from app.util.words import counted
 
 WHITE: RGB = (1.0, 1.0, 1.0)
 MAPS = "map_kd", "map_ke", "map_d"
-NAMES_SHOWN = 3  # of pictures that are missing
 PLACING = {
     "-o": (0.0, 0.0),
     "-s": (1.0, 1.0),
@@ -62,11 +61,9 @@ def read_materials(
         notes.append(
             f"{counted(filtered, 'material', 'materials')} with a filter (Tf) and without opacity (d, Tr): opaque"
         )
-    lost = [f"'{file}'" for (_, _, file), pixels in pictures.items() if pixels is None]
+    lost = [file for (_, _, file), pixels in pictures.items() if pixels is None]
     if lost:
-        shown = ", ".join(lost[:NAMES_SHOWN]) + (", ..." if len(lost) > NAMES_SHOWN else "")
-        what = counted(len(lost), "picture", "pictures")
-        notes.append(f"{what} could not be read ({shown}): Kd is used, or albedo 0.5 without it")
+        notes.append(f"{without_pictures(lost)}: Kd is used, or albedo 0.5 without it")
     return materials, notes
 
 
@@ -93,10 +90,10 @@ def _read_libraries(path: Path, libraries: list[str]) -> tuple[dict[str, Lines],
     folders: dict[str, Path] = {}
     notes = []
     for line in dict.fromkeys(libraries):
-        whole = _found(path.parent, path.parent, unquoted(line))
+        whole = file_inside(path.parent, path.parent, unquoted(line))
         listed = [line] if whole else [next(filter(None, groups)) for groups in LIBRARIES.findall(line)]
         for name in listed:
-            found = whole or _found(path.parent, path.parent, name)
+            found = whole or file_inside(path.parent, path.parent, name)
             if found is None:
                 notes.append(f"material library '{name}' is missing")
                 continue
@@ -178,7 +175,7 @@ def _pixels(root: Path, folder: Path, key: str, file: str) -> F32 | None:
     """The picture as it is named in ``folder`` or in the scene's, or without its own folders; None if there is none to read."""
     last = re.split(r"[/\\:]", file)[-1]
     for place, name in ((folder, file), (root, file), (folder, last), (root, last)):
-        found = _found(root, place, name)
+        found = file_inside(root, place, name)
         if found is not None:
             try:
                 if key != "map_d":
@@ -188,26 +185,6 @@ def _pixels(root: Path, folder: Path, key: str, file: str) -> F32 | None:
             except ImageError:
                 return None
     return None
-
-
-def _found(root: Path, folder: Path, name: str) -> Path | None:
-    """The file that a path from ``folder`` means, in any case, or None if there is none inside ``root``."""
-    text = name.replace("\\", "/").strip()
-    if not text or "\0" in text or ":" in text or text.startswith("/"):
-        return None
-    try:
-        inside, at = root.resolve(), folder.resolve()
-        for part in text.split("/"):
-            step = (at / part).resolve()
-            if not step.exists():
-                alike = [entry for entry in sorted(at.iterdir()) if entry.name.casefold() == part.casefold()]
-                step = alike[0] if alike else step
-            at = step
-            if not at.is_relative_to(inside):
-                return None
-        return at if at.is_file() else None
-    except OSError:  # a name too long for the file system, or a file where a folder should be
-        return None
 
 
 def _number(path: Path, material: str, key: str, text: str) -> float:
