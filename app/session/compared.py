@@ -144,7 +144,12 @@ class Compared:
     @property
     def busy(self) -> bool:
         """Whether a reference is on its way, or a measurement."""
-        return self.fetching is not None or (self.comparison is not None and not self._measured)
+        return self.fetching is not None or self.measuring
+
+    @property
+    def measuring(self) -> bool:
+        """Whether a measurement is on its way."""
+        return self.comparison is not None and not self._measured
 
     def release(self) -> None:
         self.stop_fetching()

@@ -62,6 +62,7 @@ class Opening:
         self.loading: Loading | None = None
         self._parts: Generator[None, None, Ready] | None = None
         self._coarse = False  # whether these parts are of coarse texels
+        self._warm = set[str]()  # solvers whose programs have drawn
 
     def begin(self, loading: Loading) -> None:
         """This one instead of any other."""
@@ -118,8 +119,9 @@ class Opening:
     def _upload(
         self, loaded: Loaded, solver_name: str, options: Mapping[str, Options], *, coarse: bool = False
     ) -> Generator[None, None, Ready]:
-        """Upload what was loaded, and draw once with each program, since drivers compile it then; yields after each part. Raises
-        UserError; then, and when given up between two parts, nothing stays on the GPU."""
+        """Upload what was loaded, and the first time draw once with each program, since drivers compile it then; in coarse texels
+        the first shot does. Yields after each part. Raises UserError; then, and when given up between two parts, nothing stays on
+        the GPU."""
         began, gpu, family = time.perf_counter(), self._gpu, SOLVERS[solver_name]
         make = family.for_coarse if coarse and family.for_coarse is not None else family.make
         with contextlib.ExitStack() as undo:
@@ -137,9 +139,11 @@ class Opening:
             solver = make(gpu, lightmap, options[solver_name])
             undo.callback(solver.release)
             yield
-            yield from solver.warm_up()
-            solver.reset()
-            yield
+            if not coarse and solver_name not in self._warm:
+                yield from solver.warm_up()
+                solver.reset()
+                yield
+            self._warm.add(solver_name)
             if self.prepare is not None:
                 undo.callback(self.prepare(lightmap))
                 gpu.ctx.finish()

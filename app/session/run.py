@@ -222,6 +222,11 @@ class Run:
         """Something else has the time until the next ``advance``: it is none of solving."""
         self._pace.pause()
 
+    @property
+    def between(self) -> bool:
+        """Whether no piece of work is under way."""
+        return self._pace.between
+
     def drawn(self) -> None:
         """The frame is drawn, see ``Pacer.drawn``."""
         self._pace.drawn()

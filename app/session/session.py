@@ -34,7 +34,7 @@ from app.util.background import BackgroundTask
 
 # Of solving in coarse texels, as fast as it goes, and the share of what is emitted that remains then: once either is reached, the
 # processor makes better ones
-COARSE_SECONDS, COARSE_LEFT = 2.0, 0.2
+COARSE_SECONDS, COARSE_LEFT = 1.0, 0.2
 
 
 @dataclass(frozen=True)
@@ -355,7 +355,7 @@ class Session(EditableScene):
         interactive: a hand is at the controls, what can wait does."""
         self._busy = False
         lit = self.run.seconds >= COARSE_SECONDS or self.run.progress.remaining <= COARSE_LEFT
-        self.run.resting = self.coarse and lit
+        self.run.resting = self.coarse and lit and self.run.between
         if self.loading is not None and (self._opening.has_part or self.loading.cancelled):
             self._busy = True
             self._open_part(self.loading)

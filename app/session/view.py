@@ -153,9 +153,10 @@ class View:
 
     @property
     def still(self) -> tuple[object, ...] | None:
-        """All that the picture depends on, where it stays as it is by itself; None while light moves."""
+        """All that the picture depends on, where it stays as it is by itself; None while light moves. Coarse light moves from one
+        piece of work to the next: it is not drawn more often."""
         session = self.session
-        if session.solving or not session.run.settled:
+        if not session.coarse and (session.solving or not session.run.settled):
             return None
         camera = self.camera
         seen = camera.world_from_camera.tobytes(), camera.yfov, self.shown, self.marked

@@ -73,7 +73,7 @@ SOLVERS: dict[str, Family] = {
         help="progressive radiosity: one patch after the other shoots its light (Cohen et al. 1988, Coombe et al. 2003)",
         options=ShootingOptions,
         make=Shooting,
-        for_coarse=partial(Shooting, audits=False, gathers=False),
+        for_coarse=partial(Shooting, audits=False, coarse=True),
         unit="shots",
         remains="unshot",
         batch=BATCH,

@@ -114,12 +114,13 @@ class UiFrame:
         size = target.size
         now = None if view.still is None else (view.still, scale, size)
         if now is None or now != self._still or fresh:
-            whole = now is not None and view.session.coarse  # its texels are few: at rest they are drawn once
+            whole = view.session.coarse  # its texels are few: they are drawn once
             if (look or fresh) and not view.draw(target, size, scale=scale, whole=whole) and fresh:
                 target.clear(*theme.PANEL)
         elif look and view.samples < SAMPLES and not view.session.coarse:
             view.draw(target, size, scale=scale, add=True)
-        self._still, self.unfinished = now, now is not None and view.samples < SAMPLES
+        self._still = now
+        self.unfinished = now is not None and view.samples < SAMPLES and not view.session.coarse
 
     def frames_to_show(self, view: View) -> int:
         """How many frames it takes until a change is seen everywhere."""

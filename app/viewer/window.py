@@ -27,11 +27,12 @@ from app.viewer.keyboard import Keyboard, pyglet_keys
 from app.viewer.mouse import Mouse
 from app.viewer.saving import Pictures, save_screenshot
 from app.viewer.ui_frame import UiFrame
+from app.viewer.waiting import LOOK_PAUSE, Waiting
 
 GL_VERSION = (4, 1)
 TITLE = "Glowtree"
 AWAKE_SECONDS = 1.0  # that frames go on after the last event: tooltips appear, scroll bars settle
-LOADING_PAUSE = 0.2  # s between frames while there is only a scene to wait for, or an event: loading gets the processor
+WAITING_PAUSE = 0.2  # s between frames after an event, while there is only a scene to wait for
 REST_SECONDS = 0.5  # between two looks around at rest; an event ends the rest at once
 NOWHERE = -3.4e38  # where Dear ImGui has the mouse when it is outside the window
 BUTTONS = {1: 0, 2: 1, 3: 2}  # left, right, middle: moderngl-window to Dear ImGui
@@ -181,7 +182,8 @@ class ViewerWindow(WindowConfig):
         self._cursor: int | None = None
         self._caption = ""
         self._turns, self._pictures = Turns(), Pictures(view, ui.state)
-        self._awake_until, self._frames_due = 0.0, 0
+        self._waiting = Waiting(self._session)
+        self._awake_until, self._touched_until, self._frames_due = 0.0, 0.0, 0
         self.frames = 0  # drawn so far
         ui.use()
         platform = imgui.get_platform_io()
@@ -195,7 +197,7 @@ class ViewerWindow(WindowConfig):
             on_mouse_leave=lambda x, y: self._mouse.move(NOWHERE, NOWHERE),
             on_scale=self._on_scale,
         )
-        self._pyglet.push_handlers(**dict.fromkeys(EVENTS, self._wake))
+        self._pyglet.push_handlers(**dict.fromkeys(EVENTS, self._on_event))
 
     # -- frames --------------------------------------------------------------------------------------------------------
 
@@ -204,7 +206,9 @@ class ViewerWindow(WindowConfig):
         self.timer.start()
         try:
             while not self.wnd.is_closing:
-                if self._at_rest():
+                if self._waits():
+                    self._wait(LOOK_PAUSE)
+                elif self._at_rest():
                     self._wait(REST_SECONDS)
                 else:
                     self._next_frame()
@@ -217,9 +221,8 @@ class ViewerWindow(WindowConfig):
         self.wnd.render(now, min(elapsed, REST_SECONDS))
         if not self.wnd.is_closing:
             self.wnd.swap_buffers()
-        waiting = self._session.on_its_way is not None or self._session.compared.fetching is not None
-        if waiting and not self._session.solving and not self._session.uploading:
-            self._wait(LOADING_PAUSE)
+        if self._waiting.only:
+            self._wait(WAITING_PAUSE)
 
     def _wait(self, seconds: float) -> None:
         """For an event, at most so long."""
@@ -228,16 +231,29 @@ class ViewerWindow(WindowConfig):
         pyglet.app.platform_event_loop.step(seconds)
         self._pyglet.dispatch_events()  # the step only queued them
 
-    def _wake(self, *_: object) -> None:
+    def _on_event(self, *_: object) -> None:
+        self._touched_until = time.perf_counter() + AWAKE_SECONDS
+        self._wake()
+
+    def _wake(self) -> None:
         self._awake_until = time.perf_counter() + AWAKE_SECONDS
         self._frames_due = self._frame.frames_to_show(self._view)
 
+    def _waits(self) -> bool:
+        """Whether another frame would show no more than the last one of a scene that is on its way."""
+        return not self._moves and time.perf_counter() > self._touched_until and self._waiting.idle()
+
     def _at_rest(self) -> bool:
         """Whether another frame would look like the last one."""
-        changes = not self._session.at_rest or self._ui.moving or self._frame.unfinished or self._pictures.busy
-        if changes or self._frames_left is not None:
+        if self._moves or not self._session.at_rest:
             self._wake()
         return time.perf_counter() > self._awake_until and self._frames_due <= 0
+
+    @property
+    def _moves(self) -> bool:
+        """Whether something goes on beside the session's light, or each frame counts."""
+        moves = self._ui.moving or self._frame.unfinished or self._pictures.busy
+        return moves or self._frames_left is not None
 
     def on_render(self, time: float, frame_time: float) -> None:
         """Collect what is ready, solve within the budget, draw, do what was asked for."""
@@ -254,7 +270,7 @@ class ViewerWindow(WindowConfig):
         requests = self._frame.draw(self._view, target, size=self.wnd.size, ratio=ratio, seconds=frame_time, look=look)
         session.run.drawn()
         if self._mouse.frame():
-            self._wake()
+            self._on_event()
         self._keyboard.frame()
         self._show_cursor()
         self._show_name()

@@ -54,8 +54,9 @@ class Casters:
 def occluders_of(gpu: Gpu, lightmap: Lightmap) -> list[Occluders]:
     """All triangles of the scene: those that are opaque, and apart from them those that are not."""
     sheer = sheer_triangles(lightmap.scene)
-    opaque = np.setdiff1d(np.arange(len(lightmap.scene.triangles)), sheer)
-    kinds = ((opaque, False), (sheer, True))
+    opaque = np.ones(len(lightmap.scene.triangles), bool)
+    opaque[sheer] = False
+    kinds = ((np.flatnonzero(opaque), False), (sheer, True))
     return [Occluders(gpu, lightmap.pool, triangles, sheer=some) for triangles, some in kinds if len(triangles)]
 
 
@@ -138,8 +139,9 @@ def occluders(pool: TilePool, which: NDArray[np.int64]) -> tuple[Any, NDArray[np
     corners = scene.triangles[which]
     last = corners[:, 2]
     vertex_at = np.full(len(scene.positions), -1, np.int64)
+    vertex_at[corners] = -2
     vertex_at[last] = np.arange(count)
-    bare = np.setdiff1d(corners, last)
+    bare = np.flatnonzero(vertex_at == -2)
     vertex_at[bare] = count + np.arange(len(bare))
     vertices = np.zeros(count + len(bare), OCCLUDER)
     vertices["in_position"] = pool.space.local_from_world(scene.positions[np.concatenate([last, bare])])

@@ -26,6 +26,7 @@ from app.session import session as session_module
 from app.session.session import Session
 from app.session.view import View
 from app.solvers import ShootingOptions
+from app.solvers.run import solve_until
 from app.ui.app import Ui
 from app.util import cache
 from app.viewer.picture import picture
@@ -121,6 +122,21 @@ def test_coarse_light_appears_and_gives_way_to_better(view: View, better: thread
         frames(session, lambda: session.run.converged)
         # 10 % of light is not yet shot in either, and 200 texels follow the shadows roughly
         assert mean_irradiance(session) == pytest.approx(coarse, rel=0.1)
+
+
+def test_few_shots_show_most_of_a_lamp(gpu: Gpu, view: View, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Other light has it shoot from fifty places."""
+    session, left = view.session, []
+    monkeypatch.setattr(loading, "default_texels", lambda sides, roots: TEXELS)
+    session.open("cornell-box")
+    frames(session, lambda: session.coarse)
+    for make in (session.family.for_coarse, session.family.make):
+        assert make is not None
+        solver = make(gpu, session.lightmap, session.options)
+        solve_until(solver, 4, lambda progress: False, most=4)
+        left.append(solver.settle().remaining)
+        solver.release()
+    assert 1 - left[0] > 1.5 * (1 - left[1])  # of a lamp of 30 texels
 
 
 def test_charts_that_are_kept_need_no_coarse_light(view: View, better: threading.Event) -> None:

@@ -118,7 +118,8 @@ def test_a_picture_is_written_to_its_end_where_the_window_fails(view: View, tmp_
     while pictures.drawing:
         pictures.step()
     fail = Mock(side_effect=RuntimeError("in a frame"))
-    window = Mock(_pictures=pictures, _at_rest=lambda: False, _next_frame=fail, wnd=Mock(is_closing=False))
+    goes_on = {"_waits": lambda: False, "_at_rest": lambda: False}
+    window = Mock(_pictures=pictures, _next_frame=fail, wnd=Mock(is_closing=False), **goes_on)
     with pytest.raises(RuntimeError, match="in a frame"):
         ViewerWindow.main_loop(window)
     assert not pictures.busy and Image.open(tmp_path / "a.png").size == SIZE

@@ -29,7 +29,7 @@ from app.util.background import Progress
 from app.util.console import Console
 from app.util.tables import Column, markdown_table
 from app.viewer.ui_frame import UiFrame
-from app.viewer.window import LOADING_PAUSE
+from app.viewer.waiting import LOOK_PAUSE, Waiting
 
 RUNS = ("new", "again")
 SEEN = {"flat": "flat picture", "coarse": "coarse light", "light": "light"}
@@ -87,9 +87,14 @@ def _opened(gpu: Gpu, flags: argparse.Namespace, report: Progress) -> dict[str, 
     target, seen = gpu.target(texture), dict[str, float]()
     try:
         session.open(flags.scene, from_flags(FileOptions, flags))
+        waiting = Waiting(session)
         while "light" not in seen:
-            what = _step(session, report)
+            if waiting.idle():
+                time.sleep(LOOK_PAUSE)
+                continue
+            what = _step(view, report)
             frame.draw(view, target, size=SIZE)
+            session.run.drawn()
             gpu.ctx.finish()
             if what is not None:
                 seen.setdefault(what, time.perf_counter() - start)
@@ -107,15 +112,15 @@ def _opened(gpu: Gpu, flags: argparse.Namespace, report: Progress) -> dict[str, 
         gpu.release_all(target, texture)
 
 
-def _step(session: Session, report: Progress) -> str | None:
+def _step(view: View, report: Progress) -> str | None:
     """What a window does before each frame; which of SEEN that will show."""
+    session = view.session
     session.poll()
+    view.tell_observer()
     session.advance()
     loading = session.loading
     if loading is not None:
         report(loading.stage, loading.fraction)
-        if not session.solving and not session.uploading:
-            time.sleep(LOADING_PAUSE)
     elif session.message is not None:
         raise UserError(session.message)
     if session.opened and session.solver.issued > 0:

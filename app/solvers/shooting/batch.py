@@ -52,16 +52,17 @@ class Batch:
     phases, see, receive: follow from the options. replay: where leaves come and go.
     """
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool, gathers: bool) -> None:
+    def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool, coarse: bool) -> None:
+        """audits, coarse: as of Shooting."""
         self._gpu, self._lightmap, self.options = gpu, lightmap, options
         self.shooters, self.bins = ShooterBatch(gpu), Bins(gpu, lightmap)
         self.occluders, self.receivers = occluders_of(gpu, lightmap), Receivers(gpu, lightmap.pool)
         self.ledger = Ledger(gpu, lightmap, self.shooters)
-        self.ambient = Ambient(gpu, lightmap, self.shooters, self.ledger, shown=options.ambient, gathers=gathers)
+        self.ambient = Ambient(gpu, lightmap, self.shooters, self.ledger, shown=options.ambient, gathers=not coarse)
         equipment = Equipment(gpu, lightmap, self.occluders, self.receivers, self.shooters)
         self.outside = Outside(equipment, self.ledger)
         self.marks = PatchMarks(gpu, lightmap)
-        self.groups = EmitterGroups(lightmap, self.ledger, self.marks)
+        self.groups = EmitterGroups(lightmap, self.ledger, self.marks, coarse=coarse)
         self.auditor = Auditor(gpu, lightmap, self.shooters, self.ledger, enabled=audits)
         self.replay = None if lightmap.refinement is None else Replay(gpu, lightmap, self.shooters)
         self._make_passes()

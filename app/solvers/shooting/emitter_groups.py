@@ -15,7 +15,8 @@ from app.solvers.shooting.ledger import Ledger
 from app.solvers.shooting.patch_marks import PatchMarks
 from app.solvers.shooting.records import GROUP
 
-MOST = 0.02  # of the emitted power: emitters of more are divided, one lamp into 50 patches at least
+MOST = 0.02  # of the emitted power: emitters of more are divided, one lamp into 50 patches at least,
+COARSE_MOST = 0.2  # or 5, of which few shoot for all of them, where better light takes the place of this soon
 SETTLED = 1 / 16  # of that: groups that are off by no more may settle when others shoot as much
 MEMBERS = GROUP**2
 CONTACT = (
@@ -26,13 +27,18 @@ CONTACT = (
 class EmitterGroups:
     """How lamps are divided. settled: power that groups may be off by [stored units · solver area]."""
 
-    def __init__(self, lightmap: Lightmap, ledger: Ledger, marks: PatchMarks) -> None:
+    def __init__(self, lightmap: Lightmap, ledger: Ledger, marks: PatchMarks, *, coarse: bool) -> None:
+        """coarse: whether they are divided into few patches."""
         self._lightmap, self._ledger, self._marks = lightmap, ledger, marks
-        self.settled = 0.0
+        self._coarse, self.settled = coarse, 0.0
+
+    @property
+    def _most(self) -> float:
+        return COARSE_MOST if self._coarse else MOST
 
     def weigh(self, at_least: float = 0.0) -> None:
         """For the emitters that there are now; at_least: power that counts as much, for what is dimmed."""
-        power = SETTLED * MOST * float(self._ledger.emitted.sum()) / self._ledger.watt
+        power = SETTLED * self._most * float(self._ledger.emitted.sum()) / self._ledger.watt
         self.settled = float(np.float32(max(power, at_least)))
 
     def divide(self, phases: Phases) -> None:
@@ -43,7 +49,7 @@ class EmitterGroups:
         slots = np.flatnonzero(self._lightmap.emits.any((1, 2)))
         power = self._lightmap.emitted_power(slots)
         largest, finest = (phases.levels_of(slots, choice) for choice in (phases.now, phases.finest))
-        most = MOST * self._ledger.emitted.sum()
+        most = self._most * self._ledger.emitted.sum()
         self._marks.divide_emitters(slots, power, most, largest, finest, phases.coarser(slots))
 
     def divide_contacts(self) -> None:

@@ -47,14 +47,14 @@ class Shooting:
     """
 
     def __init__(
-        self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool = True, gathers: bool = True
+        self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool = True, coarse: bool = False
     ) -> None:
-        """audits: whether strong shots are tried before they are made; gathers: whether the ambient term is gathered, else it is
-        an even one."""
+        """audits: whether strong shots are tried before they are made; coarse: whether soon is worth more than right: lamps are
+        divided into few patches, the ambient term is an even one, and a batch is one shot."""
         self.gpu, self.lightmap, self.options = gpu, lightmap, options
-        self.batch = Batch(gpu, lightmap, options, audits=audits, gathers=gathers)
+        self.batch = Batch(gpu, lightmap, options, audits=audits, coarse=coarse)
         self._reports, self._edits, self._picture = Reports(gpu), MaterialEdits(gpu, lightmap), ItemImage(gpu)
-        self._under_way = UnderWay()
+        self._under_way, self._most = UnderWay(), 1 if coarse else BATCH
         self._leaves: Leaves | None = None
         if lightmap.refinement is not None and self.batch.replay is not None:
             self._leaves = Leaves(
@@ -75,10 +75,10 @@ class Shooting:
     # -- work ----------------------------------------------------------------------------------------------------------
 
     def work(self, amount: int, bands: int = 1) -> Generator[None, None, int]:
-        """Up to ``amount`` shots (at most BATCH), the strongest patches first, in parts. Returns how many were issued: of a
+        """Up to ``amount`` shots (at most a batch), the strongest patches first, in parts. Returns how many were issued: of a
         batch, those too weak beside its best are left for later, and not counted once ``poll`` has the report of it."""
         self._under_way.finish()
-        shots = min(amount, BATCH)
+        shots = min(amount, self._most)
         parts = self._shoot(shots, bands) if self.batch.replay is None else self._follow_leaves(shots, bands)
         return self._under_way.begin(parts)
 
