@@ -48,7 +48,7 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
     tell(0.5)
     facet = facets(points, corners, scene.material_ids, size, edges)
     if len(found.triangle):
-        found = found.only(~on_rims(places[corners], corners, facet, found))
+        found = found.only(~on_rims(places[corners], facet, edges, found))
     notes: list[str] = []
     pieces: list[Piece] = []
     loose = 0
@@ -60,7 +60,9 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
             few = f"{left:,} small surfaces are not cut where others meet them, only the {MOST_PIECES:,} largest are"
             notes.append(f"{few}: {BLEEDS}")
         found = found.only(largest)
-        pieces, loose = parted_pieces(scene, places, corners, facet, found, lambda share: tell(0.5 + 0.4 * share))
+        pieces, loose = parted_pieces(
+            scene, places, corners, facet, edges, found, lambda share: tell(0.5 + 0.4 * share)
+        )
     if loose:
         notes.append(
             f"{loose:,} thin things stand on surfaces with more than {MOST_ENDS} such, not cut there: {BLEEDS}"

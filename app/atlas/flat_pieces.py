@@ -14,9 +14,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from app.atlas.contacts import Members, covers
+from app.atlas.contacts import covers
 from app.atlas.intersections import NEAR, Contacts
-from app.atlas.sides import FLAT, distinct_rows
+from app.atlas.planes import Members, Planes
+from app.atlas.sides import FLAT, Edges, distinct_rows, runs
 from app.scene.model import F64, I32, Scene
 from app.util.background import Report
 
@@ -43,9 +44,9 @@ class Piece:
 
 
 def parted_pieces(
-    scene: Scene, places: F64, corners: I32, facet: I32, found: Contacts, report: Report
+    scene: Scene, places: F64, corners: I32, facet: I32, edges: Edges, found: Contacts, report: Report
 ) -> tuple[list[Piece], int]:
-    """The flat pieces that contacts part; how many of these lead nowhere."""
+    """The flat pieces that contacts part; how many of these lead nowhere. edges: of the triangles."""
     triangles = places[corners]
     members = Members.of(facet)
     owner = facet[found.triangle]
@@ -63,7 +64,7 @@ def parted_pieces(
     first = np.array([piece.members[0] for piece, _ in pieces], np.int64)
     own, two_sided = facet[first].astype(np.int64), scene.sides[first]
     axes = np.stack([piece.axes for piece, _ in pieces])
-    hidden = covers(places, corners, facet, scene.sides, own, axes, FLAT)
+    hidden = covers(Planes.of(places, corners, facet, scene.sides, FLAT, edges), own, axes)
     out, left = [], 0
     for nth, (piece, there) in enumerate(pieces):
         report(0.5 + 0.5 * nth / len(pieces))
@@ -84,11 +85,13 @@ def parted_pieces(
     return out, left
 
 
-def on_rims(corners: F64, triangles: I32, facet: I32, found: Contacts) -> Mask:
-    """Which contacts run along an edge of their triangle (m, 3, 3), and that at the rim of its flat piece."""
-    start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
-    _, edge, uses = distinct_rows(np.minimum(start, end), np.maximum(start, end), np.repeat(facet, 3))
-    rim = (uses[edge] == 1).reshape(-1, 3)[found.triangle]
+def on_rims(corners: F64, facet: I32, edges: Edges, found: Contacts) -> Mask:
+    """Which contacts run along an edge of their triangle (m, 3, 3), and that at the rim of its flat piece. edges: of them."""
+    half = (3 * found.triangle[:, None] + np.arange(3)).reshape(-1)
+    first, last = edges.first[edges.edge[half]], edges.first[edges.edge[half] + 1]
+    which, at = runs(first, last)
+    alike = facet[half[which] // 3] == facet[edges.order[at] // 3]
+    rim = (np.bincount(which[alike], minlength=len(half)) == 1).reshape(-1, 3)
     mine = corners[found.triangle]
     way = np.roll(mine, -1, axis=1) - mine
     way /= np.linalg.norm(way, axis=2, keepdims=True)

@@ -16,12 +16,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from app.atlas.charts import DEFAULT_TILE, Charts
-from app.atlas.contacts import Facets, hidden_pieces
+from app.atlas.contacts import hidden_pieces
 from app.atlas.enclosed import without_enclosed
 from app.atlas.layout import Layout, density_for, measured, place, scaled, texel_count
+from app.atlas.planes import Planes
 from app.atlas.rectangles import Rectangles, find_rectangles
 from app.atlas.seams import find_seams
-from app.atlas.sides import Sides, distinct_rows, facets, least, lit_sides, most, scene_size, weld
+from app.atlas.sides import Edges, Sides, distinct_rows, facets, least, lit_sides, most, scene_size, weld
 from app.atlas.triangle_cuts import GOES_ON
 from app.atlas.unwrap import unwrap
 from app.errors import UserError
@@ -69,14 +70,15 @@ def parametrize(
     try:
         sides = beside.submit(lit_sides, scene)
         points, corners = weld(scene)
+        edges = Edges.of(corners)
         if facet is None:
             report("finding flat pieces", 0.05)
-            facet = facets(points, corners, scene.material_ids, scene_size(scene))
+            facet = facets(points, corners, scene.material_ids, scene_size(scene), edges)
         report("finding sides that light can reach", 0.15)
-        flat_pieces = beside.submit(Facets.of_scene, scene, points, corners, facet)
+        planes = beside.submit(Planes.of_scene, scene, points, corners, facet, edges)
         lit = without_enclosed(sides.result(), scene, points, corners)
         layout, method, warnings = _unfold(scene, lit, points, corners, facet, ends, time_limit, report)
-        all_facets = flat_pieces.result()
+        all_planes = planes.result()
     finally:
         beside.shutdown(wait=False, cancel_futures=True)
     report("placing pieces side by side", UNFOLDED)
@@ -102,7 +104,7 @@ def parametrize(
     )
     hidden = hidden_pieces(
         scene,
-        all_facets,
+        all_planes,
         facet,
         lit.triangle,
         lit.back,
@@ -186,8 +188,13 @@ def _unfold(
         progress=lambda stage, share: report(stage, 0.3 + (UNFOLDED - 0.3) * share),
     )
     chart[rest], uv[rest] = count + unfolded.chart, unfolded.uv
-    flat = int(unfolded.chart.max(initial=-1)) + 1 - unfolded.by_xatlas
-    kinds = ((count, "rectangles"), (unfolded.by_xatlas, "xatlas charts"), (flat, "flat pieces"))
+    flat = int(unfolded.chart.max(initial=-1)) + 1 - unfolded.by_xatlas - unfolded.seen_whole
+    kinds = (
+        (count, "rectangles"),
+        (unfolded.by_xatlas, "xatlas charts"),
+        (unfolded.seen_whole, "pieces seen whole from one side"),
+        (flat, "flat pieces"),
+    )
     method = ", ".join(f"{number} {kind}" for number, kind in kinds if number)
     size = rectangles.size
     if ends is not None:

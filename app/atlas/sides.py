@@ -125,6 +125,13 @@ def numbered(label: NDArray[np.integer]) -> NDArray[np.int64]:
     return np.asarray((np.cumsum(used) - 1)[label], np.int64)
 
 
+def runs(first: NDArray[np.int64], last: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The whole numbers from each first one up to each last one, less that, one run after the other: of which run, and they."""
+    count = last - first
+    owner = np.repeat(np.arange(len(count)), count)
+    return owner, np.arange(len(owner)) + np.repeat(first - (np.cumsum(count) - count), count)
+
+
 def distinct_rows(*columns: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """One row of each kind, in sorted order: its index (d,), the kind of each row (n,), rows of each kind (d,).
 

@@ -16,21 +16,6 @@ from app.scene.model import F64
 SLIVER = 1e-9
 
 
-def edge_distances(u: F64, v: F64, winding: F64) -> tuple[F64, F64]:
-    """How far inside the edges of triangles u, v (3, n) the unit square lies at least, and at most.
-
-    Each the least over the edges, times the edge's length. Within rounding of an edge, the square counts as inside for
-    the first and as outside for the second.
-    """
-    du, dv = (np.roll(u, -1, axis=0) - u) * winding, (np.roll(v, -1, axis=0) - v) * winding
-    at_corner = dv * u - du * v
-    length = np.abs(du) + np.abs(dv)
-    slack = 0.1 * SLIVER * length * np.minimum(length.max(axis=0), 1.0)
-    least = at_corner + np.minimum(du, 0) - np.maximum(dv, 0) + slack
-    most = at_corner + np.maximum(du, 0) - np.minimum(dv, 0) - slack
-    return least.min(axis=0), most.min(axis=0)
-
-
 def area_and_centroid(pu: F64, pv: F64) -> tuple[F64, F64, F64]:
     """Area and centroid (u, v) of triangles u, v (3, n) inside the unit square, by the formulas above."""
     qu, qv = np.roll(pu, -1, axis=0), np.roll(pv, -1, axis=0)

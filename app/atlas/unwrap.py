@@ -4,8 +4,8 @@ xatlas runs in a process of its own with a time limit; its answer is cached by w
 few triangles it gives up on, every flat piece becomes a chart by itself, laid down without distortion.
 
 Surfaces of one shape are unfolded once (copies.py). What xatlas takes for a chart grows with the square of its triangles: it
-looks at all of them for each that it adds. So large surfaces have charts of about ``CHART`` triangles at most, and the largest
-are cut into pieces.
+looks at all of them for each that it adds. So large surfaces are laid flat where they are seen whole from one side
+(large_surfaces.py); others have charts of about ``CHART`` triangles at most, and the largest are cut into pieces.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.copies import find_surfaces
+from app.atlas.large_surfaces import large_surfaces, pieces, seen_whole
 from app.atlas.sides import distinct_rows, middle, totals
 from app.scene.model import F64, I32
 from app.util import cache
@@ -35,14 +36,11 @@ TIME_LIMIT_S_PER_TRIANGLE = 1e-3  # more than ten times what xatlas takes for mo
 EXPECTED_S = 1.0, 5e-5  # and for each triangle: what it takes, about
 POLL_S = 0.05
 CACHE_FILES = 64  # kept, newest first
-FORMAT = b"glowtree unwrap 3"  # changes when the worker's options or its answer do
+FORMAT = b"glowtree unwrap 4"  # changes when the worker's options or its answer do
 # Diagonal of what xatlas sees: it drops triangles smaller than 1e-7 in area, whatever the unit.
 XATLAS_SIZE = 1000.0
-LARGE = 4096  # triangles of a surface, from which on its charts are limited: one chart of as many takes xatlas a second
-CHART = (
-    1024  # triangles of a chart then, if all were of one size: of half as many, seams are seen where light is coarse
-)
-PIECE = 16384  # triangles of a surface, beyond which it is cut
+# Triangles of a chart of a large surface, if all were of one size: of half as many, seams are seen where light is coarse.
+CHART = 1024
 # A triangle squeezed to less than this share of its area, or turned over, is unusable in its chart.
 LEAST_SHARE = 1e-4
 
@@ -51,12 +49,14 @@ LEAST_SHARE = 1e-4
 class Unfolded:
     """chart (m,) i32 numbered from 0; uv (m, 3, 2) f64 [m], to scale in area, right-handed seen from the front.
 
-    by_xatlas: how many of the charts come from xatlas (they are numbered first).
+    by_xatlas: how many of the charts come from xatlas; seen_whole: how many are large surfaces as they are seen from one side.
+    Both are numbered before flat pieces.
     """
 
     chart: I32
     uv: F64
     by_xatlas: int
+    seen_whole: int
     warnings: tuple[str, ...] = ()
 
 
@@ -76,27 +76,32 @@ def unwrap(
     pieces, the charts to fall back to. time_limit [s]; by default it grows with m.
     """
     if not len(triangles):
-        return Unfolded(np.empty(0, np.int32), np.empty((0, 3, 2)), 0)
+        return Unfolded(np.empty(0, np.int32), np.empty((0, 3, 2)), 0, 0)
     warnings: list[str] = []
     surfaces = find_surfaces(points, triangles, groups)
     originals, of = np.unique(surfaces.original, return_inverse=True)
-    try:
-        chart, uv = _xatlas(
-            points, triangles[originals], groups[originals], surfaces.surface[originals], time_limit, progress
-        )
-    except _UnwrapError as failure:
-        warnings.append(f"xatlas {failure}: every flat piece is a chart of its own")
-        chart, uv = np.full(len(originals), -1, np.int32), np.zeros((len(originals), 3, 2))
+    whole, uv = seen_whole(points, triangles[originals], surfaces.surface[originals])
+    chart = np.full(len(originals), -1, np.int32)
+    curved = np.flatnonzero(whole < 0)
+    if len(curved):
+        mine = originals[curved]
+        try:
+            chart[curved], uv[curved] = _xatlas(
+                points, triangles[mine], groups[mine], surfaces.surface[mine], time_limit, progress
+            )
+        except _UnwrapError as failure:
+            warnings.append(f"xatlas {failure}: every flat piece is a chart of its own")
+    chart = np.where(whole < 0, chart, int(chart.max()) + 1 + whole)
     if len(originals) < len(triangles):
         chart, uv = _of_copies(chart[of], surfaces.surface), uv[of]
     chart, uv = _to_scale(chart, uv, corners)
-    count = int(chart.max()) + 1
+    count, laid = int(chart.max()) + 1, len(np.unique(chart[(whole >= 0)[of] & (chart >= 0)]))
     rest = np.flatnonzero(chart < 0)
     if len(rest):
         label = np.unique(facet[rest], return_inverse=True)[1].astype(np.int32)
         chart[rest] = count + label
         uv[rest] = _laid_flat(corners[rest], label)
-    return Unfolded(chart, uv, count, tuple(warnings))
+    return Unfolded(chart, uv, count - laid, laid, tuple(warnings))
 
 
 class _UnwrapError(Exception):
@@ -154,39 +159,24 @@ def _meshes(corners: F64, groups: I32, surface: NDArray[np.int64]) -> tuple[I32,
 
     Small surfaces of a group are a mesh together, to no other scale, and their charts as large as xatlas likes.
     """
-    large = np.flatnonzero(np.bincount(surface)[surface] > LARGE)
+    large = large_surfaces(surface)
     mesh = np.unique(groups, return_inverse=True)[1].astype(np.int32)
-    if not len(large):
+    if not large:
         return mesh, np.ones(int(mesh.max()) + 1, np.float32), 0.0
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    most_area = max(float(area.sum() - area[large].sum()), 1.0)
-    pieces, centre = [], middle(corners)
-    for rows in np.split(large[np.argsort(surface[large], kind="stable")], np.cumsum(np.bincount(surface[large]))[:-1]):
-        if len(rows):
-            pieces += _pieces(centre, rows)
+    most_area = max(float(area.sum() - sum(area[rows].sum() for rows in large)), 1.0)
+    centre = middle(corners)
+    parts = [part for rows in large for part in pieces(centre, rows)]
     number = int(mesh.max()) + 1
-    for k, rows in enumerate(pieces):
+    for k, rows in enumerate(parts):
         mesh[rows] = number + k
     mesh = np.unique(mesh, return_inverse=True)[1].astype(np.int32)
     scale = np.ones(int(mesh.max()) + 1)
-    for rows in pieces:
+    for rows in parts:
         scale[mesh[rows[0]]] = np.sqrt(
             most_area / CHART * len(rows) / max(float(area[rows].sum()), np.finfo(float).tiny)
         )
     return mesh, scale.astype(np.float32), most_area
-
-
-def _pieces(centre: F64, rows: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Triangles cut in two, halfway along the longest extent of their centres (m, 3), until none is larger than PIECE."""
-    if len(rows) <= PIECE:
-        return [rows]
-    along = centre[rows, np.ptp(centre[rows], axis=0).argmax()]
-    order = np.argsort(along, kind="stable")
-    middle = len(rows) // 2
-    return [
-        *_pieces(centre, np.sort(rows[order[:middle]])),
-        *_pieces(centre, np.sort(rows[order[middle:]])),
-    ]
 
 
 def _run_worker(source: Path, target: Path, time_limit: float, triangles: int, progress: Progress | None) -> None:

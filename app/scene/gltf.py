@@ -135,13 +135,14 @@ class GltfReader:
         self._shapes: dict[tuple[int, int | None, tuple[float, ...]], list[Shape]] = {}
         self._triangle_count = 0
         self.unpainted = 0  # primitives without material
-        self._not_triangles = self._skinned = self._not_pinholes = 0
+        self._not_triangles = self._skinned = self._not_pinholes = self._faded = 0
 
     def warnings(self) -> list[str]:
         notes = [
             (self._not_triangles, "primitive", "primitives", "without triangles left out"),
             (self.unpainted, "primitive", "primitives", "without material: grey with albedo 0.5"),
             (self._skinned, "skinned mesh", "skinned meshes", "without joints in the scene: shown without pose"),
+            (self._faded, "primitive", "primitives", "with alpha of vertices: not seen through"),
             (self._not_pinholes, "camera", "cameras", "without perspective left out"),
         ]
         return [f"{counted(n, one, many)} {text}" for n, one, many, text in notes if n]
@@ -215,7 +216,7 @@ class GltfReader:
         attributes = node.extensions.instancing.attributes
         kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
         values = {name: self.file.accessor(attributes[name], kinds[name]) for name in kinds if name in attributes}
-        counts = {len(v) for v in values.values()}
+        counts = {self.file.pick(self.file.document.accessors, i, "accessor").count for i in attributes.values()}
         if len(counts) != 1:
             raise self.file.error("EXT_mesh_gpu_instancing: the attributes need the same number of elements")
         k = counts.pop()
@@ -262,8 +263,10 @@ class GltfReader:
         if primitive.material is None:
             self.unpainted += 1
         else:
-            self.file.pick(self.file.document.materials, primitive.material, "material")
+            painted = self.file.pick(self.file.document.materials, primitive.material, "material")
             self.used_materials.add(primitive.material)
+            alpha = values[-1][:, 3:] if values[-1] is not None and painted.alpha_mode != "OPAQUE" else np.ones(1)
+            self._faded += bool(alpha.min(initial=1.0) < 1.0)
         positions = morphed(self.file, primitive, weights, "POSITION", positions, where)
         uv0, uv1, normals, colours = values
         if normals is not None:

@@ -3,8 +3,8 @@
 The albedo is the base colour as it stands, also of metals: without a mirror term, what a metal reflects leaves
 diffusely. Emission is emissiveFactor × emissiveStrength [W/(sr m²)] × texture. Opacity is the alpha of the base colour, unless
 alphaMode is OPAQUE, times 1 - transmission (KHR_materials_transmission), whose tint is ignored. Roughness, normal maps and the
-alpha of vertices have no effect. A picture that cannot be read counts as white, so the factor alone is used; where the file gives
-no base colour factor either, the albedo is 0.5.
+alpha of vertices have no effect. A picture that cannot be read counts as white, so the factor alone is used; where that is white,
+too, the albedo is 0.5.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from app.scene.gltf_file import GltfFile
 from app.scene.gltf_schema import Image, TextureInfo, TextureTransform
 from app.scene.gltf_schema import Material as GltfMaterial
 from app.scene.gltf_schema import Texture as GltfTexture
-from app.scene.images import ImageError, read_channel, read_image
+from app.scene.images import ImageError, read_channel, read_image, without_pictures
 from app.scene.model import F32, F64, RGB, Material, Texture
 from app.util.words import counted
 
@@ -52,15 +52,22 @@ class _Reader:
         self._far_texcoords = 0
 
     def warnings(self, used: list[GltfMaterial]) -> list[str]:
-        missing = sum(pixels is None for pixels in self._pixels.values())
+        images = self.file.document.images
+        missing = [
+            (images[i].uri if (images[i].uri or "data:")[:5] != "data:" else None) or images[i].name or f"image {i}"
+            for i, pixels in self._pixels.items()
+            if pixels is None
+        ]
         unlit = sum(m.extensions.unlit is not None for m in used)
         notes = [
-            (missing, "picture", "pictures", "could not be read: the material's factor is used"),
             (self._without_picture, "texture", "textures", "without a picture that can be read: ignored"),
             (self._far_texcoords, "texture", "textures", "with TEXCOORD_2 or higher: ignored"),
             (unlit, "unlit material", "unlit materials", "treated as diffuse"),
         ]
-        return [f"{counted(n, one, many)} {text}" for n, one, many, text in notes if n]
+        lost = (
+            [f"{without_pictures(missing)}: the material's factor is used, or albedo 0.5 without it"] if missing else []
+        )
+        return lost + [f"{counted(n, one, many)} {text}" for n, one, many, text in notes if n]
 
     def material(self, index: int, source: GltfMaterial) -> Material:
         rough, gloss = source.pbr_metallic_roughness, source.extensions.specular_glossiness
@@ -69,7 +76,7 @@ class _Reader:
             factor, info = gloss.diffuse_factor, gloss.diffuse_texture
         albedo_texture = self._texture(info)
         r, g, b, alpha = factor or (1.0, 1.0, 1.0, 1.0)
-        lost = info is not None and albedo_texture is None and factor is None
+        lost = info is not None and albedo_texture is None and min(r, g, b) >= 1.0  # white stands for its picture
         strength = source.extensions.emissive_strength
         k = 1.0 if strength is None else strength.emissive_strength
         er, eg, eb = source.emissive_factor

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import urllib.parse
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,13 +17,21 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from app.scene.model import F32
+from app.util.words import counted
 
+NAMES_SHOWN = 3  # of pictures that are missing
 MAX_SIDE = 2048  # px; diffuse light is blind to finer detail, and a 4096² picture of floats takes 200 MB
 MAX_PIXELS = 16384 * 16384  # larger pictures are not decoded at all
 
 
 class ImageError(ValueError):
     """A picture that is missing, broken or too large; the caller counts it and goes on without."""
+
+
+def without_pictures(names: Sequence[str]) -> str:
+    """That these could not be read, for a note."""
+    shown = ", ".join(f"'{name}'" for name in names[:NAMES_SHOWN]) + (", ..." if len(names) > NAMES_SHOWN else "")
+    return f"{counted(len(names), 'picture', 'pictures')} could not be read ({shown})"
 
 
 def linear_from_srgb(srgb: F32) -> F32:
@@ -97,16 +105,28 @@ def _shrunk(pixels: F32) -> F32:
 
 
 def path_inside(folder: Path, uri: str) -> Path | None:
-    """The existing file that a relative reference means, or None if there is none inside ``folder``.
+    """The file that a relative reference means, or None if there is none inside ``folder``. Percent signs are decoded."""
+    return file_inside(folder, folder, urllib.parse.unquote(uri))
 
-    Percent signs are decoded and backslashes accepted; absolute paths, other schemes and ways out lead nowhere.
+
+def file_inside(root: Path, folder: Path, name: str) -> Path | None:
+    """The file that a path from ``folder`` means, in any case, or None if there is none inside ``root``.
+
+    Backslashes are accepted; absolute paths, other schemes and ways out lead nowhere.
     """
-    text = urllib.parse.unquote(uri).replace("\\", "/").strip()
+    text = name.replace("\\", "/").strip()
     if not text or "\0" in text or ":" in text or text.startswith("/"):
         return None
     try:
-        root = folder.resolve()
-        path = (root / text).resolve()
-        return path if path.is_relative_to(root) and path.is_file() else None
-    except OSError:  # a name too long for the file system
+        inside, at = root.resolve(), folder.resolve()
+        for part in text.split("/"):
+            step = (at / part).resolve()
+            if not step.exists():
+                alike = [entry for entry in sorted(at.iterdir()) if entry.name.casefold() == part.casefold()]
+                step = alike[0] if alike else step
+            at = step
+            if not at.is_relative_to(inside):
+                return None
+        return at if at.is_file() else None
+    except OSError:  # a name too long for the file system, or a file where a folder should be
         return None

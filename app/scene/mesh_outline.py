@@ -16,22 +16,15 @@ from app.scene.meshfile import PICTURE, TEXTURE_LINE
 from app.scene.model import F64, Material
 from app.scene.mtl import read_materials, unquoted
 from app.scene.outline import Outline, colour_textures
+from app.scene.ply import COLOURS, ORDERS, Element, header
+from app.scene.text import decoded
 
+COLOUR_NAMES = [names[0] for names in COLOURS]
 SOME = 4096  # faces and vertices that are looked at, of each
 BLOCK = 1 << 26  # bytes in work at a time
 LONGEST = 1 << 12  # bytes of a line, or of two facets in text
 HEADER_BYTES = 1 << 16  # of a PLY file
 STL_HEADER, STL_BYTES = 84, 50  # of a binary file, and of each of its triangles
-TYPES = {
-    **{name: "i1" for name in ("char", "int8")},
-    **{name: "u1" for name in ("uchar", "uint8")},
-    **{name: "i2" for name in ("short", "int16")},
-    **{name: "u2" for name in ("ushort", "uint16")},
-    **{name: "i4" for name in ("int", "int32")},
-    **{name: "u4" for name in ("uint", "uint32")},
-    **{name: "f4" for name in ("float", "float32")},
-    **{name: "f8" for name in ("double", "float64")},
-}
 GOLDEN = (5**0.5 - 1) / 2
 VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
 
@@ -119,7 +112,7 @@ def _obj(path: Path, data: Bytes, most: int) -> Outline | None:
 def _names(data: Bytes, starts: Ints, key: str) -> Iterator[str]:
     """What stands behind a key in the lines that begin with it."""
     for at in starts.tolist():
-        word, _, name = _line(data, at).decode("utf-8", "replace").partition(" ")
+        word, _, name = decoded(_line(data, at)).partition(" ")
         if word == key:
             yield unquoted(name)
 
@@ -127,59 +120,22 @@ def _names(data: Bytes, starts: Ints, key: str) -> Iterator[str]:
 # -- PLY ---------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Element:
-    """Of a PLY file: its name, how many there are, and its properties: name, type, and of a list the type of its length."""
-
-    name: str
-    count: int
-    properties: tuple[tuple[str, str, str | None], ...]
-
-    def dtype(self, order: str, length: int = 0) -> np.dtype[np.void]:
-        """As it lies in the file, with lists of that length."""
-        fields: list[tuple[str, str] | tuple[str, str, int]] = []
-        for name, kind, counted in self.properties:
-            if counted is None:
-                fields.append((name, order + kind))
-            else:
-                fields += [(f"{name} length", order + counted), (name, order + kind, length)]
-        return np.dtype(fields)
-
-
 def _ply(path: Path, data: Bytes, most: int) -> Outline | None:
-    header = data[:HEADER_BYTES].tobytes()
-    head, end, _ = header.partition(b"end_header")
-    body = header.index(b"\n", len(head)) + 1
-    kind, elements = _elements(head.decode("ascii", "replace"))
+    head = data[:HEADER_BYTES].tobytes()
+    kind, elements, body = header(head)
     vertex, face = elements[:2]
-    if not end or (vertex.name, face.name) != ("vertex", "face") or face.count <= most / 2:
+    if (vertex.name, face.name) != ("vertex", "face") or face.count <= most / 2:
         return None
     found = _ply_text(data, body, vertex, face) if kind == "ascii" else _ply_binary(data, body, kind, vertex, face)
     if found.triangles <= most:
         return None
-    coloured = any(name == "red" for element in (vertex, face) for name, _, _ in element.properties)
-    notes = [PICTURE] if TEXTURE_LINE in head else []
+    coloured = any(name in COLOUR_NAMES for element in (vertex, face) for name, _, _ in element.properties)
+    notes = [PICTURE] if TEXTURE_LINE in head[:body] else []
     return found.outline(path, [Material(path.stem)], coloured=coloured, warnings=notes)
 
 
-def _elements(head: str) -> tuple[str, list[_Element]]:
-    """The format, and the elements in their order."""
-    kind, elements = "", list[_Element]()
-    for words in map(str.split, head.splitlines()):
-        if words[:1] == ["format"]:
-            kind = words[1]
-        elif words[:1] == ["element"]:
-            elements.append(_Element(words[1], int(words[2]), ()))
-        elif words[:1] == ["property"]:
-            last = elements[-1]
-            types = [TYPES[word] for word in words[1:-1] if word != "list"]
-            one = (words[-1], types[-1], types[0] if len(types) > 1 else None)
-            elements[-1] = _Element(last.name, last.count, (*last.properties, one))
-    return kind, elements
-
-
-def _ply_binary(data: Bytes, body: int, kind: str, vertex: _Element, face: _Element) -> _Found:
-    order = {"binary_little_endian": "<", "binary_big_endian": ">"}[kind]
+def _ply_binary(data: Bytes, body: int, kind: str, vertex: Element, face: Element) -> _Found:
+    order = ORDERS[kind]
     corners = next(name for name, _, counted in face.properties if counted is not None)
     layout = vertex.dtype(order)
     begin = body + vertex.count * layout.itemsize
@@ -200,7 +156,7 @@ def _ply_binary(data: Bytes, body: int, kind: str, vertex: _Element, face: _Elem
     return _Found(face.count, rings, points)
 
 
-def _ply_text(data: Bytes, body: int, vertex: _Element, face: _Element) -> _Found:
+def _ply_text(data: Bytes, body: int, vertex: Element, face: Element) -> _Found:
     starts = _lines(data[body:]) + body
     vertices, faces = starts[: vertex.count], starts[vertex.count : vertex.count + face.count]
     columns = [[name for name, _, _ in vertex.properties].index(axis) for axis in "xyz"]

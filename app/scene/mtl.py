@@ -1,9 +1,10 @@
 """Wavefront MTL: the materials of an OBJ file, wherever and however exporters write them.
 
-Read: Kd as albedo, Ke as radiance L like glTF's emission, d or else 1 - Tr as opacity, map_Kd and, times the opacity, map_d as
-pictures inside the scene's folder. File names are met in any case, with backslashes, in quotes, or as a path of another machine
-whose last part lies beside the material library. The format has no flag for it, so every surface is double-sided. Albedo is 0.5
-where a material is missing, or has a picture that is and no Kd.
+Read: Kd as albedo, Ke as radiance L like glTF's emission, d or else 1 - Tr as opacity, map_Kd, map_Ke and, times the opacity,
+map_d as pictures inside the scene's folder, with their options -s, -o and -clamp. A filter Tf is only noted: programs write it
+for opaque surfaces, too. File names are met in any case, with backslashes, in quotes, or as a path of another machine whose last
+part lies beside the material library. The format has no flag for it, so every surface is double-sided. Albedo is 0.5 where a
+material is missing, or has a picture that is and no Kd.
 """
 
 from __future__ import annotations
@@ -13,13 +14,23 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
+
 from app.errors import SceneError
-from app.scene.images import ImageError, read_channel, read_image
+from app.scene.images import ImageError, file_inside, read_channel, read_image, without_pictures
 from app.scene.model import F32, RGB, Material, Texture
+from app.scene.text import decoded
 from app.util.words import counted
 
 WHITE: RGB = (1.0, 1.0, 1.0)
-NAMES_SHOWN = 3  # of pictures that are missing
+MAPS = "map_kd", "map_ke", "map_d"
+PLACING = {
+    "-o": (0.0, 0.0),
+    "-s": (1.0, 1.0),
+    "-t": (0.0, 0.0),
+}  # options of maps with up to three numbers, here two, and what
+# they are unless given: offset, scale, turbulence
+OPTION_WORDS = {"-mm": 2}  # that follow other options; else one
 LIBRARIES = re.compile(r'"([^"]+)"|(\S.*?\.mtl)(?=\s|$)|(\S+)', re.IGNORECASE)  # names may hold blanks
 
 Lines = dict[str, str]  # of one material, by lower-case key
@@ -45,11 +56,14 @@ def read_materials(
     if unknown:
         instead = "the colours of their vertices are used" if coloured else "grey with albedo 0.5"
         notes.append(f"{counted(unknown, 'material is', 'materials are')} not defined: {instead}")
-    lost = [f"'{file}'" for (_, _, file), pixels in pictures.items() if pixels is None]
+    filtered = sum(name in known and _only_filters(known[name]) for name in map(lambda n: _named(n, known), names))
+    if filtered:
+        notes.append(
+            f"{counted(filtered, 'material', 'materials')} with a filter (Tf) and without opacity (d, Tr): opaque"
+        )
+    lost = [file for (_, _, file), pixels in pictures.items() if pixels is None]
     if lost:
-        shown = ", ".join(lost[:NAMES_SHOWN]) + (", ..." if len(lost) > NAMES_SHOWN else "")
-        what = counted(len(lost), "picture", "pictures")
-        notes.append(f"{what} could not be read ({shown}): Kd is used, or albedo 0.5 without it")
+        notes.append(f"{without_pictures(lost)}: Kd is used, or albedo 0.5 without it")
     return materials, notes
 
 
@@ -76,10 +90,10 @@ def _read_libraries(path: Path, libraries: list[str]) -> tuple[dict[str, Lines],
     folders: dict[str, Path] = {}
     notes = []
     for line in dict.fromkeys(libraries):
-        whole = _found(path.parent, path.parent, unquoted(line))
+        whole = file_inside(path.parent, path.parent, unquoted(line))
         listed = [line] if whole else [next(filter(None, groups)) for groups in LIBRARIES.findall(line)]
         for name in listed:
-            found = whole or _found(path.parent, path.parent, name)
+            found = whole or file_inside(path.parent, path.parent, name)
             if found is None:
                 notes.append(f"material library '{name}' is missing")
                 continue
@@ -94,10 +108,10 @@ def _read_mtl(path: Path, library: Path) -> dict[str, Lines]:
     materials: dict[str, Lines] = {}
     current: Lines = {}
     try:
-        text = library.read_text("utf-8-sig", errors="replace")
+        text = decoded(library.read_bytes())
     except OSError as error:
         raise SceneError(path, f"{library.name} cannot be read: {error.strerror}") from error
-    for line in text.splitlines():
+    for line in text.split("\n"):
         key, rest = (*line.split(None, 1), "", "")[:2]
         if key.lower() == "newmtl":
             current = materials.setdefault(unquoted(rest), {})
@@ -118,30 +132,50 @@ def _material(path: Path, folder: Path, name: str, lines: Lines, pictures: Pictu
         material = dataclasses.replace(material, opacity=_number(path, name, "d", lines["d"].split()[-1]))
     elif "tr" in lines:
         material = dataclasses.replace(material, opacity=1.0 - _number(path, name, "Tr", lines["tr"]))
-    if "map_d" in lines:
-        cut_out = _texture(path.parent, folder, "map_d", lines["map_d"], pictures)
-        material = dataclasses.replace(material, opacity_texture=cut_out)
-    texture = _texture(path.parent, folder, "map_kd", lines["map_kd"], pictures) if "map_kd" in lines else None
-    if texture is None:
-        return material
-    albedo = material.albedo if "kd" in lines else WHITE
-    return dataclasses.replace(material, albedo=albedo, albedo_texture=texture)
+    textures = {key: _texture(path.parent, folder, key, lines[key], pictures) for key in MAPS if key in lines}
+    if "map_d" in textures:
+        material = dataclasses.replace(material, opacity_texture=textures["map_d"])
+    if textures.get("map_ke") is not None:
+        emission = material.emission if "ke" in lines else WHITE
+        material = dataclasses.replace(material, emission=emission, emission_texture=textures["map_ke"])
+    if textures.get("map_kd") is not None:
+        albedo = material.albedo if "kd" in lines else WHITE
+        material = dataclasses.replace(material, albedo=albedo, albedo_texture=textures["map_kd"])
+    return material
+
+
+def _only_filters(lines: Lines) -> bool:
+    """Whether a material says what light it lets pass by its filter alone."""
+    words = [] if "d" in lines or "tr" in lines else lines.get("tf", "").split()
+    return bool(words) and any(word.replace(".", "", 1).isdigit() and float(word) != 1.0 for word in words)
 
 
 def _texture(root: Path, folder: Path, key: str, text: str, pictures: Pictures) -> Texture | None:
     """The picture of a map line; of map_d its alpha, or else its red."""
-    file = _file_of_map(text)
+    file, options = _map_options(text)
     if (key, folder, file) not in pictures:
         pictures[key, folder, file] = _pixels(root, folder, key, file)
     pixels = pictures[key, folder, file]
-    return None if pixels is None else Texture(file, pixels)
+    if pixels is None:
+        return None
+    (across, up), (right, above) = (_numbers(options, option) for option in ("-s", "-o"))
+    # u across + right, and so of v, which counts from the bottom there, from the top here
+    placing = np.array([[across, 0.0, right], [0.0, up, 1.0 - up - above]])
+    wrap = "clamp" if options.get("-clamp") == ["on"] else "repeat"
+    return Texture(file, pixels, wrap=(wrap, wrap), uv_transform=placing)
+
+
+def _numbers(options: dict[str, list[str]], option: str) -> tuple[float, float]:
+    """The first two numbers of an option, or as many as there are."""
+    given, (first, second) = [float(word) for word in options.get(option, [])], PLACING[option]
+    return (given[0] if given else first, given[1] if len(given) > 1 else second)
 
 
 def _pixels(root: Path, folder: Path, key: str, file: str) -> F32 | None:
     """The picture as it is named in ``folder`` or in the scene's, or without its own folders; None if there is none to read."""
     last = re.split(r"[/\\:]", file)[-1]
     for place, name in ((folder, file), (root, file), (folder, last), (root, last)):
-        found = _found(root, place, name)
+        found = file_inside(root, place, name)
         if found is not None:
             try:
                 if key != "map_d":
@@ -151,26 +185,6 @@ def _pixels(root: Path, folder: Path, key: str, file: str) -> F32 | None:
             except ImageError:
                 return None
     return None
-
-
-def _found(root: Path, folder: Path, name: str) -> Path | None:
-    """The file that a path from ``folder`` means, in any case, or None if there is none inside ``root``."""
-    text = name.replace("\\", "/").strip()
-    if not text or "\0" in text or ":" in text or text.startswith("/"):
-        return None
-    try:
-        inside, at = root.resolve(), folder.resolve()
-        for part in text.split("/"):
-            step = (at / part).resolve()
-            if not step.exists():
-                alike = [entry for entry in sorted(at.iterdir()) if entry.name.casefold() == part.casefold()]
-                step = alike[0] if alike else step
-            at = step
-            if not at.is_relative_to(inside):
-                return None
-        return at if at.is_file() else None
-    except OSError:  # a name too long for the file system, or a file where a folder should be
-        return None
 
 
 def _number(path: Path, material: str, key: str, text: str) -> float:
@@ -188,18 +202,25 @@ def _colour(path: Path, material: str, key: str, text: str) -> RGB:
     return (values[0], values[1], values[2])
 
 
-def _file_of_map(text: str) -> str:
-    """The file name after the options of a map line (-s 1 1 1 and the like: numbers, on or off)."""
-    words = text.split()
+def _map_options(text: str) -> tuple[str, dict[str, list[str]]]:
+    """The file name of a map line, and the options before it with their words."""
+    words, options, k = text.split(), dict[str, list[str]](), 0
     if not words[0].startswith("-"):
-        return unquoted(text)
-    k = 0
+        return unquoted(text), {}
     while k < len(words) - 1 and words[k].startswith("-"):
-        k += 1
-        while k < len(words) - 1 and _is_option_value(words[k]):
-            k += 1
-    return unquoted(" ".join(words[k:]))
+        option, start = words[k].lower(), k + 1
+        k = start
+        if option in PLACING:
+            while k < min(start + 3, len(words) - 1) and _is_number(words[k]):
+                k += 1
+        else:
+            k = min(start + OPTION_WORDS.get(option, 1), len(words) - 1)
+        options[option] = words[start:k]
+    return unquoted(" ".join(words[k:])), options
 
 
-def _is_option_value(word: str) -> bool:
-    return word in ("on", "off") or word.lstrip("-+").replace(".", "", 1).replace("e", "", 1).isdigit()
+def _is_number(word: str) -> bool:
+    try:
+        return math.isfinite(float(word))
+    except ValueError:
+        return False

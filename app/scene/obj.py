@@ -10,14 +10,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import mapbox_earcut
 import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import SceneError
 from app.scene.images import linear_from_srgb
-from app.scene.model import F64, Scene
+from app.scene.model import Scene
 from app.scene.mtl import read_materials, unquoted
+from app.scene.polygons import with_ears_clipped
+from app.scene.text import decoded
 from app.scene.validate import Part, check_triangle_count, validate
 from app.util.background import Report, share_of, unheard
 
@@ -44,7 +45,7 @@ class _Mesh:
 def load_obj(path: Path, report: Report = unheard) -> Scene:
     """Read an .obj file with its .mtl files. report: as of ``load_meshfile``. SceneError for anything that makes it unusable."""
     try:
-        text = path.read_text("utf-8-sig", errors="replace")
+        text = decoded(path.read_bytes())
     except OSError as error:
         raise SceneError(path, f"cannot be read: {error.strerror}") from error
     mesh = _read_lines(path, text, share_of(report, 0.0, 0.5))
@@ -64,7 +65,7 @@ def load_obj(path: Path, report: Report = unheard) -> Scene:
             raise SceneError(path, f"{kind} index {index} is out of range: there are {len(table)}")
         if kind == "v":
             positions = table
-            corners, of = _with_ears_clipped(positions, corners, fans)
+            corners, of = with_ears_clipped(positions, corners, fans)
             object_ids, material_ids = object_ids[of], material_ids[of]
         elif (corners[:, column] < 0).all():
             values[kind] = None
@@ -92,7 +93,7 @@ def load_obj(path: Path, report: Report = unheard) -> Scene:
 def _read_lines(path: Path, text: str, report: Report) -> _Mesh:
     mesh = _Mesh()
     object_name, material_name = path.stem, ""
-    lines = text.replace("\\\n", " ").splitlines()
+    lines = text.replace("\\\n", " ").split("\n")
     for number, line in enumerate(lines, 1):
         if number % OFTEN == 1:
             report(number / len(lines))
@@ -174,48 +175,3 @@ def _colours(mesh: _Mesh) -> NDArray[np.float32] | None:
     srgb = np.full((len(mesh.numbers["v"]) // KINDS["v"], 3), np.nan, np.float32)
     srgb[list(mesh.colours)] = list(mesh.colours.values())
     return linear_from_srgb(srgb)
-
-
-def _with_ears_clipped(
-    positions: F64, corners: NDArray[np.int64], fans: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The corners (3m, 3) with other triangles in place of those fans that leave their face, and of each triangle which of the
-    given ones it is or has its face in common with.
-
-    fans: triangles of each face. A fan that leaves its face, which is concave then, folds over itself: one of its triangles turns
-    its back on the face's normal, which is the sum of theirs.
-    """
-    triangles = corners.reshape(-1, 3, 3)
-    many = fans > 1
-    if not many.any():
-        return corners, np.arange(len(triangles))
-    face = np.repeat(np.arange(len(fans)), fans)
-    a, b, c = np.moveaxis(positions[triangles[..., 0]], 1, 0)
-    cross = np.cross(b - a, c - a)
-    normals = np.stack([np.bincount(face, cross[:, k], len(fans)) for k in range(3)], axis=1)
-    turned = (cross * normals[face]).sum(axis=1) < 0.0
-    rows, of, done = [], [], 0
-    starts = np.cumsum(fans) - fans
-    for f in np.flatnonzero(many & (np.bincount(face, turned, len(fans)) > 0)).tolist():
-        start, stop = int(starts[f]), int(starts[f] + fans[f])
-        ring = np.concatenate([triangles[start, :2], triangles[start:stop, 2]])
-        clipped = _ears(positions[ring[:, 0]], normals[f])
-        if len(clipped) == 0:  # a face that has no area to clip
-            continue
-        rows += [triangles[done:start], ring[clipped]]
-        of += [np.arange(done, start), np.full(len(clipped), start)]
-        done = stop
-    rows.append(triangles[done:])
-    of.append(np.arange(done, len(triangles)))
-    return np.concatenate(rows).reshape(-1, 3), np.concatenate(of)
-
-
-def _ears(ring: F64, normal: F64) -> NDArray[np.int64]:
-    """(k, 3) corners of the triangles of a face with these corners (n, 3), each as the face winds about ``normal``."""
-    drop = int(np.argmax(np.abs(normal)))  # the axis along which the face looks largest
-    flat = np.ascontiguousarray(np.delete(ring, drop, axis=1))
-    triangles = np.asarray(mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], np.uint32)), np.int64)
-    triangles = triangles.reshape(-1, 3)
-    a, b, c = np.moveaxis(ring[triangles], 1, 0)
-    turned = (np.cross(b - a, c - a) * normal).sum(axis=1) < 0.0
-    return np.where(turned[:, None], triangles[:, ::-1], triangles)

@@ -15,15 +15,18 @@ SUFFIXES = (".hdr", ".exr")
 MOST_WIDTH = 2048  # px; larger ones are averaged down, so that their light stays
 MOST_PIXELS = 16384 * 8192
 FLAT, SCANLINE = 4, (8, 0x7FFF)  # bytes of a pixel; widths of scanlines that may be compressed [Ward94]
+EXPOSURE = re.compile(rb"^EXPOSURE\s*=\s*([-+.0-9eE]+)", re.MULTILINE)
 
 
 def read_sky_image(path: Path) -> F32:
-    """(h, w, 3) f32, its first row around the zenith. What is negative or not finite is 0. ImageError if unusable."""
+    """(h, w, 3) f32, its first row around the zenith. What is infinite, since half floats end before a sun does, is as bright as
+    they can be, or as the brightest pixel; what is negative or no number is 0. ImageError if unusable."""
     try:
         pixels = _exr(path) if path.suffix.lower() == ".exr" else radiance_hdr(path.read_bytes())
     except (OSError, RuntimeError, ValueError, KeyError, IndexError, TypeError, MemoryError) as error:
         raise ImageError(str(error) or "broken") from error
-    pixels = np.where(np.isfinite(pixels) & (pixels > 0), pixels, np.float32(0))
+    most = max(float(pixels[np.isfinite(pixels)].max(initial=0)), float(np.finfo(np.float16).max))
+    pixels = np.nan_to_num(np.maximum(pixels, np.float32(0)), nan=0.0, posinf=most)
     height, width, _ = pixels.shape
     if abs(width - 2 * height) > 2:
         raise ImageError(f"{width}×{height} pixels: a map of all directions is twice as wide as high")
@@ -44,7 +47,8 @@ def _exr(path: Path) -> F32:
 
 
 def radiance_hdr(data: bytes) -> F32:
-    """A Radiance picture, RGBE, whose scanlines are flat or compressed run by run [Ward94]. ValueError if it is none."""
+    """A Radiance picture, RGBE, whose scanlines are flat or compressed run by run, of today or of old, divided by its exposures
+    [Ward94]. ValueError if it is none."""
     header, _, rest = data.partition(b"\n\n")
     line, _, body = rest.partition(b"\n")
     size = re.fullmatch(rb"-Y (\d{1,5}) \+X (\d{1,5})", line.strip())
@@ -60,14 +64,46 @@ def radiance_hdr(data: bytes) -> F32:
     at = 0
     for row in range(height):
         head = packed[at : at + FLAT].tolist()
-        if SCANLINE[0] <= width <= SCANLINE[1] and head[:3] == [2, 2, width >> 8] and head[3] == width & 255:
-            at = _scanline(packed, at + FLAT, rgbe[row])
-        else:
-            rgbe[row] = packed[at : at + FLAT * width].reshape(width, FLAT)
-            at += FLAT * width
+        try:
+            if SCANLINE[0] <= width <= SCANLINE[1] and head[:3] == [2, 2, width >> 8] and head[3] == width & 255:
+                at = _scanline(packed, at + FLAT, rgbe[row])
+            else:
+                at = _old_scanline(packed, at, rgbe[row])
+        except IndexError as error:
+            raise ValueError(f"it ends within row {row + 1} of {height}") from error
     exponent = rgbe[..., 3:].astype(np.int32) - (128 + 8)
     light = np.ldexp(rgbe[..., :3].astype(np.float32) + np.float32(0.5), exponent)
-    return np.asarray(np.where(rgbe[..., 3:] > 0, light, 0), np.float32)
+    exposure = np.prod([float(value) for value in EXPOSURE.findall(header)])
+    if not 0 < exposure < np.inf:
+        raise ValueError(f"its exposure is {exposure:g}")
+    return np.asarray(np.where(rgbe[..., 3:] > 0, light / exposure, 0), np.float32)
+
+
+def _old_scanline(
+    packed: np.ndarray[tuple[int, ...], np.dtype[np.uint8]],
+    at: int,
+    row: np.ndarray[tuple[int, ...], np.dtype[np.uint8]],
+) -> int:
+    """Unpack a scanline of whole pixels, where (1, 1, 1, n) repeats the one before n times, and 256 n times where another such
+    follows; where the next one begins."""
+    width, filled, shift = len(row), 0, 0
+    flat = packed[at : at + FLAT * width]
+    if len(flat) == FLAT * width and not (flat.reshape(width, FLAT)[:, :3] == 1).all(axis=1).any():
+        row[:] = flat.reshape(width, FLAT)
+        return at + FLAT * width
+    while filled < width:
+        r, g, b, n = (int(packed[at + k]) for k in range(FLAT))
+        at += FLAT
+        if (r, g, b) != (1, 1, 1):
+            row[filled] = r, g, b, n
+            filled, shift = filled + 1, 0
+            continue
+        count = n << shift
+        if filled == 0 or filled + count > width:
+            raise ValueError("a scanline is broken")
+        row[filled : filled + count] = row[filled - 1]
+        filled, shift = filled + count, shift + 8
+    return at
 
 
 def _scanline(

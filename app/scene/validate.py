@@ -1,6 +1,6 @@
 """From what a loader found to a Scene that keeps its promises: the one gate that every file passes.
 
-Repaired and counted as warnings: triangles without area, triangles listed twice, textured triangles without texture
+Repaired and counted as warnings: triangles without area, triangles in the place of others, textured triangles without texture
 coordinates, albedo below 0 or above MOST_ALBEDO, vertex colours outside [0, 1], emission below 0, cameras that make
 no sense, lights with an intensity below 0 or with odd cones. Repaired without a word: normals that are zero or not finite.
 Refused with ``SceneError``: corners that are not finite, indices out of range, no triangle left, more than
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from app.errors import SceneError
 from app.scene.checked_lights import check_lights
 from app.scene.checked_materials import check_colours, check_materials, drop_unmapped_textures, hold_albedo
+from app.scene.doubles import doubles
 from app.scene.lights import Light
 from app.scene.model import F64, Camera, Material, Scene
 from app.util.background import Report, unheard
@@ -31,13 +32,6 @@ MAX_TRIANGLES = 20_000_000
 EXTENT_RANGE = (1e-12, 1e12)  # m; outside of it areas leave the range of 32-bit floats by far
 # Files and GPU hold 32-bit floats: a triangle flatter than their spacing (2^-23 relative) has no shape, only rounding.
 FLATNESS = 2.0**-23
-# Odd multipliers that spread the bits of coordinates [Knuth, multiplicative hashing by the golden ratio].
-HASH = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
-ODD_ORDERS = (
-    0 * 9 + 2 * 3 + 1,
-    1 * 9 + 0 * 3 + 2,
-    2 * 9 + 1 * 3 + 0,
-)  # of a triangle's corners: it winds the other way
 
 Array = NDArray[Any]
 Bools = NDArray[np.bool_]
@@ -99,12 +93,8 @@ def validate(
         verb = "has no area and was" if total - kept == 1 else "have no area and were"
         notes.append(f"{total - kept} of {counted(total, 'triangle', 'triangles')} {verb} dropped")
     report(0.4)
-    double_sided = np.array([m.double_sided for m in materials], bool)
-    again = repeated(positions, triangles, _join_ids([p.material_ids for p in parts], parts), double_sided) & keep
-    if again.any():
-        verb = "was listed before and was" if again.sum() == 1 else "were listed before and were"
-        notes.append(f"{counted(int(again.sum()), 'triangle', 'triangles')} {verb} dropped")
-        keep &= ~again
+    material_ids = _join_ids([p.material_ids for p in parts], parts)
+    keep &= ~doubles(positions, triangles, material_ids, materials, keep, notes)
 
     report(0.6)
     triangles = triangles[keep]
@@ -115,7 +105,7 @@ def validate(
     normals = _join_corners([p.normals for p in parts], parts, keep, 3)
     colours = check_colours(_join_corners([p.colours for p in parts], parts, keep, 3), notes)
     checked_materials = check_materials(source, materials, notes)
-    material_ids = _join_ids([p.material_ids for p in parts], parts)[keep]
+    material_ids = material_ids[keep]
     material_ids, checked_materials = drop_unmapped_textures(uvs, material_ids, checked_materials, notes)
     report(0.8)
     checked_materials, colours = hold_albedo(checked_materials, material_ids, colours, notes)
@@ -154,29 +144,6 @@ def has_area(positions: F64, triangles: Array) -> Bools:
     twice_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     solid: Bools = twice_area > FLATNESS * longest
     return solid
-
-
-def repeated(positions: F64, triangles: Array, material_ids: NDArray[np.int64], double_sided: Bools) -> Bools:
-    """(m,) whether a triangle has the corners, the material and, unless that is double-sided, the front of one before it: in the
-    same place, both would be lit and reflect, and make light."""
-    bits = np.ascontiguousarray(positions + 0.0).view(np.uint64)  # -0 is 0
-    x, y, z = ((bits ^ (bits >> np.uint64(32))) * HASH).T  # signs reach all bits, or mirrored triangles would be alike
-    vertex = ((x + y + z) ^ ((x + y + z) >> np.uint64(29))) * HASH[0]
-    whole = vertex[triangles[:, 0]] + vertex[triangles[:, 1]] + vertex[triangles[:, 2]]
-    ranked = np.sort(whole)
-    twice = ranked[1:][ranked[1:] == ranked[:-1]]
-    alike = (
-        np.flatnonzero(np.isin(whole, twice)) if len(twice) else twice.astype(np.int64)
-    )  # told apart below, if they differ
-    corners = positions[triangles[alike]]
-    order = np.lexsort((corners[..., 2], corners[..., 1], corners[..., 0]), axis=1)
-    turned = np.isin((order * [9, 3, 1]).sum(axis=1), ODD_ORDERS) & ~double_sided[material_ids[alike]]
-    rows = np.take_along_axis(corners, order[..., None], axis=1).reshape(-1, 9)
-    _, kept = np.unique(np.column_stack([rows, material_ids[alike], turned]), axis=0, return_index=True)
-    again = np.zeros(len(triangles), bool)
-    again[alike] = True
-    again[alike[kept]] = False
-    return again
 
 
 def _check_part(source: str | Path, part: Part, object_count: int, material_count: int) -> None:

@@ -48,7 +48,7 @@ def test_edges_have_all_their_half_edges() -> None:
 def test_corners_that_nearly_coincide_are_joined() -> None:
     mesh = shapes.icosphere(1.0, 2)
     corners = np.concatenate([mesh.positions, rng.integers(0, 3, (500, 3)).astype(float)])  # many share an axis
-    near = corners[::2] + rng.uniform(-1, 1, corners[::2].shape) * 1.5e-7
+    near = corners[::2] + rng.uniform(-1, 1, corners[::2].shape) * 4e-7
     positions = np.concatenate([corners, near])
     triangles = rng.permutation(len(positions))[: len(positions) // 3 * 3].reshape(-1, 3).astype(np.int32)
     ids = np.zeros(len(triangles), np.int32)

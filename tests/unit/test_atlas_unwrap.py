@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from atlas_scenes import TURN, box_room, face_areas, moved, own_cache, scene_of, split_grid
 
+import app.atlas.large_surfaces as large_surfaces
 import app.atlas.unwrap as unwrap_module
 from app.atlas.charts import Charts
 from app.atlas.parametrize import parametrize
@@ -215,8 +216,10 @@ def test_copies_are_unfolded_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_charts_of_large_surfaces_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     """A sheet with waves: xatlas would make a few charts of it, in a time that grows with the square of their triangles."""
-    for name, value in (("LARGE", 256), ("CHART", 64), ("PIECE", 512)):
-        monkeypatch.setattr(unwrap_module, name, value)
+    monkeypatch.setattr(unwrap_module, "CHART", 64)
+    monkeypatch.setattr(large_surfaces, "LARGE", 256)
+    monkeypatch.setattr(large_surfaces, "PIECE", 512)
+    monkeypatch.setattr(large_surfaces, "STEEP", 2.0)  # nothing is seen whole
     flat = split_grid(shapes.quad((0, 0, 0), (2, 0, 0), (0, 0, -2)), 32, 32)
     waves = 0.1 * np.sin(5 * flat.positions[:, :1]) * np.cos(4 * flat.positions[:, 2:])
     scene = scene_of([shapes.Mesh(flat.positions + [0, 1, 0] * waves, flat.triangles, flat.uv), BALL.moved(0, 3, 0)])

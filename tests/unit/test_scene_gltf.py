@@ -185,12 +185,19 @@ def test_picture_in_a_file_beside_and_never_outside(tmp_path: Path) -> None:
     red = png([[[255, 0, 0]]])
     written(folder, "red paint.png", red)
     written(tmp_path, "secret.png", red)
-    for uri, readable in [("red%20paint.png", True), ("../secret.png", False), (str(tmp_path / "secret.png"), False)]:
+    for uri, readable in [
+        ("red%20paint.png", True),
+        ("Red Paint.PNG", True),
+        ("../secret.png", False),
+        (str(tmp_path / "secret.png"), False),
+    ]:
         gltf = quad_gltf()
         gltf.json["images"] = [{"uri": uri}]
         scene = load(folder, gltf.glb())
         assert (scene.materials[0].albedo_texture is not None) == readable
-        assert any("1 picture could not be read" in w for w in scene.warnings) != readable
+        assert any(f"1 picture could not be read ('{uri}')" in w for w in scene.warnings) != readable
+        gltf.json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = [1, 1, 1, 1]  # stands for the picture
+        assert load(folder, gltf.glb()).materials[0].albedo[1] == (1.0 if readable else 0.5)
 
 
 def test_262_thousand_triangles_load_in_under_two_seconds(tmp_path: Path) -> None:
@@ -236,3 +243,22 @@ def test_a_lightmap_scale_that_is_none_is_one_line(tmp_path: Path, scale: Any) -
     gltf.json["materials"][0]["extras"] = {"lightmap_scale": scale}
     with pytest.raises(SceneError, match="lightmap_scale"):
         load(tmp_path, gltf.glb())
+
+
+@pytest.mark.parametrize(
+    ("mode", "alpha", "said"), [("BLEND", 0.5, True), ("MASK", 0.5, True), ("OPAQUE", 0.5, False), ("BLEND", 1, False)]
+)
+def test_alpha_of_vertices_is_noted(tmp_path: Path, mode: str, alpha: float, said: int) -> None:
+    gltf = quad_gltf()
+    gltf.json["materials"][0]["alphaMode"] = mode
+    colours = np.array([[1, 1, 1, alpha]] * 4, np.float32)
+    gltf.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = gltf.accessor(colours)
+    notes = load(tmp_path, gltf.glb()).warnings
+    assert notes == (("1 primitive with alpha of vertices: not seen through",) if said else ())
+
+
+def test_instances_may_have_values_of_their_own_alone(tmp_path: Path) -> None:
+    gltf = quad_gltf()
+    attributes = {"_ID": gltf.accessor(np.array([0], np.float32))}
+    gltf.json["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": attributes}}
+    assert len(load(tmp_path, gltf.glb()).triangles) == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -159,7 +160,9 @@ def test_concave_faces_are_not_walled_up(tmp_path: Path, name: str, turned: bool
     lines = [f"v {x} 1 {y}\nvt {x} {y}" for x, y in ring]
     face = " ".join(f"{k}/{k}" for k in range(1, len(ring) + 1))
     square = "v 9 0 0\nv 9 1 0\nv 9 1 1\nv 9 0 1\nf -4 -3 -2 -1\nf -3 -2 -1"
-    text = "\n".join([*lines, f"o before\n{square}\no wall\nusemtl paint\nf {face}\no after\n{square}"])
+    text = "\n".join(
+        [*lines, f"o before\n{square}\no wall\nusemtl paint\nf {face}\no after\n{square.replace('9', '8')}"]
+    )
     scene = load(tmp_path, text)
     wall = scene.object_ids == 1
     normals, areas = scene.normals_areas
@@ -200,7 +203,7 @@ def test_lists_of_material_libraries(tmp_path: Path, line: str) -> None:
     (tmp_path / "sub").mkdir()
     written(tmp_path, "a.mtl", "newmtl one\nKd 0.1 0.1 0.1\n")
     written(tmp_path, "b b.mtl", "newmtl two\nKd 0.2 0.2 0.2\n")
-    scene = load(tmp_path, f"mtllib {line}\n{TRIANGLE}usemtl one\nf 1 2 3\nusemtl two\nf 1 3 2\n")
+    scene = load(tmp_path, f"mtllib {line}\n{TRIANGLE}usemtl one\nf 1 2 3\nusemtl two\nv 0 0 5\nf 1 3 4\n")
     assert [m.albedo[0] for m in scene.materials] == [0.1, 0.2] and scene.warnings == ()
 
 
@@ -221,3 +224,92 @@ def test_pictures_are_found_however_they_are_named(tmp_path: Path, file: str) ->
     (tmp_path / place / "#1.png").unlink()
     (note,) = load(tmp_path, text).warnings
     assert note.startswith("1 picture could not be read ('") and file.strip('"') in note
+
+
+# A square of 4 m² in the plane y = 0, a concave polygon of 5 corners and 10 m², and a triangle of 2 m²
+PLY_POINTS = [(0, 0, 0), (2, 0, 0), (2, 0, -2), (0, 0, -2)]
+PLY_POINTS += [(9, 0, 0), (13, 0, 0), (13, 0, -4), (11, 0, -1), (9, 0, -4), (0, 0, 2)]
+PLY_FACES = [(0, 1, 2, 3), (4, 5, 6, 7, 8), (0, 9, 1), (0, 1)]
+
+
+def ply_of_polygons(kind: str, colours: str = "uchar") -> bytes:
+    """The vertices with colours sRGB 188, 0, 255 of 255, in one of the three formats."""
+    lines = ["ply", f"format {kind} 1.0", f"element vertex {len(PLY_POINTS)}"]
+    lines += [f"property double {axis}" for axis in "xyz"] + [
+        f"property {colours} {c}" for c in ("red", "green", "blue")
+    ]
+    lines += [
+        f"element face {len(PLY_FACES)}",
+        "property list uchar uint vertex_index",
+        "property float more",
+        "end_header\n",
+    ]
+    most = {"uchar": 255, "ushort": 65535, "float": 1.0}[colours]
+    paint = [188 / 255 * most, 0, most]
+    paint = paint if colours == "float" else [round(x) for x in paint]
+    rows = [[*point, *paint] for point in PLY_POINTS]
+    if kind == "ascii":
+        text = [" ".join(map(str, row)) for row in rows] + [f"{len(f)} {' '.join(map(str, f))} 0.5" for f in PLY_FACES]
+        return "\r\n".join([*lines[:-1], "end_header", *text]).encode()
+    order = "<" if "little" in kind else ">"
+    body = [struct.pack(f"{order}3d3{ {'uchar': 'B', 'ushort': 'H', 'float': 'f'}[colours] }", *row) for row in rows]
+    body += [struct.pack(f"{order}B{len(f)}If", len(f), *f, 0.5) for f in PLY_FACES]
+    return "\n".join(lines).encode() + b"".join(body)
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
+@pytest.mark.parametrize("colours", ["uchar", "ushort", "float"])
+def test_ply_with_polygons_of_all_sizes(tmp_path: Path, kind: str, colours: str) -> None:
+    scene = load(tmp_path, ply_of_polygons(kind, colours), "a.ply")
+    normals, areas = scene.normals_areas
+    assert np.allclose(areas.sum(), 4 + 10 + 2) and np.allclose(normals[:, 1], 1)
+    assert scene.colours is not None and np.allclose(scene.colours, [0.502886, 0, 0.99], atol=1e-4)
+
+
+def test_a_ply_file_that_ends_early_says_where(tmp_path: Path) -> None:
+    data = ply_of_polygons("binary_little_endian")
+    for keep, what in ((len(data) - 3, "face"), (data.index(b"end_header") + 50, "vertex")):
+        with pytest.raises(SceneError, match=f"ends before its {what} elements do"):
+            load(tmp_path, data[:keep], "a.ply")
+
+
+def test_binary_stl_that_begins_like_text_and_has_bytes_at_its_end(tmp_path: Path) -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
+    head = b"solid made by a program".ljust(80) + struct.pack("<I", 1)
+    data = head + bytes(12) + corners.tobytes() + bytes(2) + b"\r\n"
+    assert np.array_equal(load(tmp_path, data, "a.stl").corners[0], corners)
+
+
+def test_stl_as_text_with_several_solids_and_a_mark(tmp_path: Path) -> None:
+    facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 {z}\nvertex 1 0 {z}\nvertex 0 1 {z}\nendloop\nendfacet\n"
+    text = "".join(f"solid {name}\n{facet.format(z=z)}endsolid {name}\n" for z, name in enumerate("ab"))
+    assert len(load(tmp_path, "\ufeff" + text, "a.stl").triangles) == 2
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
+def test_names_in_other_encodings(tmp_path: Path, encoding: str) -> None:
+    """Two names that differ in letters beyond ASCII stay two; lines end as on Windows, some go on in the next."""
+    mtl = "newmtl W\u00e4nde\nKd 0.2 0.2 0.2\nnewmtl W\u00f6nde\nKd 0.3 0.3 0.3\n"
+    written(tmp_path, "a.mtl", mtl.encode(encoding))
+    text = f"mtllib a.mtl\n{TRIANGLE}usemtl W\u00e4nde\nf 1 2 \\\n3\nusemtl W\u00f6nde\nv 0 0 5\nf 1 3 4\n"
+    scene = load(tmp_path, text.replace("\n", "\r\n").encode(encoding))
+    assert [(m.name, m.albedo[0]) for m in scene.materials] == [("W\u00e4nde", 0.2), ("W\u00f6nde", 0.3)]
+    assert scene.warnings == ()
+
+
+def test_maps_with_options_and_of_emission(tmp_path: Path) -> None:
+    lines = "newmtl a\nmap_Kd -s 2 3 1 -o 0.5 0.25 0 -clamp on -bm 0.2 a.png\nmap_Ke -imfchan r b b.png\n"
+    written(tmp_path, "a.mtl", lines + "newmtl b\nKe 2 2 2\nmap_Ke a.png\nTf 0.5 0.5 0.5\n")
+    for name in ("a.png", "b b.png"):
+        written(tmp_path, name, png([[[188, 188, 188]]]))
+    scene = load(
+        tmp_path, f"mtllib a.mtl\n{TRIANGLE}vt 0 0\nusemtl a\nf 1/1 2/1 3/1\nv 0 0 5\nusemtl b\nf 1/1 3/1 4/1\n"
+    )
+    one, other = scene.materials
+    assert one.emission == (1, 1, 1) and one.emission_texture is not None and one.emission_texture.name == "b b.png"
+    assert other.emission == (2, 2, 2) and other.emission_texture is not None and other.albedo_texture is None
+    texture = one.albedo_texture
+    assert texture is not None and texture.wrap == ("clamp", "clamp")
+    u, v = 0.3, 0.9  # v from the bottom, as in the file
+    assert np.allclose(texture.uv_transform @ [u, 1 - v, 1], [2 * u + 0.5, 1 - (3 * v + 0.25)])
+    assert scene.warnings == ("1 material with a filter (Tf) and without opacity (d, Tr): opaque",)

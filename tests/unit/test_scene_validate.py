@@ -145,12 +145,39 @@ def test_cameras_are_rigid_and_their_names_unique() -> None:
 
 def test_triangles_listed_twice_are_dropped() -> None:
     """The same corners from whichever on, of one material and, if it has one, the same front. Coplanar neighbours stay."""
-    positions = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [-0.0, 0, 0]]
-    triangles = [[0, 1, 2], [1, 2, 4], [0, 2, 1], [1, 3, 2], [0, 1, 2], [0, 1, 2], [2, 1, 0]]
-    ids = np.array([0, 0, 0, 0, 1, 2, 2])
-    materials = [Material("a"), Material("b"), Material("c", double_sided=True)]
+    positions = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [-0.0, 0, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]]
+    triangles = [[0, 1, 2], [1, 2, 4], [0, 2, 1], [1, 3, 2], [5, 6, 7], [7, 6, 5]]
+    ids = np.array([0, 0, 0, 0, 1, 1])
+    materials = [Material("a"), Material("c", double_sided=True)]
     part = Part(np.array(positions, float), np.array(triangles), 0, ids)
     scene = validate("x", "x", [part], ["o"], materials)
-    assert scene.material_ids.tolist() == [0, 0, 0, 1, 2]
+    assert scene.material_ids.tolist() == [0, 0, 0, 1]
     np.testing.assert_array_equal(scene.triangles[:3], [[0, 1, 2], [0, 2, 1], [1, 3, 2]])
-    assert scene.warnings == ("2 triangles were listed before and were dropped",)
+    assert scene.warnings == ("2 triangles listed before were dropped",)
+
+
+def test_of_opaque_triangles_in_one_place_one_is_kept_for_each_front() -> None:
+    positions = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+    names = {"wall": Material("wall"), "paint": Material("paint"), "lamp": Material("lamp", emission=(1, 1, 1))}
+    names |= {"sheet": Material("sheet", double_sided=True), "film": Material("film", opacity=0.5)}
+    materials = list(names.values())
+
+    def kept(*stack: str) -> list[str]:
+        """Of materials in one place, with a minus those that are turned."""
+        rows = [[0, 2, 1] if name[0] == "-" else [1, 2, 0] for name in stack]
+        ids = np.array([list(names).index(name.removeprefix("-")) for name in stack])
+        scene = validate("x", "x", [Part(positions, np.array(rows), 0, ids)], ["o"], materials)
+        dropped = len(stack) - len(scene.triangles)
+        assert (f"{dropped} triangle in the place of one of another material was dropped" in scene.warnings) == (
+            dropped == 1
+        )
+        assert scene.listed is not None
+        return [stack[k] for k in scene.listed]
+
+    assert kept("wall", "paint") == ["wall"]
+    assert kept("wall", "-paint") == ["wall", "-paint"]  # back to back
+    assert kept("wall", "lamp") == ["lamp"]
+    assert kept("wall", "sheet") == ["sheet"]
+    assert kept("lamp", "-sheet") == ["lamp"]
+    assert kept("wall", "film") == ["wall", "film"]
+    assert kept("wall", "-paint", "sheet", "-wall") == ["sheet"]
