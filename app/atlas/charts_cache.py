@@ -74,6 +74,7 @@ def _made(
         cut.scene,
         ends=cut.ends,
         facet=cut.facet,
+        welded=cut.welded,
         uncut=len(scene.triangles),
         density=atlas.density,
         texels=atlas.texels,

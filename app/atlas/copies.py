@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.sides import SPREAD, distinct_rows, groups_of, middle, rows_by, totals
+from app.atlas.sides import SPREAD, distinct_rows, groups_of, middle, numbered, rows_by, totals
 from app.scene.model import F64, I32
 
 LEAST = 32  # triangles of a surface that is looked for: fewer cost no time to unfold
@@ -54,7 +54,7 @@ def _vertices(triangles: I32, groups: I32) -> I64:
     if (groups == groups[0]).all():
         return corner
     apart = corner + (int(corner.max()) + 1) * groups.astype(np.int64)[:, None]
-    return distinct_rows(apart.reshape(-1))[1].reshape(-1, 3)
+    return numbered(apart)
 
 
 def _connected(vertices: I64) -> I64:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from app.atlas.flat_pieces import MOST_ENDS, MOST_PIECES, Piece, on_rims, parted_pieces
 from app.atlas.intersections import Contacts, contacts, surfaces
-from app.atlas.sides import Edges, facets, numbered, scene_size, weld
+from app.atlas.sides import Welded, facets, numbered, scene_size
 from app.atlas.triangle_cuts import CutTriangles, cut_pieces
 from app.scene.model import F32, F64, I32, Scene
 from app.util.background import Report
@@ -27,11 +27,12 @@ BLEEDS = "light and shadow may reach a texel too far there; finer texels make th
 class Cut:
     """A scene with its triangles cut. ends (m, 3) u8: what there is at the edge from corner k to k + 1 of each triangle, GOES_ON,
     or ENDS or JUMPS, where charts end; None where nothing was cut. facet (m,): the flat piece of each triangle, as ``facets`` has
-    it."""
+    it. welded: the triangles of the scene; None where some were cut."""
 
     scene: Scene
     ends: NDArray[np.uint8] | None
     facet: I32
+    welded: Welded | None = None
 
 
 def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
@@ -39,11 +40,11 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
     may raise to cancel."""
     tell = report or (lambda share: None)
     tell(0.0)
-    points, corners = weld(scene)
+    welded = Welded.of(scene)
+    points, corners, edges = welded.points, welded.corners, welded.edges
     tell(0.1)
     size, origin = scene_size(scene), points.min(0)
     places = (points - origin) / size
-    edges = Edges.of(corners)
     found, crowded = contacts(places[corners], surfaces(edges), lambda share: tell(0.1 + 0.4 * share))
     tell(0.5)
     facet = facets(points, corners, scene.material_ids, size, edges)
@@ -70,7 +71,7 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
     if notes:
         scene = dataclasses.replace(scene, warnings=(*scene.warnings, *notes))
     if not pieces:
-        return Cut(scene, None, facet)
+        return Cut(scene, None, facet, welded)
     made = cut_pieces(pieces, places, corners, facet, lambda share: tell(0.9 + 0.1 * share))
     return _joined(scene, corners, facet, made, origin, size)
 

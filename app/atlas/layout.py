@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import ALIGN, GAP, Charts
-from app.atlas.packing import MAX_SIDE, outlines, pack
-from app.atlas.sides import Sides, distinct_rows, least, most, totals
+from app.atlas.packing import MAX_SIDE, outlines_of_edges, pack
+from app.atlas.sides import Edges, Sides, distinct_rows, least, most, totals
 from app.scene.model import F64, I32, Scene
 from app.util.background import Report
 
@@ -29,7 +29,8 @@ class Layout:
 
     chart (m,) i32 and uv (m, 3, 2) f64 [m] per scene triangle (-1 where no side is lit), u and v from 0;
     extent (c, 2) f64 [m]; area (c,) f64 [m²]; border (c,) f64: (X + Y)/2 [m]; the first ``rectangles`` are whole
-    rectangles. sides (c,): 1 or 2 lit sides. scale (c,): how many times longer than the surface all of these lengths are.
+    rectangles. sides (c,): 1 or 2 lit sides. rim (m, 3): which edges of triangles, from corner k to k + 1, may be at the border
+    of their chart: those that no neighbour continues. scale (c,): how many times longer than the surface all these lengths are.
     """
 
     chart: I32
@@ -39,11 +40,12 @@ class Layout:
     border: F64
     rectangles: int
     sides: I32
+    rim: NDArray[np.bool_]
     scale: NDArray[np.float64]
 
 
-def measured(chart: I32, uv: F64, rectangle_size: F64, lit: Sides) -> Layout:
-    """Move every chart's corner to the origin and measure it."""
+def measured(chart: I32, uv: F64, rectangle_size: F64, lit: Sides, edges: Edges | None = None) -> Layout:
+    """Move every chart's corner to the origin and measure it. edges: of the triangles, faster where they are known."""
     used = np.flatnonzero(chart >= 0)
     count = int(chart.max()) + 1
     owner, local = chart[used], uv[used]
@@ -58,8 +60,31 @@ def measured(chart: I32, uv: F64, rectangle_size: F64, lit: Sides) -> Layout:
     a, b = local[:, 1] - local[:, 0], local[:, 2] - local[:, 0]
     area = totals(owner, np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2, count)
     charts = distinct_rows(chart[lit.triangle], lit.back)[0]
+    rim = _rim(chart, moved, lit, edges)
     sides = np.bincount(chart[lit.triangle[charts]], minlength=count).astype(np.int32)
-    return Layout(chart, moved, high - low, area, _borders(owner, local, count), rectangles, sides, np.ones(count))
+    borders = _borders(chart, moved, rim, count)
+    return Layout(chart, moved, high - low, area, borders, rectangles, sides, rim, np.ones(count))
+
+
+def _rim(chart: I32, uv: F64, lit: Sides, edges: Edges | None) -> NDArray[np.bool_]:
+    """(m, 3) the edges of triangles with a chart, less those between two that lie side by side in it, lit on the same sides."""
+    rim = np.repeat(chart >= 0, 3)
+    if edges is not None:
+        two = edges.first[:-1][edges.uses == 2]
+        i, j = edges.order[two], edges.order[two + 1]
+        places, kind = uv.reshape(-1, 2), 4 * chart
+        kind[lit.triangle[~lit.back]] += 1
+        kind[lit.triangle[lit.back]] += 2
+        for _ in range(2):  # the start of each at the end of the other
+            same = (kind[i // 3] == kind[j // 3]) & (places[i] == places[_next(j)]).all(1)
+            i, j = j[same], i[same]
+        rim[i] = rim[j] = False
+    return rim.reshape(-1, 3)
+
+
+def _next(half: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The half-edges that follow some in their triangles."""
+    return half - half % 3 + (half + 1) % 3
 
 
 def scaled(layout: Layout, scene: Scene) -> Layout:
@@ -79,14 +104,15 @@ def scaled(layout: Layout, scene: Scene) -> Layout:
     )
 
 
-def _borders(chart: I32, uv: F64, count: int) -> NDArray[np.float64]:
+def _borders(chart: I32, uv: F64, rim: NDArray[np.bool_], count: int) -> NDArray[np.float64]:
     """(X + Y)/2 of each chart: half the extents of its boundary, along u and along v [m]."""
-    p, q = uv.reshape(-1, 2), np.roll(uv, -1, axis=1).reshape(-1, 2)
-    owner = np.repeat(chart, 3)
+    half = np.flatnonzero(rim)
+    owner, places = chart[half // 3], uv.reshape(-1, 2)
+    p, q = places[half], places[_next(half)]
     # an inner edge is walked both ways, with the same ends
     swap = (p[:, 0] > q[:, 0]) | ((p[:, 0] == q[:, 0]) & (p[:, 1] > q[:, 1]))
     a, b = np.where(swap[:, None], q, p), np.where(swap[:, None], p, q)
-    grain = np.maximum(np.abs(uv).max(), np.finfo(float).tiny) * 1e-9
+    grain = np.maximum(np.abs(uv).max(initial=0.0), np.finfo(float).tiny) * 1e-9
     key = np.round(np.concatenate([a, b], axis=1) / grain).astype(np.int64)
     index, _, uses = distinct_rows(owner, *key.T)
     outer = index[uses == 1]
@@ -144,7 +170,9 @@ def place(layout: Layout, lit: Sides, facet: I32, density: float, tile: int, met
     # the back of a chart is its front seen in a mirror
     uv[lit.back, :, 0] = box[piece[lit.back], 0][:, None] - uv[lit.back, :, 0]
     first, chart, _ = distinct_rows(lit.back, piece)
-    origins, size = pack(outlines(uv, chart, len(first)), tile, report)
+    face, k = np.nonzero(layout.rim[lit.triangle])
+    rims = outlines_of_edges(uv[face, k], uv[face, (k + 1) % 3], chart[face], len(first))
+    origins, size = pack(rims, tile, report)
     uv += origins[chart][:, None]
     rects = np.concatenate([origins, box[piece[first]].astype(np.int32)], axis=1)
     face_facet = distinct_rows(chart, facet[lit.triangle])[1]

@@ -44,10 +44,13 @@ def outlines(uv: F64, chart: I64, count: int) -> Outlines:
 
     uv (f, 3, 2) [texels] from the chart's own origin, not negative; chart (f,) i64 in [0, count).
     """
-    p, q = uv.reshape(-1, 2), np.roll(uv, -1, axis=1).reshape(-1, 2)
+    return outlines_of_edges(uv.reshape(-1, 2), np.roll(uv, -1, axis=1).reshape(-1, 2), np.repeat(chart, 3), count)
+
+
+def outlines_of_edges(p: F64, q: F64, owner: I64, count: int) -> Outlines:
+    """The outlines of charts from edges of triangles, p to q (e, 2), of charts owner (e,): at least those at its border."""
     swap = p[:, 0] > q[:, 0]
     p, q = np.where(swap[:, None], q, p), np.where(swap[:, None], p, q)
-    owner = np.repeat(chart, 3)
     first = np.floor(p[:, 0]).astype(np.int64) // ALIGN
     right = np.ceil(q[:, 0]).astype(np.int64)
     last = np.maximum((right + GAP - 1) // ALIGN, first)

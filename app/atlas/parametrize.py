@@ -22,7 +22,7 @@ from app.atlas.layout import Layout, density_for, measured, place, scaled, texel
 from app.atlas.planes import Planes
 from app.atlas.rectangles import Rectangles, find_rectangles
 from app.atlas.seams import find_seams
-from app.atlas.sides import Edges, Sides, distinct_rows, facets, least, lit_sides, most, scene_size, weld
+from app.atlas.sides import Sides, Welded, distinct_rows, facets, least, lit_sides, most, scene_size
 from app.atlas.triangle_cuts import GOES_ON
 from app.atlas.unwrap import unwrap
 from app.errors import UserError
@@ -47,6 +47,7 @@ def parametrize(
     roots: bool = False,
     ends: NDArray[np.uint8] | None = None,
     facet: I32 | None = None,
+    welded: Welded | None = None,
     uncut: int | None = None,
     progress: Progress | None = None,
     time_limit: float | None = None,
@@ -58,8 +59,8 @@ def parametrize(
     A material's ``lightmap_scale`` is so many times that density; where neither was given, others keep the density that they have
     without it. Rectangles are made of whole patches, so that a small number of texels is met only roughly. Charts that are
     smaller than a texel have one all the same: where there are so many that a large floor among them would be left with one, too,
-    more texels are made than were asked for. ends, facet: as in a Cut, if the scene was cut; uncut: its triangles before that,
-    for which there are texels by default. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage,
+    more texels are made than were asked for. ends, facet, welded: as in a Cut, if the scene was cut; uncut: its triangles before
+    that, for which there are texels by default. tile: texels along the edge of a leaf. time_limit [s] for xatlas. progress(stage,
     share) is called now and then and may raise to cancel.
     Raises UserError for a density or number out of range, or when more than 16 777 216 texels are needed.
     """
@@ -69,15 +70,15 @@ def parametrize(
     beside = ThreadPoolExecutor(1)
     try:
         sides = beside.submit(lit_sides, scene)
-        points, corners = weld(scene)
-        edges = Edges.of(corners)
+        welded = welded or Welded.of(scene)
+        points, corners, edges = welded.points, welded.corners, welded.edges
         if facet is None:
             report("finding flat pieces", 0.05)
             facet = facets(points, corners, scene.material_ids, scene_size(scene), edges)
         report("finding sides that light can reach", 0.15)
         planes = beside.submit(Planes.of_scene, scene, points, corners, facet, edges)
         lit = without_enclosed(sides.result(), scene, points, corners)
-        layout, method, warnings = _unfold(scene, lit, points, corners, facet, ends, time_limit, report)
+        layout, method, warnings = _unfold(scene, lit, welded, facet, ends, time_limit, report)
         all_planes = planes.result()
     finally:
         beside.shutdown(wait=False, cancel_futures=True)
@@ -120,7 +121,7 @@ def parametrize(
     if not roots:
         warnings += _too_small(layout, density)
     report("joining edges of pieces", 0.95)
-    seams = find_seams(scene, corners, lit.triangle, lit.back, charts.face_uv, charts.face_chart, ends)
+    seams = find_seams(scene, corners, lit.triangle, lit.back, charts.face_uv, charts.face_chart, ends, layout.rim)
     return dataclasses.replace(charts, warnings=warnings, seams=seams, hidden_uv=hidden.uv, hidden_face=hidden.face)
 
 
@@ -159,8 +160,7 @@ def check(density: float | None, texels: int | None) -> None:
 def _unfold(
     scene: Scene,
     lit: Sides,
-    points: F64,
-    corners: I32,
+    welded: Welded,
     facet: I32,
     ends: NDArray[np.uint8] | None,
     time_limit: float | None,
@@ -168,7 +168,10 @@ def _unfold(
 ) -> tuple[Layout, str, tuple[str, ...]]:
     """Charts in metres for every triangle with a lit side; their story in words; warnings."""
     report("laying out rectangles", 0.2)
-    used = np.unique(lit.triangle)
+    points, corners = welded.points, welded.corners
+    is_lit = np.zeros(len(corners), bool)
+    is_lit[lit.triangle] = True
+    used = np.flatnonzero(is_lit)
     rectangles = find_rectangles(points, corners[used], scene.material_ids[used], facet[used])
     slot = np.full(int(facet.max()) + 1, -1, np.int32)
     slot[rectangles.facet] = np.arange(len(rectangles.facet), dtype=np.int32)
@@ -199,7 +202,7 @@ def _unfold(
     size = rectangles.size
     if ends is not None:
         chart, uv, size = _parted(chart, uv, size, corners, ends)
-    return measured(chart, uv, size, lit), method, unfolded.warnings
+    return measured(chart, uv, size, lit, welded.edges), method, unfolded.warnings
 
 
 def _parted(

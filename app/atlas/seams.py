@@ -70,10 +70,10 @@ def find_seams(
     uv: F64,
     chart: I32,
     ends: NDArray[np.uint8] | None,
+    rim: NDArray[np.bool_],
 ) -> Seams:
-    """corners (m, 3): welded, of all triangles; triangle, back, uv, chart of the faces; ends: as in a Cut."""
-    face = np.repeat(np.arange(len(triangle)), 3)
-    k = np.tile(np.arange(3), len(triangle))
+    """corners (m, 3): welded, of all triangles; triangle, back, uv, chart of the faces; ends as in a Cut, rim as in a Layout."""
+    face, k = np.nonzero(rim[triangle])
     # a back is seen the other way round
     first, second = np.where(back[face], (k + 1) % 3, k), np.where(back[face], k, (k + 1) % 3)
     start, end = corners[triangle[face], first], corners[triangle[face], second]

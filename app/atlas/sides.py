@@ -76,7 +76,7 @@ def lit_sides(scene: Scene) -> Sides:
     corners = (scene.corners - (low + high) / 2) / size
     normals, _ = scene.normals_areas
     offsets = np.einsum("mk,mk->m", normals, corners[:, 0])
-    hull = _hull_points((scene.positions[np.unique(scene.triangles)] - (low + high) / 2) / size)
+    hull = _hull_points((scene.positions[scene.used] - (low + high) / 2) / size)
     reach_front, reach_back = np.empty(len(normals)), np.empty(len(normals))
     step = max(1, BLOCK // len(hull))
     for start in range(0, len(normals), step):
@@ -119,8 +119,11 @@ def rows_by(label: NDArray[np.integer], count: int) -> tuple[NDArray[np.int64], 
 
 
 def numbered(label: NDArray[np.integer]) -> NDArray[np.int64]:
-    """(n,) the labels (n,), which are not negative, numbered from 0 with none missing, in their order."""
-    used = np.zeros(int(label.max(initial=-1)) + 1, bool)
+    """(…) the labels (…), which are not negative, numbered from 0 with none missing, in their order."""
+    span = int(label.max(initial=-1)) + 1
+    if span > COUNTED * len(label):
+        return np.asarray(np.unique(label, return_inverse=True)[1].reshape(label.shape), np.int64)
+    used = np.zeros(span, bool)
     used[label] = True
     return np.asarray((np.cumsum(used) - 1)[label], np.int64)
 
@@ -222,10 +225,23 @@ def totals(label: NDArray[np.integer], values: F64, count: int) -> F64:
     return np.stack([np.bincount(label, column, count) for column in values.T], axis=1).astype(np.float64)
 
 
+@dataclass(frozen=True, eq=False)
+class Welded:
+    """A scene's triangles with corners that coincide made one: points (n, 3) [m], corners (m, 3) into them, and their edges."""
+
+    points: F64
+    corners: I32
+    edges: Edges
+
+    @staticmethod
+    def of(scene: Scene) -> Welded:
+        points, corners = weld(scene)
+        return Welded(points, corners, Edges.of(corners))
+
+
 def weld(scene: Scene) -> tuple[F64, I32]:
     """Join vertices that coincide: points (n, 3) [m] and the corner indices (m, 3) of the triangles into them."""
-    used = np.zeros(len(scene.positions), bool)
-    used[scene.triangles] = True
+    used = scene.used
     vertices = scene.positions[used]
     order = _by_place(vertices)
     places = vertices[order]

@@ -142,10 +142,17 @@ class Scene:
         return cross / length[:, None], length / 2
 
     @functools.cached_property
+    def used(self) -> NDArray[np.bool_]:
+        """(n,) which of the positions are corners of triangles."""
+        used = np.zeros(len(self.positions), bool)
+        used[self.triangles] = True
+        return used
+
+    @functools.cached_property
     def bounds(self) -> tuple[F64, F64]:
         """Lower and upper corner of the box around all triangles [m]."""
-        used = self.corners.reshape(-1, 3)
-        return used.min(axis=0), used.max(axis=0)
+        x, y, z = self.positions[self.used].T.copy()
+        return np.array([x.min(), y.min(), z.min()]), np.array([x.max(), y.max(), z.max()])
 
     @property
     def emits(self) -> bool:

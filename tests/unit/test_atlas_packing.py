@@ -9,7 +9,9 @@ import pytest
 
 from app.atlas import packing
 from app.atlas.charts import ALIGN, DEFAULT_TILE, GAP, TILES
+from app.atlas.layout import measured
 from app.atlas.packing import outlines, pack
+from app.atlas.sides import Edges, Sides
 from app.errors import UserError
 from app.scene.model import F64
 
@@ -94,3 +96,14 @@ def test_too_long_a_chart_is_refused() -> None:
     uv, chart = _rectangles(np.array([[packing.MAX_SIDE + 4.0, 4.0]]))
     with pytest.raises(UserError, match=r"16400 x 16 texels: the limit is 16384"):
         pack(outlines(uv, chart, 1), DEFAULT_TILE)
+
+
+@pytest.mark.parametrize(("lit_backs", "inner"), [([], 1), ([0, 1], 1), ([1], 0)])
+def test_edges_inside_of_a_chart_are_left_out(lit_backs: list[int], inner: int) -> None:
+    triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    uv = np.array([[0, 0], [9, 0], [9, 7], [0, 7.0]])[triangles]
+    lit = Sides(np.array([0, 1, *lit_backs], np.int32), np.arange(2 + len(lit_backs)) >= 2, 0)
+    chart, none = np.zeros(2, np.int32), np.empty((0, 2))
+    slow, fast = (measured(chart, uv, none, lit, edges) for edges in (None, Edges.of(triangles)))
+    assert slow.rim.all() and np.count_nonzero(~fast.rim) == 2 * inner  # from both of its sides
+    assert slow.border == fast.border == 16

@@ -47,4 +47,4 @@ def test_all_facets_in_planes_of_others_are_found(some: bool) -> None:
     meant = np.flatnonzero(pairs[:, own].any(1))
     found = planes.near(WITHIN, own if some else None)
     assert len(meant) > 30 and np.isin(meant, found).all()
-    assert len(found) < len(meant) + 0.15 * len(planes.normal)  # few others: those seen edgewise
+    assert len(found) < len(meant) + 0.25 * len(planes.normal)  # few others: those seen edgewise
