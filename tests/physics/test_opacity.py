@@ -158,3 +158,12 @@ def test_sky_and_lights_without_area_shine_through_a_board(gpu: Gpu, what: str, 
         power.append(lit(gpu, scene, *WAYS[way])[0])
     assert power[2] == pytest.approx((power[0] + power[1]) / 2, rel=0.02)
     assert power[1] < 0.6 * power[0]
+
+
+@pytest.mark.parametrize("panes", [2, 3])
+def test_the_sun_shines_through_panes_behind_each_other(gpu: Gpu, panes: int) -> None:
+    """By the product of what each lets pass: all of them are seen in one map."""
+    quads = [square(0.0, 1.0), *(square(1.0 + 0.3 * k, 1.5) for k in range(panes))]
+    scene = quads_scene(quads, [grey(0.0), replace(CLOSED, albedo=(0.0,) * 3, opacity=0.5)], [0] + [1] * panes)
+    sun = Light("sun", "directional", direction=(0.0, -1.0, 0.0))
+    assert lit(gpu, scene.with_lights((sun,)), *WAYS["hemicube"])[0] == pytest.approx(4 * 0.5**panes, rel=0.02)

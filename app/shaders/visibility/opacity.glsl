@@ -50,9 +50,15 @@ float chance(vec3 origin, vec3 direction, int row) {
 
 // The same for a sample of a map, by interleaved gradient noise [Jimenez14]: any 3×3 samples have numbers that are spread evenly,
 // and so has any regular part of them, which texels in rows may look up. Shifted on each triangle, seen from each origin. Behind
-// a sheet that is half there texels differ by 2.5 % after 300 shots, 6.3 % where each sample has a number of its own.
+// a sheet that is half there texels differ by 2.5 % after 300 shots, 6.3 % where each sample has a number of its own. One map is
+// all that a directional light has: behind two panes of one pattern it would show how much their shifts are alike, and not the
+// product of what both let pass. So every two triangles, as a pane has them, have one of eight patterns: turned, mirrored, doubled.
 float chance_in_map(vec3 origin, ivec2 px, int row) {
     uint shift = hash(hash(floatBitsToUint(origin)) + uvec3(uint(row))).x >> 8;
-    float number = 52.9829189 * fract(dot(vec2(0.06711056, 0.00583715), vec2(px)));
+    int pattern = row >> 1;
+    vec2 at = vec2((pattern & 1) == 0 ? px : px.yx);
+    if ((pattern & 2) != 0) at.x = -at.x;
+    float number = 52.9829189 * fract(dot(vec2(0.06711056, 0.00583715), at));
+    if ((pattern & 4) != 0) number *= 2.0;
     return fract(number + float(shift) * (1.0 / 16777216.0));
 }
