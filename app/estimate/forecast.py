@@ -8,7 +8,7 @@ light escapes, and which rooms it hardly reaches.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +28,10 @@ PLANE = 1.25  # cells above a point's plane, up to which lie those of its own su
 BOUNCES = 50
 SKY_ERROR = 0.02  # of directions that stand for the sky: as few as there may be
 SEED = 2
+BLOCK = 1 << 15  # texels in work at a time
+
+Ints = NDArray[np.int64]
+Colours = Callable[[Ints], NDArray[np.floating]]  # of texels, by their numbers: (n,) to (n, 3)
 
 
 class Forecast(NamedTuple):
@@ -41,16 +45,17 @@ class Forecast(NamedTuple):
 
 def forecast(
     surfaces: TexelSurfaces,
-    albedo: NDArray[np.floating],
-    exitance: NDArray[np.floating],
-    asked: NDArray[np.int64],
+    albedo: Colours,
+    exitance: Colours,
+    strongest: NDArray[np.floating],
+    asked: Ints,
     sky: Sky | None = None,
     lights: Sequence[Light] = (),
 ) -> Forecast:
-    """albedo, exitance E [W/m²]: of each texel (tiles, t, t, 3). asked: the numbers of some texels. sky, and lights without area:
-    seen by each point as far as it sees no other."""
-    at, area = _points(surfaces.area.ravel(), exitance.max(-1).ravel())
-    rho, E = (texels.reshape(-1, 3)[at].astype(np.float64) for texels in (albedo, exitance))
+    """albedo, exitance E [W/m²]: of texels; strongest: the largest of E of each texel, (tiles, t, t). asked: the numbers of some
+    texels. sky, and lights without area: seen by each point as far as it sees no other."""
+    at, area = _points(surfaces.area.ravel(), strongest.ravel())
+    rho, E = (of(at).astype(np.float64) for of in (albedo, exitance))
     shining = [light for light in lights if light.emits]
     if not E.any() and sky is None and not shining:
         return Forecast(area, np.zeros_like(E), np.zeros((len(asked), 3)))
@@ -66,7 +71,7 @@ def forecast(
     return Forecast(area, H, towards @ (E + rho * H) + asked_from_lights)
 
 
-def _points(area: F64, exitance: NDArray[np.floating]) -> tuple[NDArray[np.int64], F64]:
+def _points(area: F64, exitance: NDArray[np.floating]) -> tuple[Ints, F64]:
     """Texels, and the area that each stands for: by area of what is dark, by power of what emits."""
     rng = np.random.default_rng(SEED)
     dark, lamps = np.flatnonzero((area > 0) & (exitance <= 0)), np.flatnonzero(area * exitance > 0)
@@ -85,9 +90,7 @@ def _points(area: F64, exitance: NDArray[np.floating]) -> tuple[NDArray[np.int64
     return (np.concatenate(points), np.concatenate(areas)) if points else (np.zeros(0, np.int64), np.zeros(0))
 
 
-def _from_lights(
-    surfaces: TexelSurfaces, grid: _Grid, at: NDArray[np.int64], sky: Sky | None, lights: Sequence[Light]
-) -> F64:
+def _from_lights(surfaces: TexelSurfaces, grid: _Grid, at: Ints, sky: Sky | None, lights: Sequence[Light]) -> F64:
     """(n, 3) what texels receive of the sky and of lights without area [W/m²]."""
     p, n = (values.reshape(-1, 3)[at].astype(np.float64) for values in (surfaces.position, surfaces.normal))
     H = np.zeros((len(at), 3))
@@ -111,9 +114,7 @@ def _from_beyond(p: F64, n: F64, grid: _Grid, sky: Sky | None, lights: Sequence[
     return np.asarray(light @ irradiance)
 
 
-def _form_factors(
-    surfaces: TexelSurfaces, grid: _Grid, asked: NDArray[np.int64], at: NDArray[np.int64], area: F64
-) -> F64:
+def _form_factors(surfaces: TexelSurfaces, grid: _Grid, asked: Ints, at: Ints, area: F64) -> F64:
     """(asked, at) from each texel asked for to the disc around each point."""
     p, n = (values.reshape(-1, 3)[asked].astype(np.float64) for values in (surfaces.position, surfaces.normal))
     q, m = (values.reshape(-1, 3)[at].astype(np.float64) for values in (surfaces.position, surfaces.normal))
@@ -130,16 +131,20 @@ class _Grid:
     """Cells that surfaces lie in; ``cell`` [m] is their edge."""
 
     def __init__(self, surfaces: TexelSurfaces) -> None:
-        covered = surfaces.area > 0
-        along = np.ascontiguousarray(surfaces.position[covered].T)  # axes apart: three times as fast
+        area = surfaces.area.ravel()
+        covered, position = np.flatnonzero(area > 0), surfaces.position.reshape(-1, 3)
+        along = np.empty((3, len(covered)))  # axes apart: three times as fast
+        blocks = [slice(first, first + BLOCK) for first in range(0, len(covered), BLOCK)]
+        for some in blocks:
+            along[:, some] = position[covered[some]].T
         self._low = along.min(1)
         size = np.ptp(along, axis=1)
         self.width = float(np.linalg.norm(size))  # diagonal [m]: what is farther is beyond all
-        texel = float(np.sqrt(np.quantile(surfaces.area[covered], 0.9)))  # small charts' texels are covered in part
+        texel = float(np.sqrt(np.quantile(area[covered], 0.9)))  # small charts' texels are covered in part
         self.cell = max(float(size.max()) / CELLS, TEXELS_PER_CELL * texel)
-        index = ((along - self._low[:, None]) / self.cell).astype(np.int64)
-        self._filled = np.zeros(index.max(1) + 1, bool)
-        self._filled[tuple(index)] = True
+        self._filled = np.zeros(((along.max(1) - self._low) / self.cell).astype(np.int64) + 1, bool)
+        for some in blocks:
+            self._filled[tuple(((along[:, some] - self._low[:, None]) / self.cell).astype(np.int64))] = True
 
     def free(self, start: F64, start_normal: F64, end: F64, end_normal: F64) -> NDArray[np.bool_]:
         """Whether nothing lies between the points of each pair, (n, 3) each; looked up cell by cell. What lies in the plane of

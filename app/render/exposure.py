@@ -26,10 +26,10 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.tile_pool import TilePool
 from app.options import specs
 from app.render.options import DisplayOptions
-from app.render.sample import irradiance_at, sampled_colours, sampled_tiles
+from app.render.sample import colours_of, irradiance_at, sampled_colours, sampled_tiles, strongest_of
 from app.render.seen import Texels
 from app.render.units import LUMINANCE
-from app.scene.model import F64, Scene
+from app.scene.model import F32, F64, Scene
 
 KEY = 0.18  # mid grey [Reinhard02]
 BRIGHT = 0.99  # quantile of what is seen
@@ -47,13 +47,21 @@ def first_exposure(pool: TilePool, seen: Texels, scene: Scene | None = None) -> 
     pool's, as it was edited."""
     scene = scene or pool.scene
     materials = scene.materials
-    albedo = sampled_colours(pool, [m.albedo for m in materials], pool.albedo_tiles, slice(None))
-    emission = sampled_colours(pool, [m.emission for m in materials], pool.emission_tiles, slice(None))
+    albedos, emissions = ([getattr(m, of) for m in materials] for of in ("albedo", "emission"))
+    pi = np.float32(np.pi)
+
+    def albedo(texels: NDArray[np.int64]) -> F32:
+        return colours_of(pool, albedos, pool.albedo_tiles, texels)
+
+    def exitance(texels: NDArray[np.int64]) -> F32:
+        return pi * colours_of(pool, emissions, pool.emission_tiles, texels)
+
     some = Texels(*(values[:: -(-len(seen.slot) // FORECAST) or 1] for values in seen))
     asked = (some.slot * pool.tile + some.row) * pool.tile + some.column
     sky = scene.sky if scene.lit_by_sky else None
-    light = forecast(pool.surfaces, albedo, np.float32(np.pi) * emission, asked, sky, scene.lights)
-    return _exposure(albedo[some] * light.asked, scene.exposure)
+    strongest = pi * strongest_of(pool, emissions, pool.emission_tiles)
+    light = forecast(pool.surfaces, albedo, exitance, strongest, asked, sky, scene.lights)
+    return _exposure(albedo(asked) * light.asked, scene.exposure)
 
 
 def exposure_of(lightmap: Lightmap, seen: Texels, mean_residual: F64, mean_emitted: F64 | None = None) -> float:

@@ -29,6 +29,21 @@ def sampled_colours(pool: TilePool, factors: list[RGB], colours: F32 | None, sam
     return out if colours is None else out * colours[sample]
 
 
+def colours_of(pool: TilePool, factors: list[RGB], colours: F32 | None, texels: NDArray[np.int64]) -> F32:
+    """The same of texels that cover a surface, by their numbers: (n, 3)."""
+    material = pool.scene.material_ids[pool.charts.face_triangle[pool.surfaces.face.reshape(-1)[texels]]]
+    out = np.array(factors, np.float32)[material]
+    return out if colours is None else out * colours.reshape(-1, 3)[texels]
+
+
+def strongest_of(pool: TilePool, factors: list[RGB], colours: F32 | None) -> F32:
+    """The largest of the three of each texel (tiles, t, t); 0 where nothing is."""
+    if colours is not None:
+        return np.asarray(sampled_colours(pool, factors, colours, slice(None)).max(-1))
+    of_face = np.array(factors, np.float32).max(1)[pool.scene.material_ids[pool.charts.face_triangle]]
+    return np.append(of_face, np.float32(0))[pool.surfaces.face]  # the last where there is none, -1
+
+
 def sampled_irradiance(lightmap: Lightmap, *, whole: bool) -> F32:
     """H + a of the sampled tiles (tiles, t, t, 3) [W/m²], with what is still to come. whole: see
     ``LightTextures.refresh_ambient``."""

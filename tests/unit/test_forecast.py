@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from app.atlas.options import AtlasOptions
-from app.estimate.forecast import forecast
+from app.estimate.forecast import Forecast, forecast
 from app.lightmap.tile_pool import TilePool
 from app.render.exposure import first_exposure
-from app.render.sample import sampled_colours
+from app.render.sample import colours_of, sampled_colours, strongest_of
 from app.render.seen import seen_texels
 from app.scene.library import scene_names
+from app.scene.model import RGB
 from app.session.loading import load
 
 # EV of the automatic exposure for the first camera when solved: residual 1e-3 to 2e-2 (the grotto: 0.12) at 20,000 to 60,000
@@ -58,20 +59,25 @@ def test_a_scene_says_how_much_darker_it_is_than_mid_grey() -> None:
     assert darker == pytest.approx(first_exposure(pool, seen) - 1.5)
 
 
+def light_of(pool: TilePool, albedos: list[RGB], times: float) -> Forecast:
+    """With the scene's emission so many times, held as exitance."""
+    emissions = [(times * r, times * g, times * b) for r, g, b in (m.emission for m in pool.scene.materials)]
+    albedo, exitance = (lambda at, of=of: colours_of(pool, of, None, at) for of in (albedos, emissions))
+    return forecast(pool.surfaces, albedo, exitance, strongest_of(pool, emissions, None), NONE)
+
+
 def test_light_grows_with_the_lamp_and_no_lamp_gives_none() -> None:
     pool = nodes_of("cornell-box")
-    colours = [[getattr(m, key) for m in pool.scene.materials] for key in ("albedo", "emission")]
-    albedo, emission = (sampled_colours(pool, factors, None, slice(None)) for factors in colours)
-    once, thrice = (forecast(pool.surfaces, albedo, k * emission, NONE).irradiance for k in (1, 3))
-    np.testing.assert_allclose(thrice, 3 * once, rtol=1e-6)  # emission is in single precision
-    assert not forecast(pool.surfaces, albedo, 0 * emission, NONE).irradiance.any()
+    once, thrice = (light_of(pool, [m.albedo for m in pool.scene.materials], k) for k in (1, 3))
+    np.testing.assert_allclose(thrice.irradiance, 3 * once.irradiance, rtol=1e-6)  # emission is in single precision
+    assert not light_of(pool, [m.albedo for m in pool.scene.materials], 0).irradiance.any()
 
 
 def test_no_more_arrives_than_is_sent() -> None:
     """Energy: with black walls, what all points receive is at most what the lamps emit."""
     pool = nodes_of("cornell-box")
     emission = sampled_colours(pool, [m.emission for m in pool.scene.materials], None, slice(None))
-    light = forecast(pool.surfaces, np.zeros_like(emission), emission, NONE)
+    light = light_of(pool, [(0.0, 0.0, 0.0)] * len(pool.scene.materials), 1)
     emitted = np.einsum("tijc,tij->c", emission, pool.surfaces.area)
     received = light.area @ light.irradiance
     # sums of F are at most 1 towards either side; the box is open, and the lamp's front sees most of it
