@@ -12,14 +12,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.atlas.charts import Charts
 from app.atlas.charts_cache import program
 from app.atlas.texels import Leaves, TexelSurfaces, texel_surfaces
 from app.scene.model import F32, F64, I32, Scene
 from app.util import cache
+from app.util.ahead import ahead
 
 FOLD = 1e-4  # of a texel's width: further off the plane of its leading face, a mean of faces is off the surface
+BLOCK = 1 << 15  # texels in work at a time
 FEWEST = 1 << 18  # texels that a file is worth: they take half a second
 CACHE_FILES = 4  # kept, newest first: of two million texels a file takes 120 MB
 
@@ -41,17 +44,27 @@ def surfaces_of(
 def on_their_faces(scene: Scene, charts: Charts, surfaces: TexelSurfaces) -> TexelSurfaces:
     """Texels that fold over several faces, put onto the one that they show most of, with its normal. Their mean lies inside or
     outside of the surface, where the surface itself would hide it."""
-    covered = surfaces.face >= 0
-    face = surfaces.face[covered]
-    normal = _face_normals(scene, charts)[face]
-    position = surfaces.position[covered]
-    origin = scene.corners[charts.face_triangle[face], 0]
-    height = np.abs(np.einsum("nk,nk->n", position - origin, normal))
-    folded = height > FOLD * np.sqrt(surfaces.area[covered])
-    position[folded] = surfaces.leading[covered][folded]
-    positions, normals = surfaces.position.copy(), surfaces.normal.copy()
-    positions[covered], normals[covered] = position, normal
-    return dataclasses.replace(surfaces, position=positions, normal=normals)
+    normals, origins = _face_normals(scene, charts), scene.corners[charts.face_triangle, 0]
+    faces, area = surfaces.face.reshape(-1), surfaces.area.reshape(-1)
+    position, leading = (places.reshape(-1, 3) for places in (surfaces.position, surfaces.leading))
+
+    def folded(first: int) -> NDArray[np.int64]:
+        texels = first + np.flatnonzero(faces[first : first + BLOCK] >= 0)
+        face = faces[texels]
+        height = np.abs(np.einsum("nk,nk->n", position[texels] - origins[face], normals[face]))
+        return texels[height > FOLD * np.sqrt(area[texels])]
+
+    positions = position.copy()
+    for texels in ahead(folded, range(0, len(faces), BLOCK)):
+        positions[texels] = leading[texels]
+    return dataclasses.replace(
+        surfaces, position=positions.reshape(surfaces.position.shape), normal=_normals_of(normals, surfaces.face)
+    )
+
+
+def _normals_of(normals: F64, face: I32) -> F32:
+    """(n, t, t, 3) those of faces, 0 where there is none."""
+    return np.append(normals, np.zeros((1, 3)), axis=0).astype(np.float32)[face]
 
 
 def _face_normals(scene: Scene, charts: Charts) -> F64:
@@ -80,8 +93,7 @@ def _read(scene: Scene, charts: Charts, data: cache.Arrays | None) -> TexelSurfa
         return None
     face: I32 = data["face"]
     covered = face >= 0
-    normal: F32 = np.zeros((*face.shape, 3), np.float32)
-    normal[covered] = _face_normals(scene, charts)[face[covered]]
+    normal = _normals_of(_face_normals(scene, charts), face)
     position, leading = np.zeros((2, *face.shape, 3))
     area = np.zeros(face.shape)
     for whole, name in ((position, "position"), (leading, "leading"), (area, "area")):
