@@ -38,7 +38,7 @@ class Leaves:
         """(n,) a number for each tile; -1 where there is none."""
         return (self.level.astype(np.int64) << 48) | (self.y.astype(np.int64) << 24) | self.x
 
-    def only(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Leaves:
+    def only(self, which: slice | NDArray[np.bool_] | NDArray[np.int64]) -> Leaves:
         """Those of the leaves."""
         return Leaves(self.level[which], self.x[which], self.y[which])
 

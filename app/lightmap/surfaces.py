@@ -44,7 +44,7 @@ def surfaces_of(
 def on_their_faces(scene: Scene, charts: Charts, surfaces: TexelSurfaces) -> TexelSurfaces:
     """Texels that fold over several faces, put onto the one that they show most of, with its normal. Their mean lies inside or
     outside of the surface, where the surface itself would hide it."""
-    normals, origins = _face_normals(scene, charts), scene.corners[charts.face_triangle, 0]
+    normals, origins = face_normals(scene, charts), scene.corners[charts.face_triangle, 0]
     faces, area = surfaces.face.reshape(-1), surfaces.area.reshape(-1)
     position, leading = (places.reshape(-1, 3) for places in (surfaces.position, surfaces.leading))
 
@@ -52,7 +52,7 @@ def on_their_faces(scene: Scene, charts: Charts, surfaces: TexelSurfaces) -> Tex
         texels = first + np.flatnonzero(faces[first : first + BLOCK] >= 0)
         face = faces[texels]
         height = np.abs(np.einsum("nk,nk->n", position[texels] - origins[face], normals[face]))
-        return texels[height > FOLD * np.sqrt(area[texels])]
+        return np.asarray(texels[height > FOLD * np.sqrt(area[texels])])
 
     positions = position.copy()
     for texels in ahead(folded, range(0, len(faces), BLOCK)):
@@ -67,7 +67,7 @@ def _normals_of(normals: F64, face: I32) -> F32:
     return np.append(normals, np.zeros((1, 3)), axis=0).astype(np.float32)[face]
 
 
-def _face_normals(scene: Scene, charts: Charts) -> F64:
+def face_normals(scene: Scene, charts: Charts) -> F64:
     """(f, 3) unit, towards the lit side."""
     return np.asarray(scene.normals_areas[0][charts.face_triangle] * np.where(charts.face_back, -1.0, 1.0)[:, None])
 
@@ -93,7 +93,7 @@ def _read(scene: Scene, charts: Charts, data: cache.Arrays | None) -> TexelSurfa
         return None
     face: I32 = data["face"]
     covered = face >= 0
-    normal = _normals_of(_face_normals(scene, charts), face)
+    normal = _normals_of(face_normals(scene, charts), face)
     position, leading = np.zeros((2, *face.shape, 3))
     area = np.zeros(face.shape)
     for whole, name in ((position, "position"), (leading, "leading"), (area, "area")):

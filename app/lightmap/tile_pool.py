@@ -16,15 +16,18 @@ from app.atlas.charts import Charts
 from app.atlas.texels import Leaves, TexelSurfaces, faces_tangents, uniform_leaves
 from app.atlas.visible_mesh import VisibleMesh, visible_mesh
 from app.errors import UserError
+from app.lightmap.surfaces import face_normals
 from app.lightmap.tile_shapes import SHAPE, TileTexels, tile_shapes
 from app.lightmap.tiles import Tiles
 from app.scene.model import F32, F64, Scene
+from app.util.ahead import ahead
 
 Array = NDArray[np.generic]
 ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 MAX_FACETS = (1 << 24) - 2  # item ids are held as floats, see common/item.glsl
 TABLE_WIDTH = 2048  # columns of the facet table
+BLOCK = 128  # tiles in work at a time
 FACET_ENTRIES = 3  # of a facet in it, as in common/facet.glsl
 
 
@@ -59,6 +62,8 @@ class Moves:
 
     def array(self, array: Any, value: float) -> Any:
         """What was kept for each slot, as it is to be kept now; ``value`` in slots that are new."""
+        if self.slots == self.staying == len(array):
+            return array
         moved = np.full((self.slots, *array.shape[1:]), value, array.dtype)
         moved[: self.staying] = array[: self.staying]
         moved[self.new] = array[self.old]
@@ -95,26 +100,20 @@ class TilePool:
         self._facet_material = np.zeros(charts.facet_count, np.int32)
         self._facet_material[charts.face_facet] = scene.material_ids[charts.face_triangle]
         cut = Tiles.cut(scene, charts, uniform_leaves(charts) if leaves is None else leaves, report=report)
-        self._make_room(cut, max(len(cut), slots))
-        self.put(np.arange(len(cut)), cut)
+        self._hold(cut, max(len(cut), slots))
 
-    def _make_room(self, cut: Tiles, slots: int) -> None:
+    def _hold(self, cut: Tiles, slots: int) -> None:
+        """Let the first of so many slots hold these tiles, whose arrays are the pool's from now on."""
+        count, nowhere = len(cut), np.empty(0, np.int64)
         self.columns = max(1, int(np.ceil(np.sqrt(slots))))
-        none = np.full(0, -1, np.int32)
-        self.leaves = Leaves(none, none, none)
-        shape = (0, self.tile, self.tile)
-        vectors, colours = np.zeros((*shape, 3)), np.zeros((*shape, 3), np.float32)
-        self.surfaces = TexelSurfaces(
-            vectors, np.zeros(shape), colours, np.zeros(shape, np.int32), vectors, np.zeros(shape, bool)
-        )
-        self.albedo_tiles = None if cut.albedo is None else colours
-        self.emission_tiles = None if cut.emission is None else colours
-        self.shapes, self.used = np.zeros(0, SHAPE), np.zeros(0, bool)
-        self._texels = np.zeros(0, np.int64)  # of each slot, that cover a surface
+        self.leaves, self.surfaces = cut.leaves, cut.surfaces
+        self.albedo_tiles, self.emission_tiles = cut.albedo, cut.emission
+        self.shapes, self.used = np.zeros(count, SHAPE), np.zeros(count, bool)
+        self._texels = np.zeros(count, np.int64)  # of each slot, that cover a surface
         self.depth = 0
         self._pages = np.zeros([side // self.tile for side in self.charts.size[::-1]], np.uint32)
-        nowhere = np.empty(0, np.int64)
-        self.resize(Moves(slots, 0, nowhere, nowhere))
+        self.resize(Moves(slots, count, nowhere, nowhere))
+        self._take_in(np.arange(count), cut)
 
     def resize(self, moves: Moves) -> None:
         """Have another number of slots, in rows as long as before, with the leaves where ``moves`` has them."""
@@ -141,8 +140,14 @@ class TilePool:
         for own, colours in ((self.albedo_tiles, tiles.albedo), (self.emission_tiles, tiles.emission)):
             if own is not None:
                 own[slots] = 1.0 if colours is None else colours
+        self._take_in(slots, tiles)
+
+    def _take_in(self, slots: NDArray[np.int64], tiles: Tiles) -> None:
+        """What follows from these tiles, which these slots hold."""
         self._texels[slots] = (tiles.surfaces.face >= 0).sum((1, 2))
-        self.shapes[slots] = tile_shapes(self._tile_texels(tiles), self._facet_material)
+        some = [slice(first, first + BLOCK) for first in range(0, len(tiles), BLOCK)]
+        for part, shapes in zip(some, ahead(lambda part: self._shapes(tiles.only(part)), some), strict=True):
+            self.shapes[slots[part]] = shapes
         self.used[slots] = True
         self._fit_pages()
         self._turn_pages(slots, slots + 1)
@@ -227,8 +232,18 @@ class TilePool:
     @property
     def arrays(self) -> dict[str, Array]:
         """Texture name -> (height, width, components) array as the texture holds it."""
-        tiles = self.tile_arrays(np.arange(self.tiles))
-        return {name: self.image_from_tiles(array) for name, array in tiles.items()} | self._tables()
+        none, tile, columns = self.tile_arrays(np.empty(0, np.int64)), self.tile, self.columns
+        images = {name: np.zeros((self.rows, tile, columns, tile, of.shape[-1]), of.dtype) for name, of in none.items()}
+
+        def fill(row: int) -> None:
+            slots = np.arange(row * columns, min((row + 1) * columns, self.tiles))
+            for name, tiles in self.tile_arrays(slots).items():
+                images[name][row, :, : len(slots)] = tiles.swapaxes(0, 1)
+
+        for _ in ahead(fill, range(self.rows)):
+            pass
+        wide = {name: image.reshape(*self.size[::-1], -1) for name, image in images.items()}
+        return {**wide, **self._tables()}
 
     @property
     def pages_per_texel(self) -> float:
@@ -292,7 +307,7 @@ class TilePool:
         ids = np.where(covered, facet << np.uint32(self.material_bits) | material, np.uint32(0))
         out: dict[str, Array] = {
             "t_position_area": np.concatenate([position, area], -1).astype(np.float32),
-            "t_normal_ids": np.stack([octahedral(self.surfaces.normal[slots]), ids.astype(np.uint32)], -1),
+            "t_normal_ids": np.stack([self._packed_normals[face], ids.astype(np.uint32)], -1),
         }
         for name, tiles in (("t_albedo", self.albedo_tiles), ("t_emission", self.emission_tiles)):
             if tiles is not None:
@@ -332,9 +347,10 @@ class TilePool:
         of_plane[charts.face_facet, 3] = np.einsum("ij,ij->i", normal[charts.face_facet], corner)
         return table.reshape(rows, TABLE_WIDTH, 4)
 
-    def _tile_texels(self, tiles: Tiles) -> TileTexels:
+    def _shapes(self, tiles: Tiles) -> NDArray[np.void]:
+        """(n,) SHAPE of each of these tiles."""
         s, charts = tiles.surfaces, self.charts
-        return TileTexels(
+        texels = TileTexels(
             position=self.space.local_from_world(s.position),
             normal=s.normal,
             area=s.area / self.space.scale**2,
@@ -343,6 +359,12 @@ class TilePool:
             dpdu=self.dpdu,
             dpdv=self.dpdv,
         )
+        return tile_shapes(texels, self._facet_material)
+
+    @functools.cached_property
+    def _packed_normals(self) -> NDArray[np.uint32]:
+        """(f + 1,) those of faces, and last what stands where there is none."""
+        return octahedral(np.append(face_normals(self.scene, self.charts), np.zeros((1, 3)), 0).astype(np.float32))
 
     def _facet_tangents(self) -> tuple[F64, F64]:
         """∂p/∂u and ∂p/∂v of each facet (facets, 3), solver space per atlas texel."""

@@ -29,6 +29,11 @@ class TileTexels:
     dpdu: F64
     dpdv: F64
 
+    def only(self, which: NDArray[np.int64]) -> TileTexels:
+        """Those of the tiles."""
+        position, normal, area = self.position[which], self.normal[which], self.area[which]
+        return TileTexels(position, normal, area, self.facet[which], self.size[which], self.dpdu, self.dpdv)
+
 
 # planar: whether corner and edges say all of it. box: of the covered texels, lower corner and the one beyond the upper (x, y). In
 # the solver space, of planar tiles: a, the corner of the box and the facet, from 1; b, ∂p/∂u per texel and the material; c, ∂p/∂v
@@ -65,30 +70,33 @@ def _boxes(covered: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 def _planar_tiles(t: TileTexels) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
     """The facet of each tile, and whether all its covered texels are whole, of that facet, and on its grid."""
-    covered = t.facet >= 0
     count = len(t.facet)
     facet = t.facet.reshape(count, -1).max(1)
-    planar = np.where(covered, t.facet, facet[:, None, None]).reshape(count, -1).min(1) == facet
+    same = np.where(t.facet >= 0, t.facet, facet[:, None, None]).reshape(count, -1).min(1) == facet
+    one, planar = np.flatnonzero(same & (facet >= 0)), np.zeros(count, bool)
+    planar[one] = _on_grid(t.only(one), facet[one])
+    return facet, planar
+
+
+def _on_grid(t: TileTexels, facet: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Of tiles that show one facet: whether all their covered texels are whole and on its grid."""
+    covered = t.facet >= 0
     du, dv = t.dpdu[facet] * t.size[:, None], t.dpdv[facet] * t.size[:, None]
     whole = np.linalg.norm(np.cross(du, dv), axis=-1)
-    planar &= (
-        (np.abs(t.area / whole[:, None, None] - 1) < PLANE_ERROR)
-        .reshape(count, -1)
-        .all(1, where=covered.reshape(count, -1))
-    )
-    planar &= (np.abs((du * dv).sum(-1)) < PLANE_ERROR * whole) & covered.any((1, 2))
+    found = (np.abs(t.area / whole[:, None, None] - 1) < PLANE_ERROR) | ~covered
+    flat = found.all((1, 2)) & (np.abs((du * dv).sum(-1)) < PLANE_ERROR * whole)
     corner = _corners(t, facet)
     steps = np.arange(t.facet.shape[2]) + 0.5
     for row in range(t.facet.shape[1]):  # one row of all tiles at a time: bounded memory
         grid = corner[:, None] + steps[None, :, None] * du[:, None] + steps[row] * dv[:, None]
         error = np.linalg.norm(t.position[:, row] - grid, axis=-1)
-        planar &= (error < PLANE_ERROR * np.sqrt(whole)[:, None]).all(1, where=covered[:, row])
-    return facet, planar
+        flat &= (error < PLANE_ERROR * np.sqrt(whole)[:, None]).all(1, where=covered[:, row])
+    return np.asarray(flat)
 
 
 def _corners(t: TileTexels, facet: NDArray[np.int32]) -> F64:
     """Where each tile's lower corner lies, extrapolated from its first covered texel."""
-    first = (t.facet >= 0).reshape(len(facet), -1).argmax(1)
+    first = (t.facet >= 0).reshape(len(facet), t.facet.shape[1] * t.facet.shape[2]).argmax(1)
     row, column = np.divmod(first, t.facet.shape[2])
     at = t.position[np.arange(len(facet)), row, column]
     du, dv = t.dpdu[facet] * t.size[:, None], t.dpdv[facet] * t.size[:, None]

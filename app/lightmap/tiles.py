@@ -53,7 +53,7 @@ class Tiles:
             surfaces = dataclasses.replace(surfaces, face=face)
         return Tiles(leaves, surfaces, albedo, emission)
 
-    def only(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Tiles:
+    def only(self, which: slice | NDArray[np.bool_] | NDArray[np.int64]) -> Tiles:
         """Those of the tiles."""
         return Tiles(
             self.leaves.only(which),
