@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from app.atlas.charts import Charts
 from app.atlas.enclosed import sides_with_texels
 from app.atlas.layout import density_for, measured, place, scaled
-from app.atlas.sides import distinct_rows, groups_of
+from app.atlas.sides import Edges, distinct_rows, groups_of
 from app.scene.model import F64, I32, Scene
 from app.util.background import Report
 
@@ -28,28 +28,24 @@ def coarse_charts(scene: Scene, tile: int, texels: int, report: Report) -> Chart
     axis = np.abs(normals).argmax(axis=1)
     way = 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0)
     report(0.3)
-    count, piece = _pieces(scene, way)
+    edges = Edges.of(distinct_rows(*scene.positions.T)[1][scene.triangles].astype(np.int32))
+    count, piece = _pieces(scene, edges, way)
     report(0.5)
     if count > MOST_PIECES:
         return None
-    layout = scaled(measured(piece, _seen_along(scene.corners, way), np.empty((0, 2)), lit), scene)
+    layout = scaled(measured(piece, _seen_along(scene.corners, way), np.empty((0, 2)), lit, edges), scene)
     density = density_for(layout, texels)
     facet = np.arange(len(piece), dtype=np.int32)
     report(0.8)
     return place(layout, lit, facet, density, tile, f"{count} pieces seen along an axis", report)
 
 
-def _pieces(scene: Scene, way: NDArray[np.int64]) -> tuple[int, I32]:
+def _pieces(scene: Scene, edges: Edges, way: NDArray[np.int64]) -> tuple[int, I32]:
     """How many pieces there are, and the number of that of each triangle (m,): of one material and way (m,), joined at edges."""
-    point = distinct_rows(*scene.positions.T)[1]
-    start = point[scene.triangles].reshape(-1)
-    end = point[np.roll(scene.triangles, -1, axis=1)].reshape(-1)
-    kind = np.repeat(way * len(scene.materials) + scene.material_ids, 3)
-    edge = distinct_rows(kind, np.minimum(start, end), np.maximum(start, end))[1]
-    order = np.argsort(edge, kind="stable")
-    joined = edge[order[1:]] == edge[order[:-1]]
-    pairs = np.stack([order[:-1][joined] // 3, order[1:][joined] // 3], axis=1)
-    count, label = groups_of(len(way), pairs)
+    kind = way * len(scene.materials) + scene.material_ids
+    i, j = (half // 3 for half in edges.pairs())
+    joined = kind[i] == kind[j]
+    count, label = groups_of(len(way), np.stack([i[joined], j[joined]], axis=1))
     return count, label.astype(np.int32)
 
 

@@ -77,21 +77,28 @@ def lit_sides(scene: Scene) -> Sides:
     normals, _ = scene.normals_areas
     offsets = np.einsum("mk,mk->m", normals, corners[:, 0])
     hull = _hull_points((scene.positions[scene.used] - (low + high) / 2) / size)
-    reach_front, reach_back = np.empty(len(normals)), np.empty(len(normals))
-    step = max(1, BLOCK // len(hull))
-    for start in range(0, len(normals), step):
-        part = slice(start, start + step)
-        heights = normals[part] @ hull.T
-        reach_front[part] = heights.max(axis=1) - offsets[part]
-        reach_back[part] = offsets[part] - heights.min(axis=1)
-    fronts = reach_front > FLAT
+    fronts = _reaches(hull, normals, offsets)
     two_sided = scene.sides
-    backs = two_sided & (reach_back > FLAT)
+    backs = two_sided.copy()
+    backs[two_sided] = _reaches(hull, -normals[two_sided], -offsets[two_sided])
     if scene.open_to_lights or (not fronts.any() and not backs.any()):
         fronts, backs = np.ones_like(fronts), two_sided
     triangle = np.concatenate([np.flatnonzero(fronts), np.flatnonzero(backs)]).astype(np.int32)
     back = np.arange(len(triangle)) >= np.count_nonzero(fronts)
     return Sides(triangle, back, len(normals) + int(np.count_nonzero(two_sided)) - len(triangle))
+
+
+def _reaches(hull: F64, normals: F64, offsets: F64) -> NDArray[np.bool_]:
+    """Whether any of the points (h, 3) is in front of each plane, normals (m, 3) and offsets (m,)."""
+    found, left = np.zeros(len(normals), bool), np.arange(len(normals))
+    for extreme in (*hull.argmin(axis=0), *hull.argmax(axis=0)):  # most planes have one of these in front
+        found[left] = normals[left] @ hull[extreme] - offsets[left] > FLAT
+        left = left[~found[left]]
+    step = max(1, BLOCK // len(hull))
+    for start in range(0, len(left), step):
+        part = left[start : start + step]
+        found[part] = (normals[part] @ hull.T).max(axis=1) - offsets[part] > FLAT
+    return found
 
 
 def _hull_points(points: F64) -> F64:

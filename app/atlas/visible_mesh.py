@@ -120,6 +120,13 @@ def visible_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
     )
 
 
+def coarse_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
+    """The same for coarse texels, which are not there for long: in no clusters, and divided nowhere."""
+    whole = Divided(np.arange(len(scene.triangles)), scene.triangles.astype(np.int64), None)
+    vertices, corners = _shared_vertices(scene, charts, local.astype(np.float32), whole)
+    return VisibleMesh(vertices, corners, whole.parent, None, None)
+
+
 def _divided(local: F64, triangles: I32) -> tuple[Divided, F32]:
     """Triangles of places (n, 3) divided at T-junctions; where the points are that their corners are, as the GPU holds them."""
     rounded = local.astype(np.float32)

@@ -15,7 +15,7 @@ from app.atlas.coarse import coarse_charts
 from app.atlas.mesh_cache import kept_mesh
 from app.atlas.options import MAX_TEXELS, AtlasOptions
 from app.atlas.parametrize import check, default_texels
-from app.atlas.visible_mesh import visible_mesh
+from app.atlas.visible_mesh import coarse_mesh
 from app.errors import UserError
 from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
@@ -207,7 +207,7 @@ def _in_texels(
     exposure = None
     beside = ThreadPoolExecutor(2)
     try:
-        mesh = beside.submit(visible_mesh if coarse else kept_mesh, scene, charts, local)
+        mesh = beside.submit(coarse_mesh if coarse else kept_mesh, scene, charts, local)
         seams = beside.submit(lambda: charts.seam_texels)
         pool = quadtree_pool(scene, charts, report) if options.adaptive else TilePool(scene, charts, report=report)
         report(1.0)

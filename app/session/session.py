@@ -180,7 +180,7 @@ class Session(EditableScene):
         self._away = {key: material for key, material in edits.items() if key not in keys_of(scene.materials)}
         if not same_scene:
             self.edited = object()
-        if same_scene and self.scene is not scene:
+        if same_scene and (edits or self.scene.sky is not scene.sky or self.scene.lights is not scene.lights):
             lightmap.set_materials(with_edits(scene.materials, edits))
             lightmap.set_sky(self.scene.sky)
             lightmap.set_lights(self.scene.lights)
