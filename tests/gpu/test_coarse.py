@@ -53,6 +53,7 @@ def better(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[threadin
     monkeypatch.setattr(charts_cache, "FEWEST", 0)
     monkeypatch.setattr(loading, "COARSE_FROM", 0)
     monkeypatch.setattr(session_module, "COARSE_SECONDS", PATIENCE)
+    monkeypatch.setattr(session_module, "COARSE_LONGEST", PATIENCE)
     monkeypatch.setattr(session_module, "COARSE_LEFT", 0.0)
     monkeypatch.setattr(loading, "default_texels", lambda sides, roots: TEXELS // 16)
     with cache.elsewhere(tmp_path):
@@ -178,6 +179,7 @@ def test_the_processor_is_left_to_better_charts_after_a_while(
         session.advance()
     assert session.solver.issued == 0 and not session.solving and session.run.running
     monkeypatch.setattr(session_module, "COARSE_SECONDS", PATIENCE)
+    monkeypatch.setattr(session_module, "COARSE_LONGEST", PATIENCE)
     monkeypatch.setattr(session_module, "COARSE_LEFT", 0.9)
     frames(session, lambda: session.run.resting and session.solver.issued > 0)
     assert session.run.progress.remaining <= 0.9 and not session.solving
