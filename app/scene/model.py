@@ -131,7 +131,7 @@ class Scene:
     @functools.cached_property
     def corners(self) -> F64:
         """(m, 3, 3) f64: the corner positions of each triangle."""
-        return self.positions[self.triangles]
+        return self.positions.take(self.triangles, axis=0)
 
     @functools.cached_property
     def normals_areas(self) -> tuple[F64, F64]:
@@ -151,8 +151,8 @@ class Scene:
     @functools.cached_property
     def bounds(self) -> tuple[F64, F64]:
         """Lower and upper corner of the box around all triangles [m]."""
-        x, y, z = self.positions[self.used].T.copy()
-        return np.array([x.min(), y.min(), z.min()]), np.array([x.max(), y.max(), z.max()])
+        columns = [column[self.used] for column in self.positions.T]
+        return np.array([column.min() for column in columns]), np.array([column.max() for column in columns])
 
     @property
     def emits(self) -> bool:

@@ -45,7 +45,8 @@ class AxisRays:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._lower, self._upper = scene.corners.min(1), scene.corners.max(1)
+        a, b, c = scene.corners.transpose(1, 2, 0)
+        self._lower, self._upper = (f(f(a, b), c) for f in (np.minimum, np.maximum))  # (3, m) boxes of triangles
         self._met: dict[tuple[int, float, float], tuple[F64, NDArray[np.bool_]]] = {}
 
     def free(self, point: F64) -> Free:
@@ -68,13 +69,10 @@ class AxisRays:
         across = [(axis + 1) % 3, (axis + 2) % 3]
         u, v = (float(point[k]) for k in across)
         if (axis, u, v) not in self._met:
-            lower, upper = self._lower, self._upper
-            near = np.flatnonzero(
-                (lower[:, across[0]] <= u)
-                & (upper[:, across[0]] >= u)
-                & (lower[:, across[1]] <= v)
-                & (upper[:, across[1]] >= v)
-            )
+            near: slice | NDArray[np.int64] = slice(None)
+            for k, place in zip(across, (u, v), strict=True):
+                meets = np.flatnonzero((self._lower[k][near] <= place) & (self._upper[k][near] >= place))
+                near = meets if isinstance(near, slice) else near[meets]
             corners = self._scene.corners[near]
             flat = corners[:, :, across] - (u, v)
             # Signed areas of the line against each edge, seen along the axis: all of one sign if it passes through

@@ -135,15 +135,24 @@ def has_area(positions: F64, triangles: Array) -> Bools:
     Its least height must exceed FLATNESS of the scene's extent, and with it of its own longest edge, which is at most
     √3 times that. Everything is relative, so the answer does not depend on the unit.
     """
-    low, high = positions[triangles].min(axis=(0, 1)), positions[triangles].max(axis=(0, 1))
+    low, high = _bounds(positions, triangles)
     extent = float((high - low).max())
     if extent == 0.0:
         return np.zeros(len(triangles), bool)
-    a, b, c = np.moveaxis(((positions - low) / extent)[triangles], 1, 0)
+    places = (positions - low) / extent
+    a, b, c = (places.take(triangles[:, k], axis=0) for k in range(3))
     longest = np.maximum.reduce([np.linalg.norm(e, axis=1) for e in (b - a, c - b, a - c)])
     twice_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     solid: Bools = twice_area > FLATNESS * longest
     return solid
+
+
+def _bounds(positions: F64, triangles: Array) -> tuple[F64, F64]:
+    """Lower and upper corner of the box around triangles (m, 3) of positions (n, 3)."""
+    used = np.zeros(len(positions), bool)
+    used[triangles] = True
+    columns = [column[used] for column in positions.T]
+    return np.array([column.min() for column in columns]), np.array([column.max() for column in columns])
 
 
 def _check_part(source: str | Path, part: Part, object_count: int, material_count: int) -> None:
@@ -174,8 +183,8 @@ def _join_geometry(source: str | Path, parts: Sequence[Part]) -> tuple[F64, NDAr
             given = counted(len(triangles), "triangle has", "triangles have")
             raise SceneError(source, f"{bad} of {given} a corner that is not a finite number")
         positions = np.where(finite[:, None], positions, 0.0)
-    corners = positions[triangles]
-    extent = float((corners.max(axis=(0, 1)) - corners.min(axis=(0, 1))).max())
+    low, high = _bounds(positions, triangles)
+    extent = float((high - low).max())
     least, most = EXTENT_RANGE
     if extent > 0.0 and not least <= extent <= most:
         raise SceneError(source, f"the scene is {extent:.3g} m across: allowed is {least:g} m to {most:g} m")
