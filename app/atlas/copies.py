@@ -18,6 +18,7 @@ from app.scene.model import F64, I32
 LEAST = 32  # triangles of a surface that is looked for: fewer cost no time to unfold
 SAME = 1e-4  # of a shape's radius, that a corner of a copy may be off: charts have at most some thousand texels
 ROUNDS = 8  # shapes told apart among surfaces that seem alike; what is left then is unfolded by itself
+SAMPLED = 16  # corners of a surface that are compared first
 BLOCK = 1 << 20  # corners compared at a time
 
 I64 = NDArray[np.int64]
@@ -40,11 +41,13 @@ def find_surfaces(points: F64, triangles: I32, groups: I32) -> Surfaces:
     first, count = first[:-1], np.diff(first)
     original = np.arange(len(triangles))
     corners, named = points[triangles[order]], _names(vertices[order], first, count)
-    kind = distinct_rows(count, _digest(named, first), _sizes(corners, first, count))[1]
+    centre, radius = _extents(corners, count)
+    kind = distinct_rows(count, _digest(named, first), _sizes(corners, count, radius))[1]
     for mine in np.split(np.argsort(kind, kind="stable"), np.cumsum(np.bincount(kind))[:-1]):
         if len(mine) > 1 and count[mine[0]] >= LEAST:
             rows = first[mine][:, None] + np.arange(count[mine[0]])
-            original[order[rows]] = order[rows[_same_shape(corners, named, rows)]]
+            far = _distances(corners, rows, centre[mine], radius[mine])
+            original[order[rows]] = order[rows[_same_shape(corners, named, rows, far)]]
     return Surfaces(surface, original)
 
 
@@ -83,28 +86,42 @@ def _digest(named: I64, first: I64) -> NDArray[np.uint64]:
     return np.asarray(np.add.reduceat(mixed ^ (mixed >> np.uint64(29)), 3 * first), np.uint64)
 
 
-def _sizes(corners: F64, first: I64, count: I64) -> I64:
-    """(s,) the area of each surface over the square of its extent, roughly: surfaces that seem alike may differ there."""
-    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+def _extents(corners: F64, count: I64) -> tuple[F64, F64]:
+    """The middle of the corners (m, 3, 3) of each surface, runs of so many triangles (s,), and their mean distance from it."""
     surface = np.repeat(np.arange(len(count)), count)
     centre = totals(surface, middle(corners), len(count)) / count[:, None]
     spread = totals(surface, ((corners - centre[surface][:, None]) ** 2).sum((1, 2)), len(count)) / count
-    least = np.finfo(float).tiny
-    ratio = totals(surface, doubled, len(count)) / np.maximum(spread, least)
-    return np.asarray(np.round(64 * np.log2(np.maximum(ratio, least))), np.int64)
+    return centre, np.sqrt(np.maximum(spread / 3, np.finfo(float).tiny))
 
 
-def _same_shape(corners: F64, named: I64, rows: I64) -> I64:
-    """(k,) for each of surfaces whose triangles are the rows (k, t), the first one that it is a copy of: itself, if none."""
+def _sizes(corners: F64, count: I64, radius: F64) -> I64:
+    """(s,) the area of each surface over the square of its extent, roughly: surfaces that seem alike may differ there."""
+    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = totals(np.repeat(np.arange(len(count)), count), doubled, len(count))
+    return np.asarray(np.round(64 * np.log2(np.maximum(area / (3 * radius**2), np.finfo(float).tiny))), np.int64)
+
+
+def _distances(corners: F64, rows: I64, centre: F64, radius: F64) -> F64:
+    """(k, SAMPLED) of some corners of surfaces, of triangles rows (k, t), from their centre (k, 3), over their radius (k,)."""
+    some = np.linspace(0, rows.shape[1] - 1, SAMPLED).astype(np.int64)
+    return np.asarray(np.linalg.norm(corners[rows[:, some], 0] - centre[:, None], axis=2) / radius[:, None])
+
+
+def _same_shape(corners: F64, named: I64, rows: I64, far: F64) -> I64:
+    """(k,) for each of surfaces whose triangles are the rows (k, t), the first one that it is a copy of: itself, if none. far:
+    see _distances."""
     same, waiting, one = np.arange(len(rows)), np.arange(1, len(rows)), 0
     step = max(1, BLOCK // (3 * rows.shape[1]))
     for _ in range(ROUNDS):
         shape = _centred(corners[rows[one : one + 1]])
+        widest = np.abs(shape).max() / np.sqrt((shape**2).sum(2).mean())
+        maybe = np.flatnonzero((np.abs(far[waiting] - far[one]) <= 4 * SAME * widest).all(1))  # no copy is farther off
         fits = np.zeros(len(waiting), bool)
-        for start in range(0, len(waiting), step):
-            mine = rows[waiting[start : start + step]]
+        for start in range(0, len(maybe), step):
+            block = maybe[start : start + step]
+            mine = rows[waiting[block]]
             alike = (named[mine] == named[rows[one]]).all((1, 2))
-            fits[start : start + step] = alike & _fits(_centred(corners[mine]), shape)
+            fits[block] = alike & _fits(_centred(corners[mine]), shape)
         same[waiting[fits]] = one
         waiting = waiting[~fits]
         if not len(waiting):

@@ -128,12 +128,17 @@ def _middles_of_thin(hidden: shapely.Geometry, flat: F64) -> F64:
 
 def axes_of(corners: F64) -> F64:
     """(3, 2) of the plane of triangles (t, 3, 3), which are counter-clockwise there."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal = normals[np.linalg.norm(normals, axis=1).argmax()]
-    normal = normal / np.linalg.norm(normal)
-    across = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    across /= np.linalg.norm(across)
-    return np.stack([across, np.cross(normal, across)], axis=1)
+    normals = np.array(_cross((corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T)).T
+    normal = normals[np.linalg.norm(normals, axis=1).argmax()] if len(normals) > 1 else normals[0].copy()
+    normal /= np.sqrt(normal @ normal)
+    across = np.array(_cross(normal, np.eye(3)[np.abs(normal).argmin()]))
+    across /= np.sqrt(across @ across)
+    return np.array([across, _cross(normal, across)]).T
+
+
+def _cross(a: F64, b: F64) -> tuple[F64, F64, F64]:
+    """The cross product of a (3, …) and b (3, …); of single vectors many times faster than np.cross."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def _drawn_on(segments: F64, border: shapely.Geometry) -> tuple[F64, int]:

@@ -85,7 +85,8 @@ def cut_pieces(pieces: list[Piece], places: F64, corners: I32, facet: I32, repor
 
 def _add_border_nodes(nodes: _Nodes, piece: Piece, corners: I32) -> None:
     """The nodes at which a piece is parted at its border: neighbours there are cut there, too."""
-    ends = np.unique(piece.parts.reshape(-1, 2), axis=0)
+    ends = piece.parts.reshape(-1, 2)
+    ends = ends[distinct_rows(*ends.T)[0]]
     ends = ends[shapely.distance(shapely.points(ends), piece.border) <= NEAR]
     if not len(ends):
         return
