@@ -20,9 +20,11 @@ from app.atlas.rectangles import CREASE
 from app.atlas.sides import distinct_rows
 from app.atlas.triangle_cuts import JUMPS
 from app.scene.model import F64, I32, Scene
+from app.util.ahead import ahead
 
 REACH = 1.5  # texels: bilinear look-ups inside of a chart reach √2 beyond its edge
 SAME_NORMAL = 1e-3  # that shared vertex normals may differ by
+BLOCK = 1 << 12  # edges whose texels are looked for at a time
 
 I64 = NDArray[np.int64]
 
@@ -104,28 +106,39 @@ def find_seams(
 def seam_texels(seams: Seams, finer: int = 1) -> SeamTexels:
     """The texels near seams where there are so many of them along an edge of a texel of level 0; each by its nearest seam."""
     own, other = seams.own * finer, seams.other * finer
-    low = np.floor(own.min(1) - REACH).astype(np.int64)
-    across, up = (np.ceil(own.max(1) + REACH).astype(np.int64) - low).T
-    count = across * up
-    seam = np.repeat(np.arange(len(own)), count)
-    nth = np.arange(len(seam)) - np.repeat(np.cumsum(count) - count, count)
-    texel = low[seam] + np.stack([nth % across[seam], nth // across[seam]], axis=1)
     way, there = own[:, 1] - own[:, 0], other[:, 1] - other[:, 0]
     length = np.linalg.norm(way, axis=1)
-    from_start = texel + 0.5 - own[seam, 0]
-    t = np.clip((from_start * way[seam]).sum(1) / length[seam] ** 2, 0.0, 1.0)[:, None]
-    far = np.linalg.norm(from_start - t * way[seam], axis=1)
-    near = far <= REACH
-    seam, texel, t, far, from_start = seam[near], texel[near], t[near], far[near], from_start[near]
-    right = np.stack([way[:, 1], -way[:, 0]], axis=1) / length[:, None]
-    beyond = np.where((from_start * right[seam]).sum(1) > 0, far, -far)
-    order = np.lexsort((far, texel[:, 0], texel[:, 1]))
-    fresh = np.r_[True, (np.diff(texel[order], axis=0) != 0).any(1)][: len(order)]
-    seam, texel, t, beyond = (values[order[fresh]] for values in (seam, texel, t, beyond))
+    blocks = [slice(first, first + BLOCK) for first in range(0, len(own), BLOCK)]
+    parts = ahead(lambda some: _near(own[some], way[some], length[some], some.start), blocks or [slice(0, 0)])
+    seam, x, y, t, far, beyond = (np.concatenate(column) for column in zip(*parts, strict=True))
+    place = (y << 32) + x  # rows first, also where x is below 0
+    order = np.lexsort((far, place))
+    fresh = order[np.r_[True, place[order[1:]] != place[order[:-1]]][: len(order)]]
+    seam, x, y, t, beyond = seam[fresh], x[fresh], y[fresh], t[fresh, None], beyond[fresh]
     outward = (
         np.stack([there[:, 1], -there[:, 0]], axis=1) / length[:, None]
     )  # as long as a texel of the own chart is there
-    place = other[seam, 0] + t * there[seam] + np.maximum(beyond, 0.0)[:, None] * outward[seam]
+    goes_on = other[seam, 0] + t * there[seam] + np.maximum(beyond, 0.0)[:, None] * outward[seam]
     weight = np.clip((1 + beyond) / 2, 0.0, 1.0)
     some = weight > 0
-    return SeamTexels(texel[some], place[some] / finer, weight[some])
+    return SeamTexels(np.stack([x, y], axis=1)[some], goes_on[some] / finer, weight[some])
+
+
+def _near(own: F64, way: F64, length: F64, first: int) -> tuple[I64, I64, I64, F64, F64, F64]:
+    """Texels within REACH of edges own (k, 2, 2), numbered from ``first``, along ``way`` (k, 2) and so long: (n,) edge, x, y of
+    each; the nearest place on it, a share of the way; how far that is, and how far beyond the edge, less than 0 before it."""
+    low = np.floor(own.min(1) - REACH).astype(np.int64)
+    across, up = (np.ceil(own.max(1) + REACH).astype(np.int64) - low).T
+    count = across * up
+    edge = np.repeat(np.arange(len(own)), count)
+    nth = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+    row = nth // across[edge]
+    x, y = low[edge, 0] + nth - row * across[edge], low[edge, 1] + row
+    way_x, way_y, size = way[edge, 0], way[edge, 1], length[edge]
+    dx, dy = x + 0.5 - own[edge, 0, 0], y + 0.5 - own[edge, 0, 1]
+    t = np.clip((dx * way_x + dy * way_y) / size**2, 0.0, 1.0)
+    squared = (dx - t * way_x) ** 2 + (dy - t * way_y) ** 2
+    near = np.flatnonzero(squared <= REACH**2)
+    right = (dx * way_y - dy * way_x)[near] > 0
+    far = np.sqrt(squared[near])
+    return edge[near] + first, x[near], y[near], t[near], far, np.where(right, far, -far)
