@@ -1,8 +1,8 @@
 """The surfaces of texels as solvers take them: each on the face that it shows most of. Where there are many, they are kept on
 disk: reading takes a tenth of cutting them.
 
-A file holds what the scene and its charts do not say: of each texel its face, and whether something lies on it; of those that
-cover any, area, position and leading place. Normals are those of faces.
+A file holds what the scene and its charts do not say, of texels that cover nothing too: to read it is to copy it. Normals are
+those of faces.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from app.util.ahead import ahead
 FOLD = 1e-4  # of a texel's width: further off the plane of its leading face, a mean of faces is off the surface
 BLOCK = 1 << 15  # texels in work at a time
 FEWEST = 1 << 18  # texels that a file is worth: they take half a second
-CACHE_FILES = 4  # kept, newest first: of two million texels a file takes 120 MB
+CACHE_FILES = 4  # kept, newest first: of two million texels a file takes 160 MB
+KEPT = ("face", "cut", "area", "position", "leading")
 
 
 def surfaces_of(
@@ -82,20 +83,13 @@ def _given(scene: Scene, charts: Charts, leaves: Leaves) -> cache.Arrays:
 
 
 def _content(surfaces: TexelSurfaces) -> cache.Arrays:
-    covered = surfaces.face >= 0
-    some = {name: getattr(surfaces, name)[covered] for name in ("area", "position", "leading")}
-    return {"face": surfaces.face, "cut": surfaces.cut, **some}
+    return {name: getattr(surfaces, name) for name in KEPT}
 
 
 def _read(scene: Scene, charts: Charts, data: cache.Arrays | None) -> TexelSurfaces | None:
     """The surfaces that a file holds; None where it holds none."""
-    if data is None or not {"face", "area", "position", "leading", "cut"} <= data.keys():
+    if data is None or not set(KEPT) <= data.keys():
         return None
-    face: I32 = data["face"]
-    covered = face >= 0
-    normal = _normals_of(face_normals(scene, charts), face)
-    position, leading = np.zeros((2, *face.shape, 3))
-    area = np.zeros(face.shape)
-    for whole, name in ((position, "position"), (leading, "leading"), (area, "area")):
-        whole[covered] = data[name]
-    return TexelSurfaces(position, area, normal, face, leading, data["cut"])
+    return TexelSurfaces(
+        **{name: data[name] for name in KEPT}, normal=_normals_of(face_normals(scene, charts), data["face"])
+    )
