@@ -21,7 +21,7 @@ from app.atlas.cuts import cut_at_contacts
 from app.atlas.enclosed import cameras_inside
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import parametrize
-from app.atlas.seams import Seams
+from app.atlas.seams import Seams, SeamTexels
 from app.scene.model import Scene
 from app.util import cache
 
@@ -38,7 +38,7 @@ BY_TRIANGLE = (
 )  # of a scene, that cutting changes
 GEOMETRY = ("positions", "triangles", *BY_TRIANGLE)
 LIBRARIES = ("numpy", "scipy", "shapely", "xatlas")
-SCENE, SEAMS = "scene_", "seams_"  # before the names of what is theirs
+SCENE, SEAMS, NEAR = "scene_", "seams_", "near_seams_"  # before the names of what is theirs
 APART = ("seams", "warnings")
 
 
@@ -104,6 +104,7 @@ def _content(scene: Scene, cut: Scene, charts: Charts) -> cache.Arrays:
     notes = {SCENE + "warnings": np.array(cut.warnings[len(scene.warnings) :], np.str_)}
     own = {field.name: getattr(charts, field.name) for field in dataclasses.fields(Charts) if field.name not in APART}
     seams = {SEAMS + name: value for name, value in vars(charts.seams).items()}
+    seams |= {NEAR + name: value for name, value in vars(charts.seam_texels).items()}
     return {name: np.asarray(value) for name, value in (own | seams | changed | notes).items()}
 
 
@@ -111,12 +112,18 @@ def _read(scene: Scene, data: cache.Arrays | None) -> tuple[Scene, Charts] | Non
     """The answer that a file holds; None where it is none."""
     if data is None or not {field.name for field in dataclasses.fields(Charts)} - set(APART) < data.keys():
         return None
-    changed = {name.removeprefix(SCENE): array for name, array in data.items() if name.startswith(SCENE)}
+    changed, seams, near = (_named(data, prefix) for prefix in (SCENE, SEAMS, NEAR))
     warnings = (*scene.warnings, *map(str, changed.pop("warnings")))
-    seams = {name.removeprefix(SEAMS): array for name, array in data.items() if name.startswith(SEAMS)}
-    own = {name: _plain(array) for name, array in data.items() if not name.startswith((SCENE, SEAMS))}
+    own = {name: _plain(array) for name, array in data.items() if not name.startswith((SCENE, SEAMS, NEAR))}
     own |= {"size": tuple(data["size"].tolist()), "seams": Seams(**seams)}
-    return dataclasses.replace(scene, **changed, warnings=warnings), Charts(**own)  # type: ignore[arg-type]  # names are not known
+    charts = Charts(**own)
+    charts.__dict__["seam_texels"] = SeamTexels(**near)  # as if they had been asked for
+    return dataclasses.replace(scene, **changed, warnings=warnings), charts  # type: ignore[arg-type]  # names are not known
+
+
+def _named(data: cache.Arrays, prefix: str) -> cache.Arrays:
+    """Those with this before their names, without it."""
+    return {name.removeprefix(prefix): array for name, array in data.items() if name.startswith(prefix)}
 
 
 def _plain(array: NDArray[Any]) -> Any:

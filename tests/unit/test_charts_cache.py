@@ -15,7 +15,7 @@ from app.atlas import charts_cache
 from app.atlas.charts import Charts
 from app.atlas.charts_cache import charts_of
 from app.atlas.options import AtlasOptions
-from app.atlas.seams import Seams
+from app.atlas.seams import Seams, SeamTexels
 from app.scene import shapes
 from app.scene.model import Camera, Material, Scene
 from app.scene.sky import Sky
@@ -41,7 +41,7 @@ def _same(one: object, other: object) -> bool:
     """Values and types of all fields, but for what is cached beside them."""
     if isinstance(one, np.ndarray):
         return isinstance(other, np.ndarray) and one.dtype == other.dtype and np.array_equal(one, other)
-    if isinstance(one, Scene | Charts | Seams):
+    if isinstance(one, Scene | Charts | Seams | SeamTexels):
         return all(_same(getattr(one, f.name), getattr(other, f.name)) for f in dataclasses.fields(one))
     return type(one) is type(other) and one == other
 
@@ -56,6 +56,8 @@ def test_what_is_kept_is_the_same_again(scene: Scene, monkeypatch: pytest.Monkey
     monkeypatch.setattr(charts_cache, "parametrize", _refuse)
     again = charts_of(scene, ATLAS)
     assert all(_same(one, other) for one, other in zip(first, again, strict=True))
+    assert "seam_texels" in vars(again[1]), "found anew"
+    assert len(first[1].seam_texels.weight) and _same(first[1].seam_texels, again[1].seam_texels)
     assert charts_of(scene.with_materials((Material("red", albedo=(1, 0, 0)), scene.materials[1])), ATLAS)
 
 
