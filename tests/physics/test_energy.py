@@ -384,3 +384,21 @@ def test_patches_that_were_split_are_not_lost_at_another_level(gpu: Gpu, adaptiv
     lit.solver.batch.marks.divide_patches(split)
     assert in_patches() == pytest.approx(whole, rel=1e-4)
     lit.release()
+
+
+def test_a_lamp_that_shines_on_a_ceiling_near_by(gpu: Gpu) -> None:
+    """3 cm under a ceiling of texels of 17 cm: patches at its edge see from their middle nothing but its back, or nothing of it,
+    and 13 % of the light would be lost. Its back is lit to 10 %: light falls off within a texel there."""
+    lamp = [[1.5, 2.97, 1.5], [2.5, 2.97, 1.5], [2.5, 2.97, 2.5], [1.5, 2.97, 2.5]]
+    materials = [grey(0.7), grey(0.0, 40.0, double_sided=True)]
+    scene = quads_scene([*room((4.0, 3.0, 4.0)), lamp], materials, [0] * 6 + [1])
+    means = []
+    for solver in ("shooting", "gathering"):
+        solution = begin(gpu, scene, density=6, solver=solver)
+        solution.settle()
+        assert abs(solution.book.imbalance_share) < 0.01, solver
+        means.append(solution.means(solution.H)[:, 0])
+        solution.release()
+    shot, gathered = means
+    np.testing.assert_allclose(shot[:6], gathered[:6], rtol=0.05)
+    assert shot[6] == pytest.approx(gathered[6], rel=0.1)

@@ -7,8 +7,10 @@ from app.solvers.shooting.audit import SOUND, Found
 from app.solvers.shooting.records import SHOOTER
 
 
-def patch(x: int, size: int, chart: int = 1) -> np.void:
+def patch(x: int, size: int, chart: int = 1, *, sees_from: float = 0.0) -> np.void:
+    """Of one unit along its edge."""
     record = np.zeros(1, SHOOTER.dtype)
+    record["area"], record["origin"] = 1.0, (sees_from, 0.0, 0.0)
     record["patch_x"], record["signed_size"], record["chart"] = x, size, chart
     return record[0]  # type: ignore[no-any-return]
 
@@ -43,3 +45,25 @@ def test_what_all_quarters_lose_is_allowed_to_patches_of_that_chart_alone(found:
 def test_a_patch_without_quarters_that_shoot_is_divided(found: Found) -> None:
     found.learn(patch(0, 16), [])
     assert found.fails(patch(0, 16))
+
+
+def test_a_patch_that_sees_from_elsewhere_is_audited_again(found: Found) -> None:
+    assert found.knows(patch(0, 16)) and found.knows(patch(0, 16, sees_from=0.1))
+    assert not found.knows(patch(0, 16, sees_from=0.2))
+
+
+@pytest.mark.parametrize(("off", "near"), [(-0.05, False), (-0.3, True), (0.3, True)])
+def test_a_chart_whose_patch_is_far_off_has_something_near(off: float, near: bool) -> None:
+    found = Found()
+    found.enter(patch(0, 16), off)
+    found.learn(patch(0, 16), [])
+    assert (1 in found.near) == near
+
+
+def test_what_was_found_is_kept(found: Found) -> None:
+    found.enter(patch(16, 16, sees_from=0.5), 0.3)
+    found.learn(patch(16, 16), [])
+    again = Found()
+    again.restore(found.state())
+    assert again.near == {1} and again.fails(patch(0, 16))
+    assert again.knows(patch(16, 16, sees_from=0.5)) and not again.knows(patch(16, 16))
