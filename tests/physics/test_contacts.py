@@ -35,6 +35,24 @@ def parted() -> Scene:
     return quads_scene([*walls, LAMP], [grey(0.5, double_sided=True), grey(0.0, 10.0)], [0] * len(walls) + [1])
 
 
+@EVERY_SOLVER
+def test_sheets_back_to_back_are_a_wall(gpu: Gpu, solver: str) -> None:
+    """Two of one side each, in one place, in other triangles, receive and reflect as one with two sides does, and are in the
+    books as it is: a ray that meets both meets the one that faces it."""
+    walls, found = room((2.0, 1.0, 1.0)), []
+    back = np.roll(WALL, 1, axis=0)[::-1]
+    for sheets, two_sided in (([WALL], True), ([WALL, back], False)):
+        quads = [*walls, LAMP, *sheets]
+        materials = [grey(0.5), grey(0.0, 10.0), grey(0.8, double_sided=two_sided)]
+        scene = quads_scene(quads, materials, [0] * len(walls) + [1] + [2] * len(sheets))
+        solution = begin(gpu, scene, texels=2000, solver=solver)
+        solution.settle()
+        found.append(solution.means(solution.H)[: len(walls), 0])
+        assert abs(solution.book.imbalance_share) < 0.01
+        solution.release()
+    assert found[1] == pytest.approx(found[0], rel=0.01)
+
+
 SCENES = {"a sheet": lit_from_the_left, "a beam through it": lambda: lit_from_the_left(*beam()), "two rooms": parted}
 
 

@@ -21,5 +21,5 @@ void main() {
     if (chance_in_map(seen_from(map), ivec2(px), row) >= opacity_at(row, place_seen(map, local))) discard;
 #endif
     out_item = seen.x;
-    gl_FragDepth = seen.y / FAR;
+    gl_FragDepth = depth_in_map(seen);
 }

@@ -31,6 +31,7 @@ struct Hit {
 const int ROW_BITS = 10;  // 2^ROW_BITS nodes, or slots, lie in a row of their texture
 const int COUNT_BITS = 3;  // of a leaf's count, in its name
 const float BOX_FAR = 1.0 + 1.0 / 2097152.0;  // 4 ulp
+const float ONE_PLACE = 1.0 + 1.0 / 1048576.0;  // of distances: rounding keeps apart what is nearer together
 const float LEAST = 1e-24;  // of a component of the direction: 0 times its inverse is 0, and a box's margin times it is beyond all
 
 ivec2 entry_px(int entry, int texels) { return ivec2((entry & ((1 << ROW_BITS) - 1)) * texels, entry >> ROW_BITS); }
@@ -83,7 +84,8 @@ bool passes(int slot, vec2 weights, vec3 origin, Shear shear) {
 }
 #endif
 
-// Replaces ``hit`` where the triangle of a slot is met after ``nearest`` and before it.
+// Replaces ``hit`` where the triangle of a slot is met after ``nearest`` and before it. Of two in one place, back to back, the one that
+// faces the ray is met: the back of one with a single side is black.
 void meet(inout Hit hit, int slot, vec3 origin, Shear shear, float nearest) {
     ivec2 px = entry_px(slot, 3);
     vec3 a = sheared(shear, texelFetch(t_bvh_triangles, px, 0).xyz - origin);
@@ -95,12 +97,14 @@ void meet(inout Hit hit, int slot, vec3 origin, Shear shear, float nearest) {
     bool inside = sum != 0.0 && (least >= 0.0 || most <= 0.0);
     sides /= sum;
     float distance = dot(sides, vec3(a.z, b.z, c.z));
-    bool met = inside && distance >= nearest && distance < hit.distance;
+    bool front = (sum > 0.0) == (shear.inverse > 0.0);
+    float before = hit.slot < 0 || front == hit.front ? 1.0 : front ? ONE_PLACE : 1.0 / ONE_PLACE;
+    bool met = inside && distance >= nearest && distance < hit.distance * before;
 #if OPACITY
     met = met && !passes(slot, sides.yz, origin, shear);
 #endif
     if (met)
-        hit = Hit(distance, slot, sides.yz, (sum > 0.0) == (shear.inverse > 0.0));
+        hit = Hit(distance, slot, sides.yz, front);
 }
 
 // (first, last) distance within a box; it is met where first <= last.
@@ -149,8 +153,9 @@ Hit walk(vec3 origin, vec3 direction, float nearest, float farthest, bool any_wi
     do {
         do {
             Child a = load_child(node, 0), b = load_child(node, 1);
-            vec2 in_a = within(a.lower, a.upper, box_origin, box_inverse, nearest, hit.distance);
-            vec2 in_b = within(b.lower, b.upper, box_origin, box_inverse, nearest, hit.distance);
+            farthest = hit.distance * ONE_PLACE;
+            vec2 in_a = within(a.lower, a.upper, box_origin, box_inverse, nearest, farthest);
+            vec2 in_b = within(b.lower, b.upper, box_origin, box_inverse, nearest, farthest);
             bool meets_a = in_a.x <= in_a.y, meets_b = in_b.x <= in_b.y;
             bool b_first = meets_b && (!meets_a || in_b.x < in_a.x);
             stack[top] = b_first ? a.node : b.node;

@@ -11,6 +11,6 @@ void main() {
     out_item = 1.0;
 #else
     out_item = v_seen.x;
-    gl_FragDepth = v_seen.y / FAR;
+    gl_FragDepth = depth_in_map(v_seen);
 #endif
 }
