@@ -32,9 +32,9 @@ from app.session.versions import Version, with_edits
 from app.solvers import DEFAULT_SOLVER, SOLVERS
 from app.util.background import BackgroundTask
 
-# Of solving in coarse texels, as fast as it goes: seconds of the processor, which others may use as well, seconds in all, and the
-# share of what is emitted that remains then. Once any is reached, the processor makes better ones
-COARSE_SECONDS, COARSE_LONGEST, COARSE_LEFT = 0.6, 6.0, 0.2
+# Solving in coarse texels ends after so many seconds, but not before so much work, which takes longer beside other programs, or
+# once this share of what is emitted remains: the processor makes better ones
+COARSE_SECONDS, COARSE_WORK, COARSE_LEFT = 1.0, 6, 0.2
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,6 @@ class Session(EditableScene):
         self.edited: object = None
         self._then_reference: Path | None = None
         self._coarse: Loading | None = None  # of what is open in coarse texels, until it is there in better ones
-        self._coarse_seconds = 0.0  # of the processor, for light in these
         self._remained = math.inf  # of the light to be distributed, in coarse texels, until better ones have caught up
         self.reading = self._reading = Reading()
 
@@ -197,7 +196,7 @@ class Session(EditableScene):
         self.source = self.scene.source or self.scene.name
         self.message = None
         self._opened = True
-        self._coarse, self._coarse_seconds = None if loading is None else self.loading, 0.0
+        self._coarse = None if loading is None else self.loading
         if self._coarse is not None:  # what comes is of the same scene
             self._coarse.version = Version(self.surfaces, lambda scene: scene, self.read)
         reference_gone = self.compared.begin(lightmap, scene)
@@ -244,9 +243,7 @@ class Session(EditableScene):
         """As of any solved scene; always fast in coarse texels, for they are not there for long, and in those that take their
         place until as little remains as before."""
         fast |= self.coarse or self._remained < math.inf
-        start = time.thread_time()
         issued = super().advance(fast=fast, interactive=interactive)
-        self._coarse_seconds += time.thread_time() - start
         if self.run.converged or self.run.progress.remaining <= self._remained:
             self._remained = math.inf  # caught up: what follows has the pace that was chosen
         return issued
@@ -357,9 +354,7 @@ class Session(EditableScene):
         """Once per frame: take in what the GPU reports, and swap in a scene that has finished loading, a part of it per frame.
         interactive: a hand is at the controls, what can wait does."""
         self._busy = False
-        lit = self._coarse_seconds >= COARSE_SECONDS or self.run.seconds >= COARSE_LONGEST
-        lit |= self.run.progress.remaining <= COARSE_LEFT
-        self.run.resting = self.coarse and lit and self.run.between
+        self.run.resting = self.coarse and self._lit_coarsely and self.run.between
         if self.loading is not None and (self._opening.has_part or self.loading.cancelled):
             self._busy = True
             self._open_part(self.loading)
@@ -373,6 +368,13 @@ class Session(EditableScene):
             self.compare()
             if self._idle and not self._busy and not interactive:
                 self._estimate_part()
+
+    @property
+    def _lit_coarsely(self) -> bool:
+        """Whether there is as much light as coarse texels are given."""
+        run = self.run
+        long = run.seconds >= COARSE_SECONDS and self.solver.issued >= COARSE_WORK
+        return long or run.progress.remaining <= COARSE_LEFT
 
     @property
     def at_rest(self) -> bool:

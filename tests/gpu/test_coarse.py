@@ -53,7 +53,6 @@ def better(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[threadin
     monkeypatch.setattr(charts_cache, "FEWEST", 0)
     monkeypatch.setattr(loading, "COARSE_FROM", 0)
     monkeypatch.setattr(session_module, "COARSE_SECONDS", PATIENCE)
-    monkeypatch.setattr(session_module, "COARSE_LONGEST", PATIENCE)
     monkeypatch.setattr(session_module, "COARSE_LEFT", 0.0)
     monkeypatch.setattr(loading, "default_texels", lambda sides, roots: TEXELS // 16)
     with cache.elsewhere(tmp_path):
@@ -171,6 +170,7 @@ def test_the_processor_is_left_to_better_charts_after_a_while(
     view: View, better: threading.Event, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(session_module, "COARSE_SECONDS", 0.0)
+    monkeypatch.setattr(session_module, "COARSE_WORK", 0)
     session = view.session
     session.open("cornell-box")
     frames(session, lambda: session.coarse)
@@ -178,11 +178,16 @@ def test_the_processor_is_left_to_better_charts_after_a_while(
         session.poll()
         session.advance()
     assert session.solver.issued == 0 and not session.solving and session.run.running
+    monkeypatch.setattr(session_module, "COARSE_WORK", 2)
+    session.poll()
+    frames(session, lambda: session.run.resting)
+    assert session.solver.issued >= 2, "so much takes longer beside other programs"
     monkeypatch.setattr(session_module, "COARSE_SECONDS", PATIENCE)
-    monkeypatch.setattr(session_module, "COARSE_LONGEST", PATIENCE)
-    monkeypatch.setattr(session_module, "COARSE_LEFT", 0.9)
-    frames(session, lambda: session.run.resting and session.solver.issued > 0)
-    assert session.run.progress.remaining <= 0.9 and not session.solving
+    remaining = 0.9 * session.run.progress.remaining
+    monkeypatch.setattr(session_module, "COARSE_LEFT", remaining)
+    session.poll()
+    frames(session, lambda: session.run.resting)
+    assert session.run.progress.remaining <= remaining and not session.solving
     better.set()
     frames(session, lambda: session.loading is None and session.run.progress.remaining < 0.3)
 

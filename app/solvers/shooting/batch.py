@@ -54,7 +54,7 @@ class Batch:
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: ShootingOptions, *, audits: bool, coarse: bool) -> None:
         """audits, coarse: as of Shooting."""
-        self._gpu, self._lightmap, self.options = gpu, lightmap, options
+        self._gpu, self._lightmap, self.options, self._coarse = gpu, lightmap, options, coarse
         self.shooters, self.bins = ShooterBatch(gpu), Bins(gpu, lightmap)
         self.occluders, self.receivers = occluders_of(gpu, lightmap), Receivers(gpu, lightmap.pool)
         self.ledger = Ledger(gpu, lightmap, self.shooters)
@@ -69,7 +69,7 @@ class Batch:
 
     def _make_passes(self) -> None:
         options, lightmap = self.options, self._lightmap
-        self.phases = Phases(self._gpu, lightmap, self.shooters, options)
+        self.phases = Phases(self._gpu, lightmap, self.shooters, options, coarse=self._coarse)
         resolution = options.resolution or fitting_resolution(lightmap, ROOT_LEVEL if lightmap.pool.adaptive else 0)
         self.see = See(self._gpu, self.occluders, self.shooters, options, resolution)
         self.receive = Receive(self._gpu, lightmap, self.receivers, self.shooters, self.see, options)

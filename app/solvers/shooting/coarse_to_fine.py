@@ -19,21 +19,23 @@ from app.solvers.shooting.shooters import ShooterBatch
 # Patches of a scene: about so many show the light first, and unless a level is set, the finest are no more than the most, since
 # more gain little, nor finer than a level.
 FIRST_PATCHES, MOST_PATCHES, LEVEL = 400, 4096, 2
+COARSE_FIRST = 100  # patches that show the light first where better light takes the place of this soon
 # Finer patches follow once so little of the emitted power is unshot; the finest end once they hold so many times the residual
 # asked for.
 COARSE_ENOUGH, FINE_ENOUGH = 5e-3, 10
 
 
-def patch_levels(lightmap: Lightmap, options: ShootingOptions) -> list[int]:
-    """Levels of the patches that begin and of the finest, as powers of 2 of texels; in quadtrees, of uniform ones."""
+def patch_levels(lightmap: Lightmap, options: ShootingOptions, *, coarse: bool = False) -> list[int]:
+    """Levels of the patches that begin and of the finest, as powers of 2 of texels; in quadtrees, of uniform ones. coarse:
+    whether few begin."""
     adaptive, charts = lightmap.pool.adaptive, lightmap.charts
     top = MAX_LEVEL if adaptive else highest_level(lightmap.pool.tile)
     texels = lightmap.pool.surfaces.area.sum() * charts.density**2 * (4**ROOT_LEVEL if adaptive else 1)
     last = min(LEVEL if options.level is None else options.level, top)
     while options.level is None and last < top and texels / 4**last > MOST_PATCHES:
         last += 1
-    first = last
-    while options.coarsen and first < top and texels / 4 ** (first + 1) >= FIRST_PATCHES:
+    first, patches = last, COARSE_FIRST if coarse else FIRST_PATCHES
+    while options.coarsen and first < top and texels / 4 ** (first + 1) >= patches:
         first += 1
     return [first, last] if first > last else [last]
 
@@ -45,9 +47,12 @@ class Phases:
     shot, and hold little.
     """
 
-    def __init__(self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch, options: ShootingOptions) -> None:
+    def __init__(
+        self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch, options: ShootingOptions, *, coarse: bool
+    ) -> None:
+        """coarse: as of ``patch_levels``."""
         self._lightmap = lightmap
-        levels = patch_levels(lightmap, options)
+        levels = patch_levels(lightmap, options, coarse=coarse)
         self.choices = [Choice(gpu, lightmap, shooters, level, levels[-1]) for level in levels]
         if len(levels) > 1:
             self.choices.insert(1, Choice(gpu, lightmap, shooters, *levels, settles=True))
