@@ -61,7 +61,7 @@ def charts_of(
             waiting()
         found = _made(scene, atlas, roots, progress)
         if not found[1].warnings:
-            cache.store(cache.content(_content(scene, *found)), file, CACHE_FILES)
+            cache.store(_content(scene, *found), file, CACHE_FILES)
     return found
 
 

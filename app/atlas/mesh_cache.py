@@ -31,7 +31,7 @@ def kept_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
     found = _read(cache.read(file))
     if found is None:
         found = visible_mesh(scene, charts, local)
-        cache.store(cache.content(_content(found)), file, CACHE_FILES)
+        cache.store(_content(found), file, CACHE_FILES)
     return found
 
 

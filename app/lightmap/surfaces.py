@@ -38,7 +38,7 @@ def surfaces_of(
     found = _read(scene, charts, cache.read(file))
     if found is None:
         found = on_their_faces(scene, charts, texel_surfaces(scene, charts, leaves, report))
-        cache.store(cache.content(_content(found)), file, CACHE_FILES)
+        cache.store(_content(found), file, CACHE_FILES)
     return found
 
 

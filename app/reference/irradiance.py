@@ -215,7 +215,7 @@ def _cached(
         found["seconds"] = np.array(time.perf_counter() - start)
         result = ReferenceIrradiance(name, points.only(found["kept"]), found["E"], found.get("deviation"), made, 0.0)
         found["noise"] = np.array(result.noise or np.nan)
-        cache.store(cache.content(found), path, CACHE_FILES)
+        cache.store(found, path, CACHE_FILES)
     kept = points.only(found["kept"])
     return ReferenceIrradiance(name, kept, found["E"], found.get("deviation"), made, float(found["seconds"]))
 

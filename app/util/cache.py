@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import io
 import os
 import threading
 from collections.abc import Iterator, Mapping
@@ -53,20 +52,23 @@ def read(path: Path) -> Arrays | None:
         return None
 
 
-def content(arrays: Arrays) -> bytes:
-    """An .npz file of them."""
-    file = io.BytesIO()
-    np.savez(file, allow_pickle=False, **arrays)
-    return file.getvalue()
+def write(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """A file of them, array by array. Raises OSError."""
+    with path.open("wb") as file:
+        np.savez(file, allow_pickle=False, **arrays)
 
 
-def store(file: bytes, path: Path, files: int) -> None:
-    """Keep an .npz file for next time, and of its kind the newest so many; a cache that cannot be written is none."""
+def store(answer: bytes | Mapping[str, NDArray[Any]], path: Path, files: int) -> None:
+    """Keep arrays, or a file of them, for next time, and of its kind the newest so many; a cache that cannot be written is
+    none."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}.tmp")
         try:
-            partial.write_bytes(file)
+            if isinstance(answer, bytes):
+                partial.write_bytes(answer)
+            else:
+                write(partial, answer)
             partial.replace(path)
         finally:
             partial.unlink(missing_ok=True)

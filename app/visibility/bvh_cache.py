@@ -27,7 +27,7 @@ def bvh_of(corners: F64, tell: Callable[[float], None] | None = None) -> Bvh:
     bvh = _read(file, len(corners))
     if bvh is None:
         bvh = build_bvh(corners, tell)
-        cache.store(cache.content({name: np.asarray(value) for name, value in vars(bvh).items()}), file, CACHE_FILES)
+        cache.store({name: np.asarray(value) for name, value in vars(bvh).items()}, file, CACHE_FILES)
     return bvh
 
 

@@ -91,7 +91,7 @@ def damaged(kind: str, file: Path) -> None:
             np.save(out, nodes)
     elif kind == "of other triangles":
         other = build_bvh(CORNERS[:-1])
-        file.write_bytes(cache.content({name: np.asarray(value) for name, value in vars(other).items()}))
+        cache.write(file, {name: np.asarray(value) for name, value in vars(other).items()})
     else:
         if kind == "a triangle twice":
             data["order"][7] = data["order"][8]
@@ -104,7 +104,7 @@ def damaged(kind: str, file: Path) -> None:
             nodes[3, 0, 0] = np.nan
         elif kind == "doubles":
             data["nodes"] = nodes.astype(np.float64)
-        file.write_bytes(cache.content(data))
+        cache.write(file, data)
 
 
 @pytest.mark.parametrize(

@@ -100,7 +100,7 @@ def test_a_finer_solve_is_kept_for_the_sides_that_have_texels(tmp_path: Path, mo
     def solve(source: Path, target: Path, tell: Progress) -> None:
         calls.append(source)
         answer = {"triangle": np.zeros(1), "back": np.zeros(1), "uv": np.zeros((1, 3, 2)), "texels": np.array(4)}
-        target.write_bytes(cache.content({"image": np.zeros((2, 2, 3)), "unshot": np.array(0.0), **answer}))
+        cache.write(target, {"image": np.zeros((2, 2, 3)), "unshot": np.array(0.0), **answer})
 
     monkeypatch.setattr(comparison_solve, "_run_worker", solve)
     with cache.elsewhere(tmp_path):

@@ -121,7 +121,7 @@ def _traced(scene: Scene, points: Points, paths: int, tell: Tell) -> F64:
             tell("path-traced picture", k / 2)
             halves.append(traced.irradiance(*place, side * side, VIEW_SEED + k))
         found = {"halves": np.array(halves)}
-        cache.store(cache.content(found), path, CACHE_FILES)
+        cache.store(found, path, CACHE_FILES)
     return np.asarray(found["halves"])
 
 

@@ -191,8 +191,8 @@ class Rows:
     def save(self) -> None:
         """Keep the rows on disk, if there are more of them than there were."""
         if self.made > self._kept:
-            content = cache.content({"nodes": self._nodes[: self.made], "hits": self._hits[: self.made]})
-            cache.store(content, self._file, CACHE_FILES)
+            own: cache.Arrays = {"nodes": self._nodes[: self.made], "hits": self._hits[: self.made]}
+            cache.store(own, self._file, CACHE_FILES)
             self._kept = self.made
 
     @property
