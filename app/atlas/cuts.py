@@ -7,6 +7,7 @@ the floor's triangles are cut along the wall's foot, neighbours along with them,
 from __future__ import annotations
 
 import dataclasses
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,9 +46,14 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
     tell(0.1)
     size, origin = scene_size(scene), points.min(0)
     places = (points - origin) / size
-    found, crowded = contacts(places[corners], surfaces(edges), lambda share: tell(0.1 + 0.4 * share))
-    tell(0.5)
-    facet = facets(points, corners, scene.material_ids, size, edges)
+    beside = ThreadPoolExecutor(1)
+    try:
+        flat = beside.submit(facets, points, corners, scene.material_ids, size, edges)
+        found, crowded = contacts(places[corners], surfaces(edges), lambda share: tell(0.1 + 0.4 * share))
+        tell(0.5)
+        facet = flat.result()
+    finally:
+        beside.shutdown(wait=False, cancel_futures=True)
     if len(found.triangle):
         found = found.only(~on_rims(places[corners], facet, edges, found))
     notes: list[str] = []

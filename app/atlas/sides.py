@@ -120,9 +120,15 @@ def rows_by(label: NDArray[np.integer], count: int) -> tuple[NDArray[np.int64], 
 
     label (n,) in [0, count). By counting, as sparse matrices are transposed: many times faster than np.argsort.
     """
-    rows = np.arange(len(label) + 1)
+    order, first = _counted(label, count)
+    return order.astype(np.int64), first.astype(np.int64)
+
+
+def _counted(label: NDArray[np.integer], count: int) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+    """As rows_by, in numbers as small as they fit in."""
+    rows = np.arange(len(label) + 1, dtype=np.int32 if len(label) < np.iinfo(np.int32).max else np.int64)
     by_label = csr_array((np.ones(len(label), bool), label, rows), shape=(len(label), count)).tocsc()
-    return by_label.indices.astype(np.int64), by_label.indptr.astype(np.int64)
+    return by_label.indices, by_label.indptr
 
 
 def numbered(label: NDArray[np.integer]) -> NDArray[np.int64]:
@@ -158,9 +164,10 @@ def _in_order(columns: tuple[NDArray[Any], ...]) -> tuple[NDArray[np.int64], NDA
     count = len(columns[0])
     columns, spans = _packed(columns)
     if spans:
-        order = rows_by(columns[-1], spans[-1])[0]
+        counted = _counted(columns[-1], spans[-1])[0]
         for column, span in zip(columns[-2::-1], spans[-2::-1], strict=True):
-            order = order[rows_by(column[order], span)[0]]
+            counted = counted[_counted(column[counted], span)[0]]
+        order = counted.astype(np.int64)
     else:
         order = np.lexsort(columns[::-1])
     fresh = np.zeros(count, bool)
@@ -185,7 +192,8 @@ def _packed(columns: tuple[NDArray[Any], ...]) -> tuple[tuple[NDArray[Any], ...]
     keys: list[NDArray[Any]] = []
     sizes: list[int] = []
     for column, low, span in zip(columns, least, spans, strict=True):
-        key = column.astype(np.int64) - low
+        key = column - low if counted and column.dtype == np.int32 else column.astype(np.int64) - low
+        key = key.astype(np.int32) if most < np.iinfo(np.int32).max else key
         if keys and sizes[-1] * span <= most:
             keys[-1] = keys[-1] * span + key
             sizes[-1] *= span

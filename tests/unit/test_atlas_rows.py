@@ -13,17 +13,19 @@ from app.scene.model import Material, Scene
 rng = np.random.default_rng(5)
 
 
+@pytest.mark.parametrize("kind", [np.int8, np.int32])
 @pytest.mark.parametrize("count", [0, 5, FEW + 1])
-@pytest.mark.parametrize("most", [(1, 3, 2), (900, 700, 2), (1 << 40, 5, 1 << 20), (1 << 40, 1 << 40, 1 << 40)])
-def test_distinct_rows(count: int, most: tuple[int, int, int]) -> None:
+@pytest.mark.parametrize("most", [(1, 99, 2), (900, 700, 2), (1 << 40, 5, 1 << 20), (1 << 40, 1 << 40, 1 << 40)])
+def test_distinct_rows(kind: type[np.integer], count: int, most: tuple[int, int, int]) -> None:
     columns = [rng.integers(-span, span, count) for span in most]
     columns = [np.concatenate([column, column[: count // 2]]) for column in columns]
-    index, kind, uses = distinct_rows(*columns)
+    columns = [column.astype(kind) if span < 100 else column for column, span in zip(columns, most, strict=True)]
+    index, own, uses = distinct_rows(*columns)
     rows, first, inverse, counts = np.unique(
         np.stack(columns, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
     )
     assert (np.stack(columns, axis=1)[index] == rows).all()
-    assert (index == first).all() and (kind == inverse.reshape(-1)).all() and (uses == counts).all()
+    assert (index == first).all() and (own == inverse.reshape(-1)).all() and (uses == counts).all()
 
 
 def test_rows_by_label_and_their_numbers() -> None:
