@@ -245,7 +245,7 @@ def upload(gpu: Gpu, array: Array) -> Texture:
     """(height, width, components) as a texture of the same type."""
     height, width, components = array.shape
     dtype = {"float32": "f4", "float16": "f2", "uint32": "u4"}[array.dtype.name]
-    return gpu.texture((width, height), components, dtype, np.ascontiguousarray(array).tobytes())
+    return gpu.texture((width, height), components, dtype, np.ascontiguousarray(array))
 
 
 def write_table(gpu: Gpu, texture: Texture, table: Array) -> Texture:

@@ -29,6 +29,7 @@ from app.util.background import Report, unheard
 from app.util.words import counted, one_line
 
 MAX_TRIANGLES = 20_000_000
+BLOCK = 1 << 14  # triangles in work at a time: a processor's cache holds them
 EXTENT_RANGE = (1e-12, 1e12)  # m; outside of it areas leave the range of 32-bit floats by far
 # Files and GPU hold 32-bit floats: a triangle flatter than their spacing (2^-23 relative) has no shape, only rounding.
 FLATNESS = 2.0**-23
@@ -140,11 +141,18 @@ def has_area(positions: F64, triangles: Array) -> Bools:
     if extent == 0.0:
         return np.zeros(len(triangles), bool)
     places = (positions - low) / extent
-    a, b, c = (places.take(triangles[:, k], axis=0) for k in range(3))
-    longest = np.maximum.reduce([np.linalg.norm(e, axis=1) for e in (b - a, c - b, a - c)])
-    twice_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    solid: Bools = twice_area > FLATNESS * longest
+    solid = np.empty(len(triangles), bool)
+    for first in range(0, len(triangles), BLOCK):
+        some = triangles[first : first + BLOCK]
+        a, b, c = (np.ascontiguousarray(places.take(some[:, k], axis=0).T) for k in range(3))
+        longest = np.maximum.reduce([_length(e) for e in (b - a, c - b, a - c)])
+        solid[first : first + BLOCK] = _length(np.cross(b - a, c - a, axis=0)) > FLATNESS * longest
     return solid
+
+
+def _length(vectors: F64) -> F64:
+    """(n,) of vectors (3, n)."""
+    return np.asarray(np.sqrt((vectors**2).sum(axis=0)))
 
 
 def _bounds(positions: F64, triangles: Array) -> tuple[F64, F64]:
