@@ -35,6 +35,9 @@ from app.solvers import HEMISPHERE, Inspection, Rays
 
 SIZE = (1280, 720)  # px, of a picture before the first one
 TRAPPED = "the light is trapped: none of it reaches what the camera sees"
+BACKS = (
+    "all light falls on the backs of surfaces that have one side, and are black there: their fronts face away from it"
+)
 LOOK_SECONDS = 0.5  # between two looks whether light is trapped: each reads what is seen
 RAYS_SECONDS = 0.25  # between two looks at the rays that are drawn, while light moves
 
@@ -210,8 +213,9 @@ class View:
         self.display = self.display.replace(exposure=exposure)
 
     def look_for_light(self) -> str | None:
-        """What to say where all light has been distributed and none of it is where the camera sees anything. Looked up once for a
-        solution and a place of the camera, not in every frame while that moves; it becomes the session's message, too."""
+        """What to say where all light has been distributed and none of it is anywhere, or where the camera sees anything. Looked
+        up once for a solution and a place of the camera, not in every frame while that moves; it becomes the session's message,
+        too."""
         session = self.session
         if not session.opened or not session.run.converged:
             self._say_no_longer()
@@ -228,15 +232,24 @@ class View:
         balance = session.run.energy
         even = float(np.mean(balance.emitted)) / max(balance.area, 1e-300)
         width, height = self._size
-        if not is_trapped(session.lightmap, self._seen(width / height), even):
+        if self._only_backs_are_lit():
+            session.message = BACKS
+        elif is_trapped(session.lightmap, self._seen(width / height), even):
+            session.message = TRAPPED
+        else:
             self._say_no_longer()
             return None
-        session.message = TRAPPED
-        return TRAPPED
+        return session.message
+
+    def _only_backs_are_lit(self) -> bool:
+        """Whether light is emitted, does not escape, and reaches no texel. Waits for the GPU where no texel reflects."""
+        balance = self.session.run.energy
+        kept = float(np.sum(balance.emitted)) > 2 * float(np.sum(balance.escaped))
+        return kept and not np.any(balance.reflectance) and not self.session.lightmap.irradiance().any()
 
     def _say_no_longer(self) -> None:
-        """Say no longer that light is trapped."""
-        if self.session.message == TRAPPED:
+        """Say no longer that light is trapped, or behind all surfaces."""
+        if self.session.message in (TRAPPED, BACKS):
             self.session.message = None
 
     def _seen(self, aspect: float) -> Texels:

@@ -13,13 +13,13 @@ from app.render.camera import CameraView
 from app.render.frame import FrameRenderer
 from app.render.options import DisplayOptions
 from app.render.seen import ROWS, seen_texels
-from app.scene.cameras import look_at
+from app.scene.cameras import default_camera, look_at
 from app.scene.model import Camera, Material, Scene
 from app.scene.shapes import Mesh, box
 from app.scene.validate import Part, validate
 from app.session.run import Stop
 from app.session.session import Session
-from app.session.view import TRAPPED, View
+from app.session.view import BACKS, TRAPPED, View
 
 GREY, LAMP = Material("grey"), Material("lamp", (0.0, 0.0, 0.0), (5.0, 5.0, 5.0))
 SIZE = (ROWS * 16 // 9, ROWS)
@@ -77,3 +77,16 @@ def test_light_that_reaches_nothing_that_is_seen_is_said_to_be_trapped(
         assert view.look_for_light() is None and view.session.message is None
         view.release()
         view.session.release()
+
+
+@pytest.mark.parametrize("solver", ["shooting", "gathering"])
+def test_light_behind_all_surfaces_is_said(gpu: Gpu, solver: str) -> None:
+    """In a room of walls with one side whose fronts are outside, as programs for engineering write them."""
+    parts = [Part(m.positions, m.triangles, 0, k) for m, k in ((box((4, 4, 4)), 0), (box((0.1, 0.1, 0.1)), 1))]
+    view = View(Session(gpu, solver=solver, atlas=AtlasOptions(texels=1000)))
+    scene = validate("x", "x", parts, ["x"], [GREY, LAMP])
+    view.session.open_now(dataclasses.replace(scene, cameras=(default_camera(scene),)))
+    view.session.solve(Stop())
+    assert view.look_for_light() == BACKS == view.session.message
+    view.release()
+    view.session.release()
