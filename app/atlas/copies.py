@@ -40,7 +40,7 @@ def find_surfaces(points: F64, triangles: I32, groups: I32) -> Surfaces:
     order, first = rows_by(surface, int(surface.max()) + 1)
     first, count = first[:-1], np.diff(first)
     original = np.arange(len(triangles))
-    corners, named = points[triangles[order]], _names(vertices[order], first, count)
+    corners, named = points.take(triangles[order], axis=0), _names(vertices[order], first, count)
     centre, radius = _extents(corners, count)
     kind = distinct_rows(count, _digest(named, first), _sizes(corners, count, radius))[1]
     for mine in np.split(np.argsort(kind, kind="stable"), np.cumsum(np.bincount(kind))[:-1]):
@@ -90,7 +90,8 @@ def _extents(corners: F64, count: I64) -> tuple[F64, F64]:
     """The middle of the corners (m, 3, 3) of each surface, runs of so many triangles (s,), and their mean distance from it."""
     surface = np.repeat(np.arange(len(count)), count)
     centre = totals(surface, middle(corners), len(count)) / count[:, None]
-    spread = totals(surface, ((corners - centre[surface][:, None]) ** 2).sum((1, 2)), len(count)) / count
+    off = corners - centre[surface][:, None]
+    spread = totals(surface, np.einsum("mck,mck->m", off, off), len(count)) / count
     return centre, np.sqrt(np.maximum(spread / 3, np.finfo(float).tiny))
 
 
