@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from app.atlas.sides import FLAT, Sides, distinct_rows, groups_of, least, lit_sides, most, scene_size, totals, weld
+from app.atlas.sides import FLAT, Edges, Sides, groups_of, least, lit_sides, most, scene_size, totals, weld
 from app.scene.model import F64, I32, Scene
 
 Mask = NDArray[np.bool_]
@@ -50,10 +50,9 @@ def _may_enclose(scene: Scene) -> bool:
 def _enclosed(scene: Scene, points: F64, corners: I32) -> Mask:
     """(m, 2) fronts and backs of triangles that are the inside of such a body."""
     start, end = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
-    _, edge, uses = distinct_rows(np.minimum(start, end), np.maximum(start, end))
-    order = np.argsort(edge, kind="stable")
-    joined = edge[order[1:]] == edge[order[:-1]]
-    pairs = np.stack([order[:-1][joined], order[1:][joined]], axis=1) // 3
+    edges = Edges.of(corners)
+    edge, uses = edges.edge, edges.uses
+    pairs = np.stack(edges.pairs(), axis=1) // 3
     count, body = groups_of(len(corners), pairs)
     way = np.bincount(edge, np.where(start < end, 1.0, -1.0))
     holds = np.array([m.opaque and m.double_sided for m in scene.materials])[scene.material_ids]
@@ -81,10 +80,16 @@ def _alone(
     x, y = np.argsort(-np.ptp(triangles.reshape(-1, 3), axis=0))[:2]
     lower, upper = low[asked] + near, high[asked] - near
     tree = shapely.STRtree(shapely.box(lower[:, x], lower[:, y], upper[:, x], upper[:, y]))
+    # triangles of bodies whose boxes meet those of others
+    other, mine = tree.query(shapely.box(low[:, x], low[:, y], high[:, x], high[:, y]))
+    meets = (other != asked[mine]) & (low[other] < upper[mine]).all(1) & (high[other] > lower[mine]).all(1)
+    may = np.zeros(len(low), bool)
+    may[other[meets]] = True
+    some = np.flatnonzero(may[body])
     eyes = cameras_inside(scene)
-    first = np.concatenate([least(triangles), eyes])
-    last = np.concatenate([most(triangles), eyes])
-    owner = np.concatenate([body, np.full(len(eyes), -1)])
+    first = np.concatenate([least(triangles[some]), eyes])
+    last = np.concatenate([most(triangles[some]), eyes])
+    owner = np.concatenate([body[some], np.full(len(eyes), -1)])
     one, other = tree.query(shapely.box(first[:, x], first[:, y], last[:, x], last[:, y]))
     meets = (owner[one] != asked[other]) & (first[one] < upper[other]).all(1) & (last[one] > lower[other]).all(1)
     alone = np.asarray((upper > lower).all(1))
