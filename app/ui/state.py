@@ -169,7 +169,7 @@ class State:
     pointed_age: float = 0.0
     reveal_material: bool = False
     draw_rays: bool = True
-    inspected: tuple[object, Any] | None = None
+    inspected: tuple[object, object, Any] | None = None
     inspected_age: float = 0.0
     inset: tuple[object, Any] | None = None
     inset_age: float = 0.0

@@ -77,12 +77,16 @@ def _picture(view: View, state: State, caption: str, meaning: str, width: float)
 
 
 def _inspection(view: View, state: State) -> Any:
-    """With pictures, made anew a few times a second, and whenever the textures behind them may be others."""
+    """With pictures, made anew a few times a second while light moves, of coarse light once it rests, and whenever the textures
+    behind them may be others."""
     session, texel = view.session, _texel(state)
     source = session.lightmap, session.solver, session.options, texel, view.display
-    if state.inspected is None or state.inspected[0] != source or state.inspected_age >= REFRESH_SECONDS:
-        state.inspected, state.inspected_age = (source, view.inspect(texel)), 0.0
-    return state.inspected[1]
+    light, known = (session.state, session.run.progress.done), state.inspected
+    waits = state.inspected_age < REFRESH_SECONDS or (session.coarse and session.solving)
+    if known is None or known[0] != source or (known[1] != light and not waits):
+        known, state.inspected_age = (source, light, view.inspect(texel)), 0.0
+        state.inspected = known
+    return known[2]
 
 
 def _texel(state: State) -> tuple[int, int] | None:
