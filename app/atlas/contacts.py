@@ -20,8 +20,9 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from app.atlas.facets import facets
 from app.atlas.planes import Facets, Members, Planes
-from app.atlas.sides import FLAT_ANGLE, Edges, distinct_rows, facets, numbered, scene_size, weld
+from app.atlas.sides import FLAT_ANGLE, Edges, distinct_rows, numbered, scene_size, weld
 from app.scene.model import F64, I32, Scene
 from app.util.background import Report
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.atlas.facets import facets
 from app.atlas.flat_pieces import MOST_ENDS, MOST_PIECES, Piece, on_rims, parted_pieces
 from app.atlas.intersections import Contacts, contacts, surfaces
-from app.atlas.sides import Welded, facets, numbered, scene_size
+from app.atlas.sides import Welded, numbered, scene_size
 from app.atlas.triangle_cuts import CutTriangles, cut_pieces
 from app.scene.model import F32, F64, I32, Scene
 from app.util.background import Report

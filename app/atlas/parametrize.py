@@ -18,11 +18,12 @@ from scipy.sparse.csgraph import connected_components
 from app.atlas.charts import DEFAULT_TILE, Charts
 from app.atlas.contacts import hidden_pieces
 from app.atlas.enclosed import without_enclosed
+from app.atlas.facets import facets
 from app.atlas.layout import Layout, density_for, measured, place, scaled, texel_count
 from app.atlas.planes import Planes
 from app.atlas.rectangles import Rectangles, find_rectangles
 from app.atlas.seams import find_seams
-from app.atlas.sides import Sides, Welded, distinct_rows, facets, least, lit_sides, most, scene_size
+from app.atlas.sides import Sides, Welded, distinct_rows, least, lit_sides, most, scene_size
 from app.atlas.triangle_cuts import GOES_ON
 from app.atlas.unwrap import unwrap
 from app.errors import UserError

@@ -35,7 +35,7 @@ class Rectangles:
 def find_rectangles(points: F64, triangles: I32, materials: I32, facet: I32) -> Rectangles:
     """The facets whose area equals that of a rectangle around them, except the strips of a curved surface.
 
-    points (n, 3) [m], triangles (m, 3), materials (m,), facet (m,) as from ``sides.facets``. u runs along the longer
+    points (n, 3) [m], triangles (m, 3), materials (m,), facet (m,) as from ``facets``. u runs along the longer
     side.
     """
     some = _of_whole_or_beside(triangles, facet)

@@ -9,10 +9,11 @@ import pytest
 from atlas_scenes import TURN, box_room, moved, scene_of, split_grid
 
 from app.atlas.enclosed import without_enclosed
+from app.atlas.facets import facets
 from app.atlas.parametrize import parametrize
 from app.atlas.points import SideIndex, random_points
 from app.atlas.rectangles import find_rectangles
-from app.atlas.sides import facets, lit_sides, scene_size, weld
+from app.atlas.sides import lit_sides, scene_size, weld
 from app.scene import shapes
 from app.scene.model import Camera, Light, Material, Scene
 from app.scene.shapes import Mesh

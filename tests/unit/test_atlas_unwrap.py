@@ -16,8 +16,9 @@ from atlas_scenes import TURN, box_room, face_areas, moved, own_cache, scene_of,
 import app.atlas.large_surfaces as large_surfaces
 import app.atlas.unwrap as unwrap_module
 from app.atlas.charts import Charts
+from app.atlas.facets import facets
 from app.atlas.parametrize import parametrize
-from app.atlas.sides import facets, scene_size, weld
+from app.atlas.sides import scene_size, weld
 from app.atlas.unwrap import Unfolded, unwrap
 from app.scene import shapes
 from app.scene.model import F64, I32, Material, Scene
