@@ -120,6 +120,19 @@ def test_looking_is_cheap(desk: Desk) -> None:
     assert len(looks) == before
 
 
+def test_the_last_shooter_is_drawn_anew_only_where_light_moved(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    session, made, inspect = desk.session, list[object](), desk.session.inspect
+    monkeypatch.setattr(type(session), "solver", session.solver)  # another each time it is asked for
+    monkeypatch.setattr(session, "inspect", lambda texel=None: made.append(texel) or inspect(texel))
+    desk.frames(60)
+    made.clear()
+    desk.frames(60)
+    assert not made
+    session.state = "of other light"
+    desk.frames(60)
+    assert len(made) == 1
+
+
 def test_a_pick_selects_the_material(desk: Desk) -> None:
     desk.session.picked = type(PICKED)(**vars(PICKED) | {"material": 2})
     desk.click(*VIEW)
