@@ -21,6 +21,7 @@ NEAR = 4 * FLAT  # what is no farther apart is in one place
 MOST_PAIRS = 1 << 24  # of triangles whose boxes meet, beyond which none is looked at: soups of loose triangles
 DENSE = 256  # triangles of a surface, from which on it is looked at by itself
 BLOCK = 1 << 16  # pairs of triangles that are looked at at once
+SURFACES = 1 << 10  # whose boxes are looked at at once
 
 I64 = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -75,12 +76,18 @@ def _near_others(low: F64, high: F64, surface: I64) -> I64:
     lows, highs = _around(low, high, surface)
     x, y, z = np.argsort(-np.ptp(np.concatenate([lows, highs]), axis=0))
     boxes = shapely.box(lows[:, x], lows[:, y], highs[:, x], highs[:, y])
-    one, other = shapely.STRtree(boxes).query(boxes)
-    meets = (one != other) & (lows[one, z] <= highs[other, z]) & (highs[one, z] >= lows[other, z])
-    one, other = one[meets], other[meets]
+    tree, pairs = shapely.STRtree(boxes), 0
     least_shared, most_shared = np.full(lows.shape, np.inf), np.full(lows.shape, -np.inf)
-    np.minimum.at(least_shared, one, np.maximum(lows[one], lows[other]))
-    np.maximum.at(most_shared, one, np.minimum(highs[one], highs[other]))
+    for start in range(0, len(boxes), SURFACES):
+        one, other = tree.query(boxes[start : start + SURFACES])
+        one = one + start
+        meets = (one != other) & (lows[one, z] <= highs[other, z]) & (highs[one, z] >= lows[other, z])
+        one, other = one[meets], other[meets]
+        pairs += len(one)
+        if pairs > MOST_PAIRS:
+            return np.arange(len(surface))
+        np.minimum.at(least_shared, one, np.maximum(lows[one], lows[other]))
+        np.maximum.at(most_shared, one, np.minimum(highs[one], highs[other]))
     meets = np.ones(len(surface), bool)
     for k in range(3):
         meets &= (low[:, k] <= most_shared[surface, k]) & (high[:, k] >= least_shared[surface, k])

@@ -35,6 +35,7 @@ TIME_LIMIT_S = 120.0
 TIME_LIMIT_S_PER_TRIANGLE = 1e-3  # more than ten times what xatlas takes for models that it digests
 EXPECTED_S = 1.0, 5e-5  # and for each triangle: what it takes, about
 POLL_S = 0.05
+SEEN = 0.05  # of the work, that is done when large surfaces have been looked at
 CACHE_FILES = 64  # kept, newest first
 FORMAT = b"glowtree unwrap 4"  # changes when the worker's options or its answer do
 # Diagonal of what xatlas sees: it drops triangles smaller than 1e-7 in area, whatever the unit.
@@ -78,16 +79,27 @@ def unwrap(
     if not len(triangles):
         return Unfolded(np.empty(0, np.int32), np.empty((0, 3, 2)), 0, 0)
     warnings: list[str] = []
+    tell = progress or (lambda stage, share: None)
     surfaces = find_surfaces(points, triangles, groups)
     originals, of = np.unique(surfaces.original, return_inverse=True)
-    whole, uv = seen_whole(points, triangles[originals], surfaces.surface[originals])
+    whole, uv = seen_whole(
+        points,
+        triangles[originals],
+        surfaces.surface[originals],
+        lambda share: tell("finding what is seen whole from one side", SEEN * share),
+    )
     chart = np.full(len(originals), -1, np.int32)
     curved = np.flatnonzero(whole < 0)
     if len(curved):
         mine = originals[curved]
         try:
             chart[curved], uv[curved] = _xatlas(
-                points, triangles[mine], groups[mine], surfaces.surface[mine], time_limit, progress
+                points,
+                triangles[mine],
+                groups[mine],
+                surfaces.surface[mine],
+                time_limit,
+                lambda stage, share: tell(stage, SEEN + (1 - SEEN) * share),
             )
         except _UnwrapError as failure:
             warnings.append(f"xatlas {failure}: every flat piece is a chart of its own")
@@ -122,7 +134,7 @@ def _xatlas(
     groups: I32,
     surface: NDArray[np.int64],
     time_limit: float | None,
-    progress: Progress | None,
+    progress: Progress,
 ) -> tuple[I32, F64]:
     """xatlas's own charts, from the cache or from a worker."""
     used, local = np.unique(triangles, return_inverse=True)
@@ -179,7 +191,7 @@ def _meshes(corners: F64, groups: I32, surface: NDArray[np.int64]) -> tuple[I32,
     return mesh, scale.astype(np.float32), most_area
 
 
-def _run_worker(source: Path, target: Path, time_limit: float, triangles: int, progress: Progress | None) -> None:
+def _run_worker(source: Path, target: Path, time_limit: float, triangles: int, progress: Progress) -> None:
     """Run xatlas on source; whatever ends the wait (the limit, Ctrl-C, a cancelling callback) ends the worker."""
     root = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(p for p in (root, os.environ.get("PYTHONPATH")) if p)
@@ -192,8 +204,7 @@ def _run_worker(source: Path, target: Path, time_limit: float, triangles: int, p
                 elapsed = time.monotonic() - start
                 if elapsed > time_limit:
                     raise _UnwrapError(f"took longer than {time_limit:g} s")
-                if progress is not None:
-                    progress("unfolding curved pieces", elapsed / (elapsed + EXPECTED_S[0] + EXPECTED_S[1] * triangles))
+                progress("unfolding curved pieces", elapsed / (elapsed + EXPECTED_S[0] + EXPECTED_S[1] * triangles))
                 time.sleep(POLL_S)
         finally:
             worker.kill()

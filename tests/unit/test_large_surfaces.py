@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -13,7 +14,7 @@ import app.atlas.large_surfaces as large_surfaces
 from app.atlas.parametrize import parametrize
 from app.atlas.sides import weld
 from app.scene import shapes
-from app.scene.model import F64, I32, Scene
+from app.scene.model import F64, I32, Material, Scene
 
 __all__ = ["own_cache"]
 
@@ -40,7 +41,7 @@ def _sheet(
 
 def _seen(scene: Scene) -> tuple[I32, F64]:
     points, corners = weld(scene)
-    return large_surfaces.seen_whole(points, corners, np.zeros(len(corners), np.int64))
+    return large_surfaces.seen_whole(points, corners, np.zeros(len(corners), np.int64), lambda share: None)
 
 
 def _hills(u: F64, v: F64) -> list[F64]:
@@ -96,3 +97,36 @@ def test_what_turns_away_is_not_seen_whole_but_its_halves_may_be() -> None:
 
 def test_a_closed_surface_is_not_seen_whole() -> None:
     assert (_seen(scene_of([shapes.icosphere(0.5, 3)]))[0] < 0).all()
+
+
+def test_a_narrow_ring_is_several_charts() -> None:
+    """The rectangle around a road around a lake is nearly empty."""
+
+    def ring(width: float) -> Scene:
+        def place(u: F64, v: F64) -> list[F64]:
+            angle, radius = 2 * np.pi * u, 1 + width * v
+            return [radius * np.sin(angle), 0 * u, radius * np.cos(angle)]
+
+        return _sheet(place, across=400, up=2)
+
+    assert set(_seen(ring(2.0))[0]) == {0}
+    chart, uv = _seen(ring(0.1))
+    assert (chart >= 0).all() and 4 <= chart.max() + 1 <= 16
+    boxes = [np.ptp(uv[chart == k].reshape(-1, 2), axis=0).prod() for k in range(chart.max() + 1)]
+    assert sum(boxes) < 1.1**2 * np.pi  # of 4.8 m²; each arc's box may be three times as large as it
+
+
+def test_mirrored_surfaces_are_seen_from_their_front(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And those of two materials are a chart each."""
+    sheet = _sheet(_hills)
+    scene = dataclasses.replace(
+        sheet,
+        triangles=sheet.triangles[:, ::-1].copy(),
+        material_ids=(np.arange(len(sheet.triangles)) % 48 < 24).astype(np.int32),
+        materials=(Material("one", double_sided=True), Material("other", double_sided=True)),
+    )
+    charts = parametrize(scene, density=8.0)
+    assert charts.method == "2 pieces seen whole from one side" and charts.chart_count == 4  # from the back, too
+    a, b = charts.face_uv[:, 1] - charts.face_uv[:, 0], charts.face_uv[:, 2] - charts.face_uv[:, 0]
+    turned = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    assert ((turned < 0) == charts.face_back).all()
