@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
-from solver_scenes import EVERY_SOLVER, begin, grey, quads_scene, room
+from solver_scenes import EVERY_SOLVER, FAST, begin, grey, quads_scene, room
 
 from app.gpu import Gpu
 from app.scene.model import F64, Scene
@@ -56,10 +58,9 @@ def test_sheets_back_to_back_are_a_wall(gpu: Gpu, solver: str) -> None:
 SCENES = {"a sheet": lit_from_the_left, "a beam through it": lambda: lit_from_the_left(*beam()), "two rooms": parted}
 
 
-@EVERY_SOLVER
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(("solver", "name"), [*itertools.product(FAST, SCENES), ("local", "a beam through it")])
 def test_the_dark_half_is_dark(gpu: Gpu, solver: str, name: str) -> None:
-    solution = begin(gpu, SCENES[name](), texels=3000, solver=solver)
+    solution = begin(gpu, SCENES[name](), texels=300 if solver == "local" else 3000, solver=solver)
     solution.settle()
     dark = solution.position[:, 0] > 1.03 + 1e-6
     on_wall = np.abs(solution.position[:, 0] - 1.03) <= 1e-6
@@ -70,6 +71,10 @@ def test_the_dark_half_is_dark(gpu: Gpu, solver: str, name: str) -> None:
     # Where an edge of the beam runs askew through a sample of a map, the sample may see past it: the rasteriser rounds to 1/256
     # of one. Straight feet of walls pass nothing at all.
     least = 1e-6 if solver == "shooting" and name == "a beam through it" else 0.0
+    if (
+        solver == "local"
+    ):  # single precision, twice: a matrix is inverted, whose blocks of zeros are left with what rounding makes
+        least = 1e-12
     assert dark_light <= least * lit_light
     solution.release()
 
