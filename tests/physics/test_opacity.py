@@ -160,10 +160,20 @@ def test_sky_and_lights_without_area_shine_through_a_board(gpu: Gpu, what: str, 
     assert power[1] < 0.6 * power[0]
 
 
-@pytest.mark.parametrize("panes", [2, 3])
-def test_the_sun_shines_through_panes_behind_each_other(gpu: Gpu, panes: int) -> None:
-    """By the product of what each lets pass: all of them are seen in one map."""
-    quads = [square(0.0, 1.0), *(square(1.0 + 0.3 * k, 1.5) for k in range(panes))]
-    scene = quads_scene(quads, [grey(0.0), replace(CLOSED, albedo=(0.0,) * 3, opacity=0.5)], [0] + [1] * panes)
+def specks(count: int) -> list[list[list[float]]]:
+    """Small squares aside, in no light's way."""
+    corners = np.array([[3.2, 0.9, 0.0], [3.2, 0.9, 0.1], [3.3, 0.9, 0.1], [3.3, 0.9, 0.0]])
+    return [np.add(corners, [0.0, 0.0, 0.6 + 0.25 * k]).tolist() for k in range(count)]
+
+
+@pytest.mark.parametrize(("panes", "apart"), [(2, 1), (3, 1), (2, 8)])
+def test_the_sun_shines_through_panes_behind_each_other(gpu: Gpu, panes: int, apart: int) -> None:
+    """By the product of what each lets pass, wherever they stand in the file: all are seen in one map. Within 5 %: each of
+    the 256 texels looks up one sample, and by chance alone two panes were off by 11 % on average, three by 17 %."""
+    quads = [square(0.0, 1.0)]
+    for k in range(panes):
+        quads += [square(1.0 + 0.3 * k, 1.5), *(specks(apart - 1) if k + 1 < panes else [])]
+    black = replace(CLOSED, albedo=(0.0,) * 3, opacity=0.5)
+    scene = quads_scene(quads, [grey(0.0), black], [0] + [1] * (len(quads) - 1))
     sun = Light("sun", "directional", direction=(0.0, -1.0, 0.0))
-    assert lit(gpu, scene.with_lights((sun,)), *WAYS["hemicube"])[0] == pytest.approx(4 * 0.5**panes, rel=0.02)
+    assert lit(gpu, scene.with_lights((sun,)), *WAYS["hemicube"])[0] == pytest.approx(4 * 0.5**panes, rel=0.05)

@@ -48,17 +48,19 @@ float chance(vec3 origin, vec3 direction, int row) {
     return float(hash(bits + uvec3(uint(row))).x >> 8) * (1.0 / 16777216.0);
 }
 
-// The same for a sample of a map, by interleaved gradient noise [Jimenez14]: any 3×3 samples have numbers that are spread evenly,
-// and so has any regular part of them, which texels in rows may look up. Shifted on each triangle, seen from each origin. Behind
-// a sheet that is half there texels differ by 2.5 % after 300 shots, 6.3 % where each sample has a number of its own. One map is
-// all that a directional light has: behind two panes of one pattern it would show how much their shifts are alike, and not the
-// product of what both let pass. So every two triangles, as a pane has them, have one of eight patterns: turned, mirrored, doubled.
+// The same for a sample of a map: gradient · px, a lattice, with steps along rows and columns such that neighbours have numbers
+// that are spread evenly, as those of interleaved gradient noise [Jimenez14]. Shifted on each triangle, seen from each origin. One
+// map is all that a directional light has: behind two panes of one gradient it would show how much their shifts are alike, and not
+// the product of what both let pass. So every two triangles, as a pane has them, have a gradient of their own, by a hash of their
+// number: turned, mirrored, and anywhere between these steps. Of 256² samples two or three panes pass what they should within 0.1
+// to 0.2 % on average, 6 % at worst; 0.4 and 2 % by chance alone.
+const vec2 LEAST_STEPS = vec2(0.15, 0.43), MOST_STEPS = vec2(0.40, 0.49);
+
 float chance_in_map(vec3 origin, ivec2 px, int row) {
     uint shift = hash(hash(floatBitsToUint(origin)) + uvec3(uint(row))).x >> 8;
-    int pattern = row >> 1;
-    vec2 at = vec2((pattern & 1) == 0 ? px : px.yx);
-    if ((pattern & 2) != 0) at.x = -at.x;
-    float number = 52.9829189 * fract(dot(vec2(0.06711056, 0.00583715), at));
-    if ((pattern & 4) != 0) number *= 2.0;
-    return fract(number + float(shift) * (1.0 / 16777216.0));
+    uvec3 pane = hash(uvec3(uint(row >> 1), 0u, 1u));
+    vec2 gradient = mix(LEAST_STEPS, MOST_STEPS, vec2(pane.xy >> 8) * (1.0 / 16777216.0));
+    if ((pane.z & 0x10000u) != 0u) gradient = gradient.yx;
+    if ((pane.z & 0x20000u) != 0u) gradient.x = -gradient.x;
+    return fract(dot(vec2(px), gradient) + float(shift) * (1.0 / 16777216.0));
 }
