@@ -13,11 +13,9 @@ from app.util.words import counted
 
 # Odd multipliers that spread the bits of coordinates [Knuth, multiplicative hashing by the golden ratio].
 HASH = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
-ODD_ORDERS = (
-    0 * 9 + 2 * 3 + 1,
-    1 * 9 + 0 * 3 + 2,
-    2 * 9 + 1 * 3 + 0,
-)  # of a triangle's corners: it winds the other way
+# Of a triangle's corners, 9 a + 3 b + c: it winds the other way.
+ODD_ORDERS = 0 * 9 + 2 * 3 + 1, 1 * 9 + 0 * 3 + 2, 2 * 9 + 1 * 3 + 0
+BOTH = 2  # in place of a front
 
 Array = NDArray[Any]
 Bools = NDArray[np.bool_]
@@ -30,7 +28,9 @@ def doubles(
     """(m,) which of the ``given`` triangles are to be left out, since others lie in the same place.
 
     Of one material, those that have the corners and, unless it is double-sided, the front of one before them. Of several opaque
-    ones, all but one for each front: one that emits light before one with two sides, and that before one listed earlier.
+    ones, one that emits light from two sides is left alone. Else one for each front that emits; then one with two sides, unless
+    both fronts emit: its other side is the wall of the room behind; and only where there is none, one for each front left. Of
+    those that are alike in this the first is kept.
     """
     alike = _with_equal_corners(positions, triangles)
     alike = alike[given[alike]]
@@ -38,17 +38,19 @@ def doubles(
     place, turned = _places(positions[triangles[alike]])
     material = material_ids[alike]
     emits, two_sided, opaque = np.array([(m.emits, m.double_sided, m.opaque) for m in materials], bool)[material].T
-    side = turned & ~two_sided
-    again[alike] = ~_firsts(place, side, material)
+    front = np.where(two_sided, BOTH, turned)
+    again[alike] = ~_firsts(place, np.where(two_sided, 0, turned), material)
     listed = int(again.sum())
-    order = np.lexsort((~two_sided, ~emits, place))
+    order = np.argsort(~emits, kind="stable")
     order = order[(opaque & ~again[alike])[order]]
-    hidden = ~_firsts(place[order], side[order])
-    best = np.flatnonzero(np.diff(place[order], prepend=-1))  # of each place
-    follows = np.ones(len(order), bool)
-    follows[best] = False
-    alone = np.repeat(two_sided[order][best], np.diff(np.append(best, len(order))))
-    hidden |= follows & (alone | two_sided[order])
+    place, front, emits = place[order], front[order], emits[order]
+    hidden = ~_firsts(place, front)
+    there, lit = np.zeros((2, int(place.max(initial=0)) + 1, 3), bool)
+    there[place, front] = True
+    lit[place[emits], front[emits]] = True
+    hidden |= lit[place, BOTH] & ~(emits & (front == BOTH))
+    hidden |= lit[place, :BOTH].all(axis=1) & ~emits
+    hidden |= there[place, BOTH] & ~emits & (front != BOTH)
     again[alike[order[hidden]]] = True
     for count, what in (
         (listed, "listed before"),

@@ -160,6 +160,7 @@ def test_of_opaque_triangles_in_one_place_one_is_kept_for_each_front() -> None:
     positions = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
     names = {"wall": Material("wall"), "paint": Material("paint"), "lamp": Material("lamp", emission=(1, 1, 1))}
     names |= {"sheet": Material("sheet", double_sided=True), "film": Material("film", opacity=0.5)}
+    names["panel"] = Material("panel", emission=(1, 1, 1), double_sided=True)
     materials = list(names.values())
 
     def kept(*stack: str) -> list[str]:
@@ -178,6 +179,9 @@ def test_of_opaque_triangles_in_one_place_one_is_kept_for_each_front() -> None:
     assert kept("wall", "-paint") == ["wall", "-paint"]  # back to back
     assert kept("wall", "lamp") == ["lamp"]
     assert kept("wall", "sheet") == ["sheet"]
-    assert kept("lamp", "-sheet") == ["lamp"]
+    assert kept("lamp", "-sheet") == ["lamp", "-sheet"]  # the room behind has a wall
+    assert kept("paint", "sheet", "lamp", "sheet") == ["sheet", "lamp"]
+    assert kept("lamp", "sheet", "-lamp") == ["lamp", "-lamp"]
+    assert kept("lamp", "sheet", "panel") == ["panel"]
     assert kept("wall", "film") == ["wall", "film"]
     assert kept("wall", "-paint", "sheet", "-wall") == ["sheet"]
