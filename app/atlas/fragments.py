@@ -164,9 +164,8 @@ def _spans(u: F64, v: F64, winding: F64, across: I64, pair: I64, row: I64) -> tu
     rises = np.take(rise > 0, pair, axis=1)
     rise, along = np.take(rise, pair, axis=1), np.take(du, pair, axis=1) * row
     with np.errstate(over="ignore"):
-        met, filled = (
-            (np.take(corner, pair, axis=1) + along) / rise for corner in (near, far + slack)
-        )  # where the edge crosses
+        # where the edge crosses
+        met, filled = ((np.take(corner, pair, axis=1) + along) / rise for corner in (near, far + slack))
     wide = across[pair]
     first, end = np.where(rises, -1.0, np.floor(met)) + 1, np.where(rises, np.ceil(met), np.inf)
     whole_from, whole_to = np.where(rises, 0.0, np.ceil(filled)), np.where(rises, np.floor(filled), np.inf) + 1

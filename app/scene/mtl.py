@@ -24,12 +24,8 @@ from app.util.words import counted
 
 WHITE: RGB = (1.0, 1.0, 1.0)
 MAPS = "map_kd", "map_ke", "map_d"
-PLACING = {
-    "-o": (0.0, 0.0),
-    "-s": (1.0, 1.0),
-    "-t": (0.0, 0.0),
-}  # options of maps with up to three numbers, here two, and what
-# they are unless given: offset, scale, turbulence
+# Options of maps with up to three numbers, here two, and what they are unless given: offset, scale, turbulence.
+PLACING = {"-o": (0.0, 0.0), "-s": (1.0, 1.0), "-t": (0.0, 0.0)}
 OPTION_WORDS = {"-mm": 2}  # that follow other options; else one
 LIBRARIES = re.compile(r'"([^"]+)"|(\S.*?\.mtl)(?=\s|$)|(\S+)', re.IGNORECASE)  # names may hold blanks
 
