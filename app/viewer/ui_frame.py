@@ -37,7 +37,7 @@ class UiFrame:
     it.
 
     whole: show all light as it is now; False bounds the work of a frame, and where nothing moves each adds to the samples of the
-    picture. unfinished: whether such samples are still to come.
+    picture. unfinished: whether such samples are still to come, or a picture of what stands still now.
     """
 
     def __init__(self, gpu: Gpu, ui: Ui, *, whole: bool = True) -> None:
@@ -111,16 +111,17 @@ class UiFrame:
         if view.waits_for_light and not fresh:
             self._still, self.unfinished = None, False
             return
-        size = target.size
+        size, coarse = target.size, view.session.coarse
         now = None if view.still is None else (view.still, scale, size)
-        if now is None or now != self._still or fresh:
-            whole = view.session.coarse  # its texels are few: they are drawn once
-            if (look or fresh) and not view.draw(target, size, scale=scale, whole=whole) and fresh:
-                target.clear(*theme.PANEL)
-        elif look and view.samples < SAMPLES and not view.session.coarse:
-            view.draw(target, size, scale=scale, add=True)
-        self._still = now
-        self.unfinished = now is not None and view.samples < SAMPLES and not view.session.coarse
+        if look or fresh:
+            if now is None or now != self._still or fresh:  # coarse texels are few: they are drawn whole, and once
+                if not view.draw(target, size, scale=scale, whole=coarse) and fresh:
+                    target.clear(*theme.PANEL)
+                self._still = now
+            elif view.samples < SAMPLES and not coarse:
+                view.draw(target, size, scale=scale, add=True)
+        more = view.samples < SAMPLES and not coarse
+        self.unfinished = now is not None and (more or now != self._still)
 
     def frames_to_show(self, view: View) -> int:
         """How many frames it takes until a change is seen everywhere."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -23,6 +24,7 @@ from app.scene.load import load_scene
 from app.scene.sky import Sky
 from app.session import loading, opening
 from app.session import session as session_module
+from app.session.pacing import SLOW_FRAME, Turns
 from app.session.session import Session
 from app.session.view import View
 from app.solvers import ShootingOptions
@@ -295,19 +297,32 @@ def test_nothing_stays_on_the_gpu(
     assert counts[1:] == counts[:1] * 2 and not forgotten()
 
 
-def test_a_picture_at_rest_shows_all_of_the_coarse_light(view: View, gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where a frame brings only a few of its texels up to date."""
-    session, size = view.session, (640, 360)
+@pytest.fixture
+def seen(gpu: Gpu, view: View) -> Iterator[Callable[..., np.ndarray]]:
+    """Draws a frame as the window does, ``look``: with the view anew; gives the view's lower half, below what says how far
+    loading is."""
+    size = 640, 360
     texture = gpu.texture(size, 4, "f1")
     target, ui = gpu.target(texture), Ui(live=False)
     frame = UiFrame(gpu, ui, whole=False)
 
-    def seen() -> np.ndarray:
-        frame.draw(view, target, size=size)
+    def seen(*, look: bool = True) -> np.ndarray:
+        frame.draw(view, target, size=size, look=look)
         left, bottom, width, height = ui.view_rect
         image = np.frombuffer(texture.read(), np.uint8).reshape(size[1], size[0], 4)
-        return image[bottom : bottom + height // 2, left : left + width].copy()  # below what says how far it is
+        return image[bottom : bottom + height // 2, left : left + width].copy()
 
+    yield seen
+    frame.release()
+    ui.release()
+    gpu.release_all(target, texture)
+
+
+def test_a_picture_at_rest_shows_all_of_the_coarse_light(
+    view: View, seen: Callable[..., np.ndarray], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where a frame brings only a few of its texels up to date."""
+    session = view.session
     monkeypatch.setattr(session_module, "COARSE_LEFT", 0.5)
     session.open("cornell-box")
     frames(session, lambda: session.opened)
@@ -316,12 +331,36 @@ def test_a_picture_at_rest_shows_all_of_the_coarse_light(view: View, gpu: Gpu, m
     monkeypatch.setattr(resolve, "TEXELS_PER_FRAME", 1)
     frames(session, lambda: session.run.resting)
     at_rest = [seen() for _ in range(2)][-1]
-    frame._still = None
     monkeypatch.setattr(resolve, "TEXELS_PER_FRAME", 1 << 20)
-    for _ in range(2):
-        all_of_it = seen()
-    frame.release()
-    ui.release()
-    gpu.release_all(target, texture)
+    view.display = view.display.replace(exposure=view.display.exposure + 1)
+    seen()
+    view.display = view.display.replace(exposure=view.display.exposure - 1)
+    all_of_it = seen()
     assert session.coarse and all_of_it.std() > 10
     assert np.array_equal(at_rest, all_of_it)
+
+
+def test_coarse_light_is_seen_where_solving_and_drawing_take_turns(
+    view: View, seen: Callable[..., np.ndarray], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Frames that solve do not draw, and so the next one must; where the camera moved in one, too."""
+    session, turns, pictures = view.session, Turns(), []
+    session.open("cornell-box")
+    frames(session, lambda: session.opened)
+    for _ in range(4):
+        seen()  # the panels find their places
+    for _ in range(6):
+        solve, look = turns.next(SLOW_FRAME)
+        if solve:
+            session.work()
+        pictures.append((solve, look, seen(look=look)))
+    anew = [not np.array_equal(one[-1], other[-1]) for one, other in itertools.pairwise(pictures)]
+    looked = [look for _, look, _ in pictures[1:]]
+    assert session.coarse and anew == looked and sum(looked) >= 2
+    monkeypatch.setattr(session_module, "COARSE_LEFT", 1.0)
+    session.poll()
+    frames(session, lambda: session.run.resting)
+    before = seen()
+    view.camera = dataclasses.replace(view.camera, yfov=0.5)
+    assert np.array_equal(seen(look=False), before)
+    assert not np.array_equal(seen(), before)
