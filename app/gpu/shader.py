@@ -61,6 +61,7 @@ class ShaderLibrary:
         self._programs: dict[tuple[object, ...], moderngl.Program] = {}
         self._empty: dict[int, moderngl.VertexArray] = {}
         self.generation = 0  # counts reloads: holders of vertex arrays rebuild when it moves
+        self.compiled = 0  # programs so far, those of reloads as well
 
     def program(
         self,
@@ -118,10 +119,12 @@ class ShaderLibrary:
         if unused:
             raise ShaderError(f"{name}: no shader declares #define {', '.join(sorted(unused))}")
         try:
-            return self._ctx.program(vertex_shader=stages[0].text, fragment_shader=stages[1].text)
+            program = self._ctx.program(vertex_shader=stages[0].text, fragment_shader=stages[1].text)
         except moderngl.Error as error:
             message = str(error)
             raise ShaderError(stages["vertex_shader" not in message].explain(message)) from None
+        self.compiled += 1
+        return program
 
 
 def _names(program: moderngl.Program) -> dict[str, tuple[object, ...]]:

@@ -62,7 +62,7 @@ class Opening:
         self.loading: Loading | None = None
         self._parts: Generator[None, None, Ready] | None = None
         self._coarse = False  # whether these parts are of coarse texels
-        self._warm = set[str]()  # solvers whose programs have drawn
+        self._warm = set[tuple[int, str]]()  # solvers all of whose programs have drawn, since which reload of these
 
     def begin(self, loading: Loading) -> None:
         """This one instead of any other."""
@@ -119,9 +119,9 @@ class Opening:
     def _upload(
         self, loaded: Loaded, solver_name: str, options: Mapping[str, Options], *, coarse: bool = False
     ) -> Generator[None, None, Ready]:
-        """Upload what was loaded, and the first time draw once with each program, since drivers compile it then; in coarse texels
-        the first shot does. Yields after each part. Raises UserError; then, and when given up between two parts, nothing stays on
-        the GPU."""
+        """Upload what was loaded, and draw once with each program of the solver, since drivers compile it then, unless all have
+        drawn; in coarse texels the first shot does. Yields after each part. Raises UserError; then, and when given up between two
+        parts, nothing stays on the GPU."""
         began, gpu, family = time.perf_counter(), self._gpu, SOLVERS[solver_name]
         make = family.for_coarse if coarse and family.for_coarse is not None else family.make
         with contextlib.ExitStack() as undo:
@@ -136,14 +136,18 @@ class Opening:
             undo.callback(lightmap.release)
             gpu.ctx.finish()
             yield
+            compiled = gpu.shaders.compiled
             solver = make(gpu, lightmap, options[solver_name])
+            if gpu.shaders.compiled > compiled:
+                self._warm.clear()  # solvers share programs: others may need these, too
             undo.callback(solver.release)
             yield
-            if not coarse and solver_name not in self._warm:
+            warm = gpu.shaders.generation, solver_name
+            if not coarse and warm not in self._warm:
                 yield from solver.warm_up()
                 solver.reset()
                 yield
-            self._warm.add(solver_name)
+                self._warm.add(warm)
             if self.prepare is not None:
                 undo.callback(self.prepare(lightmap))
                 gpu.ctx.finish()

@@ -32,9 +32,9 @@ from app.session.versions import Version, with_edits
 from app.solvers import DEFAULT_SOLVER, SOLVERS
 from app.util.background import BackgroundTask
 
-# Solving in coarse texels ends after so many seconds, but not before so much work, which takes longer beside other programs, or
-# once this share of what is emitted remains: the processor makes better ones
-COARSE_SECONDS, COARSE_WORK, COARSE_LEFT = 1.0, 6, 0.2
+# Solving in coarse texels ends after so many seconds, but not before so much work, which takes longer beside other programs; in
+# any case after the longest, or once this share of what is emitted remains: the processor makes better ones
+COARSE_SECONDS, COARSE_WORK, COARSE_LONGEST, COARSE_LEFT = 1.0, 6, 4.0, 0.2
 
 
 @dataclass(frozen=True)
@@ -373,8 +373,8 @@ class Session(EditableScene):
     def _lit_coarsely(self) -> bool:
         """Whether there is as much light as coarse texels are given."""
         run = self.run
-        long = run.seconds >= COARSE_SECONDS and self.solver.issued >= COARSE_WORK
-        return long or run.progress.remaining <= COARSE_LEFT
+        enough = COARSE_SECONDS if self.solver.issued >= COARSE_WORK else COARSE_LONGEST
+        return run.seconds >= enough or run.progress.remaining <= COARSE_LEFT
 
     @property
     def at_rest(self) -> bool:

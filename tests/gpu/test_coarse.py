@@ -27,8 +27,9 @@ from app.session import session as session_module
 from app.session.pacing import SLOW_FRAME, Turns
 from app.session.session import Session
 from app.session.view import View
-from app.solvers import ShootingOptions
+from app.solvers import SOLVERS, ShootingOptions
 from app.solvers.run import solve_until
+from app.solvers.shooting.solver import Shooting
 from app.ui.app import Ui
 from app.util import cache
 from app.viewer.picture import picture
@@ -55,6 +56,7 @@ def better(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[threadin
     monkeypatch.setattr(charts_cache, "FEWEST", 0)
     monkeypatch.setattr(loading, "COARSE_FROM", 0)
     monkeypatch.setattr(session_module, "COARSE_SECONDS", PATIENCE)
+    monkeypatch.setattr(session_module, "COARSE_LONGEST", PATIENCE)
     monkeypatch.setattr(session_module, "COARSE_LEFT", 0.0)
     monkeypatch.setattr(loading, "default_texels", lambda sides, roots: TEXELS // 16)
     with cache.elsewhere(tmp_path):
@@ -184,7 +186,13 @@ def test_the_processor_is_left_to_better_charts_after_a_while(
     session.poll()
     frames(session, lambda: session.run.resting)
     assert session.solver.issued >= 2, "so much takes longer beside other programs"
-    monkeypatch.setattr(session_module, "COARSE_SECONDS", PATIENCE)
+    monkeypatch.setattr(session_module, "COARSE_WORK", 1 << 30)
+    session.poll()
+    assert not session.run.resting
+    monkeypatch.setattr(session_module, "COARSE_LONGEST", session.run.seconds)
+    session.poll()
+    assert session.run.resting, "but no longer than this"
+    monkeypatch.setattr(session_module, "COARSE_LONGEST", PATIENCE)
     remaining = 0.9 * session.run.progress.remaining
     monkeypatch.setattr(session_module, "COARSE_LEFT", remaining)
     session.poll()
@@ -280,6 +288,41 @@ def test_another_scene_may_be_opened_meanwhile(view: View, better: threading.Eve
     assert session.name == "Furnace"
 
 
+def test_programs_draw_once_before_light_needs_them(
+    gpu: Gpu, view: View, better: threading.Event, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of coarse light are fewer; another scene may need more, and reloaded ones have not drawn."""
+    session, warmed, warm_up = view.session, [], Shooting.warm_up
+
+    def counted(solver: Shooting) -> Iterator[None]:
+        warmed.append(solver)
+        return warm_up(solver)
+
+    def warmed_for(name: str) -> int:
+        """How often, where it opens in coarse texels first, then in better ones."""
+        better.clear()
+        warmed.clear()
+        session.atlas = session.atlas.replace(texels=session.atlas.texels + 1)  # or its charts are kept
+        session.open(name)
+        frames(session, lambda: session.coarse)
+        better.set()
+        frames(session, lambda: session.loading is None)
+        return len(warmed)
+
+    monkeypatch.setattr(Shooting, "warm_up", counted)
+    assert [warmed_for("furnace") for _ in range(2)] == [1, 0]
+    monkeypatch.setattr(gpu.shaders, "generation", gpu.shaders.generation + 1)  # as a reload does
+    assert warmed_for("furnace") == 1
+    more = gpu.shaders.compiled  # a name that no program has had
+
+    def needy(*args: Any, **options: Any) -> Shooting:
+        gpu.shaders.program("imgui/present", slots={f"of {more}": "nothing"})
+        return Shooting(*args, **options)
+
+    monkeypatch.setitem(SOLVERS, "shooting", dataclasses.replace(session.family, for_coarse=needy))
+    assert warmed_for("furnace") == 1
+
+
 def test_nothing_stays_on_the_gpu(
     gpu: Gpu, view: View, better: threading.Event, forgotten: Callable[[], list[object]]
 ) -> None:
@@ -350,13 +393,13 @@ def test_coarse_light_is_seen_where_solving_and_drawing_take_turns(
     for _ in range(4):
         seen()  # the panels find their places
     for _ in range(6):
-        solve, look = turns.next(SLOW_FRAME)
+        solve, look = turns.next(1.1 * SLOW_FRAME)
         if solve:
             session.work()
         pictures.append((solve, look, seen(look=look)))
     anew = [not np.array_equal(one[-1], other[-1]) for one, other in itertools.pairwise(pictures)]
     looked = [look for _, look, _ in pictures[1:]]
-    assert session.coarse and anew == looked and sum(looked) >= 2
+    assert session.coarse and anew == looked and set(looked) == {False, True}
     monkeypatch.setattr(session_module, "COARSE_LEFT", 1.0)
     session.poll()
     frames(session, lambda: session.run.resting)
