@@ -12,6 +12,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -23,14 +24,41 @@ from app.scene.text import decoded
 from app.util.words import counted
 
 WHITE: RGB = (1.0, 1.0, 1.0)
-MAPS = "map_kd", "map_ke", "map_d"
+INSTEAD = {  # of the picture of a map
+    "map_kd": "Kd is used, or albedo 0.5 without it",
+    "map_ke": "Ke is used, or no light without it",
+    "map_d": "d or Tr is used, or opacity 1 without them",
+}
 # Options of maps with up to three numbers, here two, and what they are unless given: offset, scale, turbulence.
 PLACING = {"-o": (0.0, 0.0), "-s": (1.0, 1.0), "-t": (0.0, 0.0)}
 OPTION_WORDS = {"-mm": 2}  # that follow other options; else one
 LIBRARIES = re.compile(r'"([^"]+)"|(\S.*?\.mtl)(?=\s|$)|(\S+)', re.IGNORECASE)  # names may hold blanks
 
 Lines = dict[str, str]  # of one material, by lower-case key
-Pictures = dict[tuple[str, Path, str], F32 | None]  # by key, folder and file; None where it cannot be read
+
+
+@dataclass(frozen=True)
+class _Pictures:
+    """Those of all maps inside ``root``: each that was read, as colours or as opacity, and the maps of each that is lost."""
+
+    root: Path
+    read: dict[tuple[Path, bool], F32 | None] = field(default_factory=dict)
+    lost: dict[str, set[str]] = field(default_factory=dict)
+
+    def of(self, folder: Path, key: str, file: str) -> F32 | None:
+        """The one of a map line in a library in ``folder``; None if there is none to read, which is noted."""
+        found, opacity = _picture_file(self.root, folder, file), key == "map_d"
+        if found is not None and (found, opacity) not in self.read:
+            self.read[found, opacity] = _pixels(found, opacity=opacity)
+        pixels = None if found is None else self.read[found, opacity]
+        if pixels is None:
+            self.lost.setdefault(file, set()).add(key)
+        return pixels
+
+    def notes(self) -> list[str]:
+        """Which are lost, and what is used instead."""
+        instead = "; ".join(text for key, text in INSTEAD.items() if any(key in keys for keys in self.lost.values()))
+        return [f"{without_pictures(list(self.lost))}: {instead}"] if self.lost else []
 
 
 def read_materials(
@@ -39,7 +67,7 @@ def read_materials(
     """The materials of these ``names`` in order, and what of them is missing. coloured: whether all vertices have colours,
     which are the albedo of what has no material."""
     known, folders, notes = _read_libraries(path, libraries)
-    pictures: Pictures = {}
+    pictures = _Pictures(path.parent)
     materials, unknown = [], 0
     for name in names:
         found = _named(name, known)
@@ -57,10 +85,7 @@ def read_materials(
         notes.append(
             f"{counted(filtered, 'material', 'materials')} with a filter (Tf) and without opacity (d, Tr): opaque"
         )
-    lost = [file for (_, _, file), pixels in pictures.items() if pixels is None]
-    if lost:
-        notes.append(f"{without_pictures(lost)}: Kd is used, or albedo 0.5 without it")
-    return materials, notes
+    return materials, notes + pictures.notes()
 
 
 def unquoted(text: str) -> str:
@@ -118,7 +143,7 @@ def _read_mtl(path: Path, library: Path) -> dict[str, Lines]:
     return materials
 
 
-def _material(path: Path, folder: Path, name: str, lines: Lines, pictures: Pictures) -> Material:
+def _material(path: Path, folder: Path, name: str, lines: Lines, pictures: _Pictures) -> Material:
     material = Material(name or "no material", double_sided=True)
     if "kd" in lines:
         material = dataclasses.replace(material, albedo=_colour(path, name, "Kd", lines["kd"]))
@@ -128,7 +153,7 @@ def _material(path: Path, folder: Path, name: str, lines: Lines, pictures: Pictu
         material = dataclasses.replace(material, opacity=_number(path, name, "d", lines["d"].split()[-1]))
     elif "tr" in lines:
         material = dataclasses.replace(material, opacity=1.0 - _number(path, name, "Tr", lines["tr"]))
-    textures = {key: _texture(path.parent, folder, key, lines[key], pictures) for key in MAPS if key in lines}
+    textures = {key: _texture(folder, key, lines[key], pictures) for key in INSTEAD if key in lines}
     if "map_d" in textures:
         material = dataclasses.replace(material, opacity_texture=textures["map_d"])
     if textures.get("map_ke") is not None:
@@ -146,12 +171,10 @@ def _only_filters(lines: Lines) -> bool:
     return bool(words) and any(word.replace(".", "", 1).isdigit() and float(word) != 1.0 for word in words)
 
 
-def _texture(root: Path, folder: Path, key: str, text: str, pictures: Pictures) -> Texture | None:
-    """The picture of a map line; of map_d its alpha, or else its red."""
+def _texture(folder: Path, key: str, text: str, pictures: _Pictures) -> Texture | None:
+    """The picture of a map line."""
     file, options = _map_options(text)
-    if (key, folder, file) not in pictures:
-        pictures[key, folder, file] = _pixels(root, folder, key, file)
-    pixels = pictures[key, folder, file]
+    pixels = pictures.of(folder, key, file)
     if pixels is None:
         return None
     (across, up), (right, above) = (_numbers(options, option) for option in ("-s", "-o"))
@@ -167,20 +190,27 @@ def _numbers(options: dict[str, list[str]], option: str) -> tuple[float, float]:
     return (given[0] if given else first, given[1] if len(given) > 1 else second)
 
 
-def _pixels(root: Path, folder: Path, key: str, file: str) -> F32 | None:
-    """The picture as it is named in ``folder`` or in the scene's, or without its own folders; None if there is none to read."""
-    last = re.split(r"[/\\:]", file)[-1]
-    for place, name in ((folder, file), (root, file), (folder, last), (root, last)):
-        found = file_inside(root, place, name)
-        if found is not None:
-            try:
-                if key != "map_d":
-                    return read_image(found)
-                alpha = read_channel(found, "A")
-                return read_channel(found, "R") if alpha is None else alpha
-            except ImageError:
-                return None
+def _picture_file(root: Path, folder: Path, file: str) -> Path | None:
+    """The picture as it is named in ``folder`` or in the scene's, or without its own folders; or else without what may be a
+    comment. None if there is none."""
+    for name in dict.fromkeys((file, unquoted(file.partition("#")[0]))):
+        last = re.split(r"[/\\:]", name)[-1]
+        for place, part in ((folder, name), (root, name), (folder, last), (root, last)):
+            found = file_inside(root, place, part)
+            if found is not None:
+                return found
     return None
+
+
+def _pixels(file: Path, *, opacity: bool) -> F32 | None:
+    """Its colours, or as opacity its alpha, or else its red. None if it cannot be read."""
+    try:
+        if not opacity:
+            return read_image(file)
+        alpha = read_channel(file, "A")
+        return read_channel(file, "R") if alpha is None else alpha
+    except ImageError:
+        return None
 
 
 def _number(path: Path, material: str, key: str, text: str) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from scene_files import png, written
 
 from app.errors import SceneError
+from app.scene.images import read_image
 from app.scene.meshfile import load_meshfile
 from app.scene.model import Scene
 
@@ -78,6 +80,26 @@ def test_obj_without_its_pictures(tmp_path: Path) -> None:
     assert scene.warnings == (
         "2 pictures could not be read ('a.png', '../b.png'): Kd is used, or albedo 0.5 without it",
     )
+
+
+def test_a_picture_of_several_maps_is_read_once_and_missed_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It says of each kind of map what is used instead."""
+    library = "newmtl glow\nmap_Kd a.png\nmap_Ke a.png\nmap_d a.png\nnewmtl paint\nmap_Kd ./a.png # red\nmap_Ke b.png\n"
+    written(tmp_path, "room.mtl", library)
+    written(tmp_path, "a.png", png([[[188, 188, 188]]]))
+    read = Mock(wraps=read_image)
+    monkeypatch.setattr("app.scene.mtl.read_image", read)
+    assert (
+        load(tmp_path, OBJ).warnings[0] == "1 picture could not be read ('b.png'): Ke is used, or no light without it"
+    )
+    assert read.call_count == 1
+    written(tmp_path, "room.mtl", library.split("newmtl paint")[0])
+    (tmp_path / "a.png").unlink()
+    instead = "Kd is used, or albedo 0.5 without it; Ke is used, or no light without it; "
+    instead += "d or Tr is used, or opacity 1 without them"
+    assert f"1 picture could not be read ('a.png'): {instead}" in load(tmp_path, OBJ).warnings
 
 
 @pytest.mark.parametrize("kind", ["ply", "stl", "obj"])
@@ -208,7 +230,15 @@ def test_lists_of_material_libraries(tmp_path: Path, line: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "file", ["TEX\\paint.PNG", '"tex/paint.png"', "C:\\old\\tex\\paint.png", "../tex/paint.png", "tex/#1.png"]
+    "file",
+    [
+        "TEX\\paint.PNG",
+        '"tex/paint.png"',
+        "C:\\old\\tex\\paint.png",
+        "../tex/paint.png",
+        "tex/#1.png",
+        '"tex/paint.png" # red',
+    ],
 )
 def test_pictures_are_found_however_they_are_named(tmp_path: Path, file: str) -> None:
     for folder in ("tex", "lib"):
