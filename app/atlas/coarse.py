@@ -20,7 +20,7 @@ from app.util.background import Report
 
 SPECK = 8  # triangles of a piece that is one, at most,
 LEAST_SEEN = 1 / 3  # and the cosine of what goes along with others, at least
-MOST_PIECES = 1 << 14  # beyond which placing them takes as long as better charts do
+MOST_PIECES = 1 << 12  # beyond which most are copies or loose parts, whose better charts are there as soon
 
 
 def coarse_charts(scene: Scene, tile: int, texels: int, report: Report) -> Charts | None:
