@@ -206,14 +206,15 @@ def _stl_text(data: Bytes) -> _Found:
 
 
 def _lines(data: Bytes) -> Ints:
-    """Where each line begins."""
-    ends = [np.flatnonzero(data[at : at + BLOCK] == ord("\n")) + at for at in range(0, len(data), BLOCK)]
+    """Where each line begins; they end in \\n, or all in \\r where the first ones do."""
+    end = ord("\n" if (data[:HEADER_BYTES] == ord("\n")).any() else "\r")
+    ends = [np.flatnonzero(data[at : at + BLOCK] == end) + at for at in range(0, len(data), BLOCK)]
     starts = np.concatenate([[0], *ends]) + np.r_[0, np.ones(sum(map(len, ends)), np.int64)]
     return np.asarray(starts[starts < len(data)], np.int64)
 
 
 def _line(data: Bytes, at: int) -> bytes:
-    return data[at : at + LONGEST].tobytes().partition(b"\n")[0]
+    return data[at : at + LONGEST].tobytes().replace(b"\r", b"\n").partition(b"\n")[0]
 
 
 def _words(data: Bytes, at: int) -> list[bytes]:

@@ -35,7 +35,7 @@ def load_meshfile(path: Path, report: Report = unheard) -> Scene:
         data = path.read_bytes()
     except OSError as error:
         raise SceneError(path, f"cannot be read: {error.strerror}") from error
-    part = read_ply(path, data) if path.suffix.lower() == ".ply" else _read_stl(path, data)
+    part = read_ply(path, data, share_of(report, 0.0, 0.4)) if path.suffix.lower() == ".ply" else _read_stl(path, data)
     report(0.4)
     if part.colours is not None:
         material = Material("colours", albedo=(1.0, 1.0, 1.0), double_sided=True)

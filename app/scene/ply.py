@@ -7,6 +7,8 @@ those of vertices or else of faces, sRGB.
 from __future__ import annotations
 
 import re
+import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ from app.scene.images import linear_from_srgb
 from app.scene.model import F32, F64
 from app.scene.polygons import fan_corners, with_ears_clipped
 from app.scene.validate import Part, check_triangle_count
+from app.util.background import Report, unheard
 
 TYPES = {
     **{name: "i1" for name in ("char", "int8")},
@@ -32,6 +35,9 @@ TYPES = {
 }
 ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
 CORNERS = "vertex_indices", "vertex_index"
+LETTERS = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}  # of struct
+LARGEST = 2.0**53  # up to here f64 holds all integers
+ROWS = 1 << 15  # of a table, between two reports
 COLOURS = ("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b")
 END = re.compile(rb"(?:^|[\r\n])end_header[ \t]*(?:\r\n|\r(?!\n)|\n)")
 
@@ -59,9 +65,10 @@ class Element:
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """A property of all elements of a kind: its values, and of lists their lengths (n,), one list after the other."""
+    """A property of all elements of a kind: values and their type, and of lists their lengths (n,), one list after the other."""
 
     values: NDArray[Any]
+    kind: str
     lengths: I64 | None = None
 
 
@@ -78,17 +85,25 @@ class _Text:
     def __len__(self) -> int:
         return len(self.numbers)
 
-    def length(self, place: int, kind: str) -> int:
-        return int(self.numbers[place])
+    def reader(self, kind: str) -> Callable[[int], float]:
+        """What reads one number at a place."""
+        return self.numbers.item
 
     def at(self, places: I64, kind: str) -> NDArray[Any]:
         """Those that begin there."""
-        return np.asarray(self.numbers[places].astype(kind))
+        return _whole(self.numbers[places], kind)
 
     def grid(self, first: int, kind: str, shape: tuple[int, int], step: int) -> NDArray[Any]:
         """The first, and others after it in as many columns, rows so far apart."""
         size = self.numbers.itemsize
-        return np.ndarray(shape, np.float64, self.numbers, first * size, (step * size, size)).astype(kind)
+        return _whole(np.ndarray(shape, np.float64, self.numbers, first * size, (step * size, size)), kind)
+
+
+def _whole(numbers: F64, kind: str) -> NDArray[Any]:
+    """Numbers of a text as integers where their type is one and so are they, however large; else as they are."""
+    if kind[0] == "f" or not ((np.abs(numbers) < LARGEST) & (numbers % 1 == 0)).all():
+        return numbers.copy()
+    return numbers.astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +120,10 @@ class _Binary:
     def __len__(self) -> int:
         return len(self.data)
 
-    def length(self, place: int, kind: str) -> int:
-        return int.from_bytes(
-            self.data[place : place + int(kind[1])].tobytes(), "little" if self.order == "<" else "big"
-        )
+    def reader(self, kind: str) -> Callable[[int], float]:
+        """As of text."""
+        one, data = struct.Struct(self.order + LETTERS[kind]).unpack_from, self.data.data
+        return self.data.item if kind == "u1" else lambda place: one(data, place)[0]
 
     def at(self, places: I64, kind: str) -> NDArray[Any]:
         """As of text."""
@@ -134,17 +149,26 @@ def header(data: bytes) -> tuple[str, list[Element], int]:
             elements.append(Element(words[1], int(words[2]), ()))
         elif words[:1] == ["property"]:
             last = elements[-1]
+            unknown = [word for word in words[1:-1] if word != "list" and word not in TYPES]
+            if unknown or len(words) < 3:
+                raise ValueError(f"property {words[-1]} is of no known type" + "".join(f": '{w}'" for w in unknown))
             types = [TYPES[word] for word in words[1:-1] if word != "list"]
             one = (words[-1], types[-1], types[0] if len(types) > 1 else None)
             elements[-1] = Element(last.name, last.count, (*last.properties, one))
+    if kind != "ascii" and kind not in ORDERS:
+        raise ValueError(f"format '{kind}' is unknown" if kind else "its header has no format")
     return kind, elements, end.end()
 
 
-def read_ply(path: Path, data: bytes) -> Part:
-    """Its polygons as triangles, with their colours. SceneError where it is no such file, or has no polygons."""
+def read_ply(path: Path, data: bytes, report: Report = unheard) -> Part:
+    """Its polygons as triangles, with their colours. SceneError where it is no such file, or has no polygons. report(share) is
+    called now and then and may raise to cancel."""
     try:
-        tables = _tables(data)
+        tables = _tables(data, report)
         vertex, face = tables.get("vertex", {}), tables.get("face", {})
+        lost = [axis for axis in "xyz" if axis not in vertex]
+        if lost:
+            raise ValueError(f"its vertices have no {', '.join(lost)}")
         positions = np.stack([vertex[axis].values for axis in "xyz"], axis=1).astype(np.float64)
     except (ValueError, KeyError, IndexError, OverflowError) as error:
         reason = " ".join(str(error).split())[:120]
@@ -153,10 +177,14 @@ def read_ply(path: Path, data: bytes) -> Part:
     if lists is None or lists.lengths is None or not len(lists.values):
         strips = ": its triangle strips are not read" if "tristrips" in tables else ""
         raise SceneError(path, f"no triangles{strips}")
-    polygon = lists.values.astype(np.int64)
-    outside = (polygon < 0) | (polygon >= len(positions))
-    if outside.any():
-        raise SceneError(path, f"index {polygon[outside][0]} is out of range: there are {len(positions)} vertices")
+    polygon = lists.values
+    broken = ~((polygon >= 0) & (polygon < len(positions)))
+    if broken.any():
+        worst = polygon[broken][0]
+        raise SceneError(path, f"index {worst:.15g} is out of range: there are {len(positions)} vertices")
+    if (polygon % 1 != 0).any():
+        raise SceneError(path, f"index {polygon[polygon % 1 != 0][0]:g} is no whole number")
+    polygon = polygon.astype(np.int64)
     check_triangle_count(path, int(np.maximum(lists.lengths - 2, 0).sum()))
     corners, fans = fan_corners(lists.lengths)
     if not len(corners):
@@ -169,7 +197,7 @@ def read_ply(path: Path, data: bytes) -> Part:
     return Part(positions, corners.reshape(-1, 3), colours=colours)
 
 
-def _tables(data: bytes) -> dict[str, dict[str, Column]]:
+def _tables(data: bytes, report: Report) -> dict[str, dict[str, Column]]:
     """The properties of each kind of element, by their names. Errors as of ``header``."""
     kind, elements, start = header(data)
     body: _Text | _Binary
@@ -179,11 +207,13 @@ def _tables(data: bytes) -> dict[str, dict[str, Column]]:
         body, at = _Binary(np.frombuffer(data, np.uint8), ORDERS[kind]), start
     tables = {}
     for element in elements:
-        tables[element.name], at = _table(element, body, at)
+        tables[element.name], at = _table(element, body, at, report)
+    if kind == "ascii" and at < len(body):
+        raise ValueError(f"it has {len(body) - at} more numbers than its header says")
     return tables
 
 
-def _table(element: Element, body: _Text | _Binary, at: int) -> tuple[dict[str, Column], int]:
+def _table(element: Element, body: _Text | _Binary, at: int, report: Report) -> tuple[dict[str, Column], int]:
     """The properties of an element, which begins there, and where the next one does."""
     count, first, columns = element.count, [at], dict[str, Column]()  # where each property of the first row begins
     lengths = []  # of its lists; most tables have all rows alike
@@ -193,70 +223,82 @@ def _table(element: Element, body: _Text | _Binary, at: int) -> tuple[dict[str, 
         if counted is None:
             first.append(first[-1] + body.size(kind))
             continue
-        lengths.append(_length(body, first[-1], counted) if count else 0)
+        lengths.append(_length(body, body.reader(counted), first[-1], body.size(counted)) if count else 0)
         first.append(first[-1] + body.size(counted) + body.size(kind) * lengths[-1])
     step = first.pop() - at
     if not count:
         empty = np.empty(0, np.int64)
-        return {name: Column(empty, empty if counted else None) for name, _, counted in element.properties}, at
+        return {name: Column(empty, kind, empty if counted else None) for name, kind, counted in element.properties}, at
     if at + step * count > len(body):
-        return _uneven(element, body, at)
+        return _uneven(element, body, at, report)
     nth = iter(lengths)
     for (name, kind, counted), start in zip(element.properties, first, strict=True):
         if counted is None:
-            columns[name] = Column(body.grid(start, kind, (count, 1), step)[:, 0])
+            columns[name] = Column(body.grid(start, kind, (count, 1), step)[:, 0], kind)
             continue
         length = next(nth)
         if (body.grid(start, counted, (count, 1), step) != length).any():
-            return _uneven(element, body, at)
+            return _uneven(element, body, at, report)
         values = body.grid(start + body.size(counted), kind, (count, length), step).reshape(-1)
-        columns[name] = Column(values, np.full(count, length, np.int64))
+        columns[name] = Column(values, kind, np.full(count, length, np.int64))
     return columns, at + step * count
 
 
-def _uneven(element: Element, body: _Text | _Binary, at: int) -> tuple[dict[str, Column], int]:
-    """As ``_table``, of rows with lists of different lengths."""
-    first = np.empty((element.count, len(element.properties)), np.int64)
-    lengths = np.zeros_like(first)
-    sizes = [(body.size(kind), body.size(counted or kind), counted) for _, kind, counted in element.properties]
-    for row, lists in zip(first, lengths, strict=True):
-        for nth, (size, before, counted) in enumerate(sizes):
-            row[nth] = at
-            if counted:
-                lists[nth] = length = _length(body, at, counted)
-                at += before + size * length
-            else:
-                at += size
+def _uneven(element: Element, body: _Text | _Binary, at: int, report: Report) -> tuple[dict[str, Column], int]:
+    """As ``_table``, of rows with lists of different lengths, one row after another."""
+    starts, counts = list[int](), list[int]()  # of each property of each row; the second of lists
+    readers = {counted: body.reader(counted) for _, _, counted in element.properties if counted}
+    parts = [
+        (body.size(kind), body.size(counted or kind), readers.get(counted or ""))
+        for _, kind, counted in element.properties
+    ]
+    for row in range(element.count):
+        if row % ROWS == 0:
+            report(row / element.count)
+        for size, before, read in parts:
+            starts.append(at)
+            at += before
+            length = 0
+            if read:
+                length = _length(body, read, at - before, before)
+                at += size * length
+            counts.append(length)
     if at > len(body):
         raise ValueError(f"it ends before its {element.name} elements do")
+    shape = element.count, len(element.properties)
+    first, lengths = (np.array(each, np.int64).reshape(shape) for each in (starts, counts))
     columns = {}
     for nth, (name, kind, counted) in enumerate(element.properties):
         if counted is None:
-            columns[name] = Column(body.at(first[:, nth], kind))
+            columns[name] = Column(body.at(first[:, nth], kind), kind)
             continue
         mine = lengths[:, nth]
         within = np.arange(mine.sum()) - np.repeat(np.cumsum(mine) - mine, mine)
-        starts = np.repeat(first[:, nth] + body.size(counted), mine)
-        columns[name] = Column(body.at(starts + body.size(kind) * within, kind), mine)
+        begin = np.repeat(first[:, nth] + body.size(counted), mine)
+        columns[name] = Column(body.at(begin + body.size(kind) * within, kind), kind, mine)
     return columns, at
 
 
-def _length(body: _Text | _Binary, place: int, kind: str) -> int:
+def _length(body: _Text | _Binary, read: Callable[[int], float], place: int, size: int) -> int:
     """Of the list that begins there. ValueError where it makes no sense."""
-    if place + body.size(kind) > len(body):
+    if place + size > len(body):
         raise ValueError("it ends early")
-    length = body.length(place, kind)
-    if not 0 <= length <= len(body):
-        raise ValueError(f"a list has {length} values")
-    return length
+    length = read(place)
+    if not 0 <= length <= len(body) or length % 1:
+        raise ValueError(f"a list has {length:.15g} values")
+    return int(length)
 
 
 def _colours(table: dict[str, Column]) -> F32 | None:
-    """(n, 3) linear Rec.709; None if there are none. Whole numbers are shares of their most, others from 0 to 1, or to 255."""
+    """(n, 3) linear Rec.709; None if there are none. Integers of 8 or 16 bits are shares of the most that they hold, wider
+    ones of 255; numbers with fractions are shares of 1, or of 255 where one is above 1."""
     for names in COLOURS:
         if all(name in table for name in names):
             srgb = np.stack([table[name].values for name in names], axis=1)
-            whole = srgb.dtype.kind in "iu"
-            most = np.iinfo(srgb.dtype).max if whole else 255 if srgb.max(initial=0) > 1 else 1
+            kind = table[names[0]].kind
+            if srgb.dtype.kind == "f":
+                most = 255 if srgb.max(initial=0) > 1 else 1
+            else:
+                most = 255 if int(kind[1]) > 2 else np.iinfo(kind).max
             return linear_from_srgb(np.clip(srgb.astype(np.float32) / np.float32(most), 0, 1))
     return None

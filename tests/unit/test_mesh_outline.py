@@ -59,6 +59,7 @@ FILES: dict[str, Callable[[trimesh.Trimesh], str | bytes]] = {
     "ball.obj": obj,
     "binary.ply": lambda mesh: mesh.export(file_type="ply"),
     "text.ply": lambda mesh: mesh.export(file_type="ply", encoding="ascii"),
+    "returns.ply": lambda mesh: mesh.export(file_type="ply", encoding="ascii").replace(b"\n", b"\r"),
     "quads.ply": lambda mesh: ply_of_quads(),
     "binary.stl": lambda mesh: mesh.export(file_type="stl"),
     "text.stl": lambda mesh: mesh.export(file_type="stl_ascii"),

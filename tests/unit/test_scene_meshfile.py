@@ -257,52 +257,6 @@ def test_pictures_are_found_however_they_are_named(tmp_path: Path, file: str) ->
 
 
 # A square of 4 m² in the plane y = 0, a concave polygon of 5 corners and 10 m², and a triangle of 2 m²
-PLY_POINTS = [(0, 0, 0), (2, 0, 0), (2, 0, -2), (0, 0, -2)]
-PLY_POINTS += [(9, 0, 0), (13, 0, 0), (13, 0, -4), (11, 0, -1), (9, 0, -4), (0, 0, 2)]
-PLY_FACES = [(0, 1, 2, 3), (4, 5, 6, 7, 8), (0, 9, 1), (0, 1)]
-
-
-def ply_of_polygons(kind: str, colours: str = "uchar") -> bytes:
-    """The vertices with colours sRGB 188, 0, 255 of 255, in one of the three formats."""
-    lines = ["ply", f"format {kind} 1.0", f"element vertex {len(PLY_POINTS)}"]
-    lines += [f"property double {axis}" for axis in "xyz"] + [
-        f"property {colours} {c}" for c in ("red", "green", "blue")
-    ]
-    lines += [
-        f"element face {len(PLY_FACES)}",
-        "property list uchar uint vertex_index",
-        "property float more",
-        "end_header\n",
-    ]
-    most = {"uchar": 255, "ushort": 65535, "float": 1.0}[colours]
-    paint = [188 / 255 * most, 0, most]
-    paint = paint if colours == "float" else [round(x) for x in paint]
-    rows = [[*point, *paint] for point in PLY_POINTS]
-    if kind == "ascii":
-        text = [" ".join(map(str, row)) for row in rows] + [f"{len(f)} {' '.join(map(str, f))} 0.5" for f in PLY_FACES]
-        return "\r\n".join([*lines[:-1], "end_header", *text]).encode()
-    order = "<" if "little" in kind else ">"
-    body = [struct.pack(f"{order}3d3{ {'uchar': 'B', 'ushort': 'H', 'float': 'f'}[colours] }", *row) for row in rows]
-    body += [struct.pack(f"{order}B{len(f)}If", len(f), *f, 0.5) for f in PLY_FACES]
-    return "\n".join(lines).encode() + b"".join(body)
-
-
-@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
-@pytest.mark.parametrize("colours", ["uchar", "ushort", "float"])
-def test_ply_with_polygons_of_all_sizes(tmp_path: Path, kind: str, colours: str) -> None:
-    scene = load(tmp_path, ply_of_polygons(kind, colours), "a.ply")
-    normals, areas = scene.normals_areas
-    assert np.allclose(areas.sum(), 4 + 10 + 2) and np.allclose(normals[:, 1], 1)
-    assert scene.colours is not None and np.allclose(scene.colours, [0.502886, 0, 0.99], atol=1e-4)
-
-
-def test_a_ply_file_that_ends_early_says_where(tmp_path: Path) -> None:
-    data = ply_of_polygons("binary_little_endian")
-    for keep, what in ((len(data) - 3, "face"), (data.index(b"end_header") + 50, "vertex")):
-        with pytest.raises(SceneError, match=f"ends before its {what} elements do"):
-            load(tmp_path, data[:keep], "a.ply")
-
-
 def test_binary_stl_that_begins_like_text_and_has_bytes_at_its_end(tmp_path: Path) -> None:
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
     head = b"solid made by a program".ljust(80) + struct.pack("<I", 1)
