@@ -24,6 +24,8 @@ SOME = 4096  # faces and vertices that are looked at, of each
 BLOCK = 1 << 26  # bytes in work at a time
 LONGEST = 1 << 12  # bytes of a line, or of two facets in text
 HEADER_BYTES = 1 << 16  # of a PLY file
+LARGEST_FACE = 64  # corners of those that are looked at, of PLY files with faces of all sizes
+IN_A_ROW = 8  # such faces that make sense: the last is one, even where the first ones only seemed to be
 STL_HEADER, STL_BYTES = 84, 50  # of a binary file, and of each of its triangles
 GOLDEN = (5**0.5 - 1) / 2
 VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
@@ -34,22 +36,28 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """How many faces a file has, the corners (k, 3) of some of them, and some of its vertices (n, 3)."""
+    """How many faces a file has, the corners (k, 3) of some of them, and some of its vertices (n, 3). known: the number of its
+    triangles, if it is."""
 
     faces: int
     rings: Sequence[F64]
     points: F64
+    known: int | None = None
 
     @property
     def triangles(self) -> int:
-        corners = sum(max(len(ring) - 2, 0) for ring in self.rings)
-        return round(self.faces * corners / max(len(self.rings), 1))
+        return round(self.faces * self._some / max(len(self.rings), 1)) if self.known is None else self.known
+
+    @property
+    def _some(self) -> int:
+        """The triangles of those that are looked at."""
+        return sum(max(len(ring) - 2, 0) for ring in self.rings)
 
     def outline(
         self, path: Path, materials: Sequence[Material], *, objects: int = 1, coloured: bool, warnings: Sequence[str]
     ) -> Outline:
         sums = [np.cross(ring[1:-1] - ring[0], ring[2:] - ring[0]).sum(axis=0) for ring in self.rings]
-        area = float(np.mean([np.linalg.norm(s) / 2 for s in sums])) * self.faces
+        area = float(np.sum([np.linalg.norm(s) / 2 for s in sums])) / max(self._some, 1) * self.triangles
         points = np.concatenate([self.points, *self.rings])
         return Outline(
             name=path.stem,
@@ -126,7 +134,10 @@ def _ply(path: Path, data: Bytes, most: int) -> Outline | None:
     vertex, face = elements[:2]
     if (vertex.name, face.name) != ("vertex", "face") or face.count <= most / 2:
         return None
-    found = _ply_text(data, body, vertex, face) if kind == "ascii" else _ply_binary(data, body, kind, vertex, face)
+    last = len(elements) == 2
+    found = (
+        _ply_text(data, body, vertex, face) if kind == "ascii" else _ply_binary(data, body, kind, vertex, face, last)
+    )
     if found.triangles <= most:
         return None
     coloured = any(name in COLOUR_NAMES for element in (vertex, face) for name, _, _ in element.properties)
@@ -134,7 +145,8 @@ def _ply(path: Path, data: Bytes, most: int) -> Outline | None:
     return found.outline(path, [Material(path.stem)], coloured=coloured, warnings=notes)
 
 
-def _ply_binary(data: Bytes, body: int, kind: str, vertex: Element, face: Element) -> _Found:
+def _ply_binary(data: Bytes, body: int, kind: str, vertex: Element, face: Element, last: bool) -> _Found:
+    """last: whether nothing follows the faces."""
     order = ORDERS[kind]
     corners = next(name for name, _, counted in face.properties if counted is not None)
     layout = vertex.dtype(order)
@@ -148,12 +160,55 @@ def _ply_binary(data: Bytes, body: int, kind: str, vertex: Element, face: Elemen
             some = data[begin:end].view(shape)[_spread(np.arange(face.count))]
             if (some[f"{corners} length"] == length).all():
                 faces = list(some[corners].astype(np.int64))
+    if faces is None and not last:
+        raise ValueError("faces of all sizes before something else")
+    known = None
     if faces is None:
-        raise ValueError("faces of many kinds")
+        fixed = face.dtype(order, 0).itemsize
+        corner = face.dtype(order, 1).itemsize - fixed
+        known = (len(data) - begin - fixed * face.count) // corner - 2 * face.count
+        faces = _faces_of_all_sizes(data, begin, order, face, vertex.count)
     xyz = [vertices[name] for name in "xyz"]
     points = np.stack([axis[_spread(np.arange(len(vertices)))] for axis in xyz], axis=1).astype(np.float64)
     rings = [np.stack([axis[ring] for axis in xyz], axis=1).astype(np.float64) for ring in faces]
-    return _Found(face.count, rings, points)
+    return _Found(face.count, rings, points, known)
+
+
+def _faces_of_all_sizes(data: Bytes, begin: int, order: str, face: Element, vertices: int) -> list[Ints]:
+    """Corners of those that follow on places evenly among the bytes from ``begin`` on. ValueError where few are found."""
+    (nth,) = [k for k, (_, _, counted) in enumerate(face.properties) if counted]
+    sizes = [int(kind[1]) for _, kind, _ in face.properties]
+    (_, kind, counted), before, after = face.properties[nth], sum(sizes[:nth]), sum(sizes[nth + 1 :])
+    wide = int(str(counted)[1])
+
+    def row(at: int) -> tuple[Ints, int] | None:
+        """The corners in a row that begins there, and where the next one does; None where it makes no sense."""
+        first = at + before + wide
+        length = int(data[first - wide : first].view(f"{order}{counted}")[0])
+        if not 3 <= length <= LARGEST_FACE:
+            return None
+        end = first + length * sizes[nth]
+        corners = data[first:end].view(order + kind).astype(np.int64)
+        return (corners, end + after) if corners.min() >= 0 and corners.max() < vertices else None
+
+    def next_face(at: int) -> Ints | None:
+        for start in range(at, at + before + wide + LARGEST_FACE * sizes[nth] + after):
+            found = row(start)
+            for _ in range(IN_A_ROW - 1):
+                found = found and row(found[1])
+            if found:
+                return found[0]
+        return None
+
+    faces = list[Ints]()
+    room = (IN_A_ROW + 1) * (before + wide + LARGEST_FACE * sizes[nth] + after)
+    for tried, at in enumerate(np.linspace(begin, max(len(data) - room, begin), SOME).astype(np.int64).tolist()):
+        found = next_face(at)
+        if found is not None:
+            faces.append(found)
+        elif tried > 2 * len(faces) + LARGEST_FACE:
+            raise ValueError("few of its faces are found")
+    return faces
 
 
 def _ply_text(data: Bytes, body: int, vertex: Element, face: Element) -> _Found:

@@ -41,7 +41,7 @@ def obj(mesh: trimesh.Trimesh) -> str:
     return "\n".join(lines)
 
 
-def ply_of_quads() -> bytes:
+def ply_of_quads(*, every: int = 1) -> bytes:
     """Squares side by side, big endian."""
     n = 100
     x, z = (axis.ravel() for axis in np.meshgrid(np.arange(n + 1), np.arange(n + 1)))
@@ -51,8 +51,13 @@ def ply_of_quads() -> bytes:
     faces = np.column_stack([np.full(len(quads), 4), quads]).astype(">i4")
     head = f"ply\nformat binary_big_endian 1.0\nelement vertex {len(vertices)}\n"
     head += "".join(f"property float {axis}\n" for axis in "xyz")
-    head += f"element face {len(faces)}\nproperty list int int vertex_indices\nend_header\n"
-    return head.encode() + vertices.tobytes() + faces.tobytes()
+    rows = [face.tobytes() for face in faces]
+    for k in set(range(len(faces))) - set(range(0, len(faces), every)):
+        _, a, b, c, d = faces[k]
+        rows[k : k + 1] = [np.array([[3, a, b, c], [3, a, c, d]], ">i4").tobytes()]
+    triangles = len(faces) - len(range(0, len(faces), every))
+    head += f"element face {len(faces) + triangles}\nproperty list int int vertex_indices\nend_header\n"
+    return head.encode() + vertices.tobytes() + b"".join(rows)
 
 
 FILES: dict[str, Callable[[trimesh.Trimesh], str | bytes]] = {
@@ -61,6 +66,7 @@ FILES: dict[str, Callable[[trimesh.Trimesh], str | bytes]] = {
     "text.ply": lambda mesh: mesh.export(file_type="ply", encoding="ascii"),
     "returns.ply": lambda mesh: mesh.export(file_type="ply", encoding="ascii").replace(b"\n", b"\r"),
     "quads.ply": lambda mesh: ply_of_quads(),
+    "mixed.ply": lambda mesh: ply_of_quads(every=3),
     "binary.stl": lambda mesh: mesh.export(file_type="stl"),
     "text.stl": lambda mesh: mesh.export(file_type="stl_ascii"),
 }
