@@ -16,6 +16,7 @@ HASH = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np
 # Of a triangle's corners, 9 a + 3 b + c: it winds the other way.
 ODD_ORDERS = 0 * 9 + 2 * 3 + 1, 1 * 9 + 0 * 3 + 2, 2 * 9 + 1 * 3 + 0
 BOTH = 2  # in place of a front
+WINS = ": what emits stays before what has two sides, and that before what is listed first"
 
 Array = NDArray[Any]
 Bools = NDArray[np.bool_]
@@ -52,12 +53,13 @@ def doubles(
     hidden |= lit[place, :BOTH].all(axis=1) & ~emits
     hidden |= there[place, BOTH] & ~emits & (front != BOTH)
     again[alike[order[hidden]]] = True
-    for count, what in (
-        (listed, "listed before"),
-        (int(again.sum()) - listed, "in the place of one of another material"),
+    for count, what, which in (
+        (listed, "listed before", ""),
+        (int(again.sum()) - listed, "in the place of one of another material", WINS),
     ):
         if count:
-            notes.append(f"{counted(count, 'triangle', 'triangles')} {what} {'was' if count == 1 else 'were'} dropped")
+            verb = "was" if count == 1 else "were"
+            notes.append(f"{counted(count, 'triangle', 'triangles')} {what} {verb} dropped{which}")
     return again
 
 
