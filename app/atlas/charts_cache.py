@@ -93,7 +93,7 @@ def program(*more: Path) -> bytes:
 
 def _given(scene: Scene, atlas: AtlasOptions, roots: bool) -> cache.Arrays:
     geometry = {name: value for name in GEOMETRY if (value := getattr(scene, name)) is not None}
-    sides = np.array([(m.double_sided, m.opaque, m.lightmap_scale) for m in scene.materials])
+    sides = np.array([(m.double_sided, m.opaque, m.emits, m.lightmap_scale) for m in scene.materials])
     open_to = np.array([scene.sky is not None, bool(scene.lights)])
     asked = np.array([atlas.density or 0.0, atlas.texels or 0, atlas.tile, roots], np.float64)
     return {**geometry, "sides": sides, "open_to": open_to, "cameras": cameras_inside(scene), "asked": asked}

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.atlas.covered import without_covered
 from app.atlas.facets import facets
 from app.atlas.flat_pieces import MOST_ENDS, MOST_PIECES, Piece, on_rims, parted_pieces
 from app.atlas.intersections import Contacts, contacts, surfaces
@@ -20,6 +21,7 @@ from app.atlas.sides import Welded, numbered, scene_size
 from app.atlas.triangle_cuts import CutTriangles, cut_pieces
 from app.scene.model import F32, F64, I32, Scene
 from app.util.background import Report
+from app.util.words import counted
 
 # where triangles are not cut, for people
 BLEEDS = "light and shadow may reach a texel too far there; finer texels make that less"
@@ -37,24 +39,47 @@ class Cut:
     welded: Welded | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class _Met:
+    """What surfaces of a scene meet: its welded triangles, their points places (n, 3) over the scene's size, the flat piece facet
+    (m,) of each; where they meet, pairs (k, 2) that overlap in one plane, and whether there are too many to say."""
+
+    welded: Welded
+    places: F64
+    facet: I32
+    found: Contacts
+    overlaps: NDArray[np.int64]
+    crowded: bool
+
+    @staticmethod
+    def of(scene: Scene, tell: Report) -> _Met:
+        tell(0.0)
+        welded = Welded.of(scene)
+        points, corners, edges = welded.points, welded.corners, welded.edges
+        tell(0.1)
+        size = scene_size(scene)
+        places = (points - points.min(0)) / size
+        beside = ThreadPoolExecutor(1)
+        try:
+            flat = beside.submit(facets, points, corners, scene.material_ids, size, edges)
+            met = contacts(places[corners], surfaces(edges), lambda share: tell(0.1 + 0.4 * share))
+            tell(0.5)
+            return _Met(welded, places, flat.result(), *met)
+        finally:
+            beside.shutdown(wait=False, cancel_futures=True)
+
+
 def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
     """The scene with its triangles cut where others meet them; as it is where none does. report(share) is called now and then and
     may raise to cancel."""
     tell = report or (lambda share: None)
-    tell(0.0)
-    welded = Welded.of(scene)
-    points, corners, edges = welded.points, welded.corners, welded.edges
-    tell(0.1)
-    size, origin = scene_size(scene), points.min(0)
-    places = (points - origin) / size
-    beside = ThreadPoolExecutor(1)
-    try:
-        flat = beside.submit(facets, points, corners, scene.material_ids, size, edges)
-        found, crowded = contacts(places[corners], surfaces(edges), lambda share: tell(0.1 + 0.4 * share))
-        tell(0.5)
-        facet = flat.result()
-    finally:
-        beside.shutdown(wait=False, cancel_futures=True)
+    met = _Met.of(scene, tell)
+    if len(met.overlaps):
+        uncovered = _uncovered(scene, met, lambda share: tell(0.5))
+        if uncovered is not scene:
+            scene, met = uncovered, _Met.of(uncovered, tell)
+    welded, places, facet, found, crowded = met.welded, met.places, met.facet, met.found, met.crowded
+    corners, edges = welded.corners, welded.edges
     if len(found.triangle):
         found = found.only(~on_rims(places[corners], facet, edges, found))
     notes: list[str] = []
@@ -80,7 +105,8 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
     if not pieces:
         return Cut(scene, None, facet, welded)
     made = cut_pieces(pieces, places, corners, facet, lambda share: tell(0.9 + 0.1 * share))
-    return _joined(scene, corners, facet, made, origin, size)
+    cut, source, ends = _joined(scene, welded, made)
+    return Cut(cut, ends, numbered(facet[source]).astype(np.int32))  # slivers may have been a piece
 
 
 def _largest(facet: I32, area: F64, found: Contacts) -> tuple[NDArray[np.bool_], int]:
@@ -92,13 +118,27 @@ def _largest(facet: I32, area: F64, found: Contacts) -> tuple[NDArray[np.bool_],
     return np.isin(facet[found.triangle], chosen), len(met) - len(chosen)
 
 
-def _joined(scene: Scene, corners: I32, facet: I32, made: CutTriangles, origin: F64, size: float) -> Cut:
-    """The scene with triangles in the places of those that they were made of. corners (m, 3): its
-    triangles of welded points; facet (m,) of them."""
+def _uncovered(scene: Scene, met: _Met, report: Report) -> Scene:
+    """The scene less the parts of surfaces that others in their planes cover, see covered.py; itself where none is."""
+    found = without_covered(scene, met.places, met.welded.corners, met.facet, met.overlaps, report)
+    if found is None:
+        return scene
+    made, gone, count = found
+    covered = counted(count, "surface was", "surfaces were")
+    note = f"{covered} cut away where another one lies in the same plane and faces the same way"
+    return dataclasses.replace(_joined(scene, met.welded, made, gone)[0], warnings=(*scene.warnings, note))
+
+
+def _joined(
+    scene: Scene, mesh: Welded, made: CutTriangles, gone: NDArray[np.bool_] | None = None
+) -> tuple[Scene, NDArray[np.int64], NDArray[np.uint8]]:
+    """The scene with triangles in the places of those that they were made of, less some that go (m,); of each the one (t,) that
+    it was made of, and its ends (t, 3) as in Cut. mesh: of the scene."""
+    corners, origin, size = mesh.corners, mesh.points.min(0), scene_size(scene)
     welded = int(corners.max()) + 1
     parent, numbers, weights, ends = made.parent, made.nodes, made.weights, made.ends
     count = len(scene.triangles)
-    gone = np.zeros(count, bool)
+    gone = np.zeros(count, bool) if gone is None else gone
     gone[parent] = True
     kept = np.flatnonzero(~gone)
     source = np.concatenate([kept, parent])
@@ -131,5 +171,4 @@ def _joined(scene: Scene, corners: I32, facet: I32, made: CutTriangles, origin: 
         colours=shared(scene.colours),
         normals=normals,
     )
-    pieces = numbered(facet[source]).astype(np.int32)  # slivers may have been a piece
-    return Cut(cut, np.concatenate([np.zeros((len(kept), 3), np.uint8), ends])[order], pieces)
+    return cut, source, np.concatenate([np.zeros((len(kept), 3), np.uint8), ends])[order]

@@ -54,7 +54,7 @@ def parted_pieces(
     pieces: list[tuple[Piece, Contacts]] = []
     for mine in np.split(order, np.flatnonzero(np.diff(owner[order])) + 1):
         report(0.5 * len(pieces) / MOST_PIECES)
-        piece = _piece(triangles, members[owner[mine[0]]])
+        piece = piece_of(triangles, members[owner[mine[0]]])
         lines = shapely.linestrings(found.ends[mine] @ piece.axes)
         inside = shapely.length(shapely.difference(lines, shapely.buffer(piece.border, NEAR))) > NEAR
         if inside.any():
@@ -100,7 +100,7 @@ def on_rims(corners: F64, facet: I32, edges: Edges, found: Contacts) -> Mask:
     return np.asarray((rim & (np.linalg.norm(off, axis=3).max(2) <= NEAR)).any(1))
 
 
-def _piece(corners: F64, members: I64) -> Piece:
+def piece_of(corners: F64, members: I64) -> Piece:
     """A flat piece of triangles (m, 3, 3), not parted."""
     axes = axes_of(corners[members])
     flat = corners[members] @ axes

@@ -1,4 +1,4 @@
-"""Where triangles of different surfaces meet: segments in which they touch or pierce each other.
+"""Where triangles of different surfaces meet: segments in which they touch or pierce each other, and overlaps in one plane.
 
 Lengths are over the scene's size. Triangles that are joined edge by edge are one surface, and not looked at.
 """
@@ -48,26 +48,29 @@ def surfaces(edges: Edges) -> I64:
     return groups_of(len(edges.edge) // 3, pairs)[1]
 
 
-def contacts(corners: F64, surface: I64, report: Report) -> tuple[Contacts, bool]:
-    """Where triangles (m, 3, 3) of different surfaces meet; whether there are too many to say. report(share) is called for each
-    block, and may raise."""
+def contacts(corners: F64, surface: I64, report: Report) -> tuple[Contacts, I64, bool]:
+    """Where triangles (m, 3, 3) of different surfaces meet; pairs (k, 2) of them that overlap in one plane; whether there are too
+    many to say. report(share) is called for each block, and may raise."""
     low, high = least(corners) - FLAT, most(corners) + FLAT
     some = _near_others(low, high, surface)
     corners = corners[some]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
     found = [Contacts(np.empty(0, np.int64), np.empty((0, 2, 3)), np.empty(0, bool), np.empty(0, bool))]
+    overlaps = [np.empty((0, 2), np.int64)]
     pairs = 0
     for one, other in _pairs_that_meet(low[some], high[some], numbered(surface[some]), report):
         pairs += len(one)
         if pairs > MOST_PAIRS:
-            return found[0], True
+            return found[0], overlaps[0], True
         for first in range(0, len(one), BLOCK):
             report(0.5 + 0.5 * pairs / MOST_PAIRS)
             block = slice(first, first + BLOCK)
-            found += _meeting(corners, normals, one[block], other[block])
+            meeting, overlapping = _meeting(corners, normals, one[block], other[block])
+            found += meeting
+            overlaps.append(overlapping)
     triangle, *rest = (np.concatenate([getattr(f, name.name) for f in found]) for name in dataclasses.fields(Contacts))
-    return Contacts(some[triangle], *rest), False
+    return Contacts(some[triangle], *rest), some[np.concatenate(overlaps)], False
 
 
 def _near_others(low: F64, high: F64, surface: I64) -> I64:
@@ -132,13 +135,16 @@ def _pairs_that_meet(low: F64, high: F64, surface: I64, report: Report) -> Itera
             yield one[meets], other[meets]
 
 
-def _meeting(corners: F64, normals: F64, one: I64, other: I64) -> list[Contacts]:
-    """Where pairs of triangles meet in a segment: those of each first one, and of each other one."""
+def _meeting(corners: F64, normals: F64, one: I64, other: I64) -> tuple[list[Contacts], I64]:
+    """Where pairs of triangles meet in a segment: those of each first one, and of each other one; pairs (k, 2) that overlap."""
     heights = [
         _heights(corners, normals, a, b) for a, b in ((one, other), (other, one))
     ]  # of b's corners over a's plane
     along = np.cross(normals[one], normals[other])
     slope = np.linalg.norm(along, axis=1)
+    flat = np.flatnonzero((slope <= FLAT_ANGLE) & ~heights[0].any(1) & ~heights[1].any(1))
+    overlapping = np.stack([one[flat], other[flat]], axis=1)
+    overlapping = overlapping[_overlap(corners[overlapping], normals[overlapping])]
     maybe = slope > FLAT_ANGLE
     for h in heights:
         maybe &= (h.min(1) <= 0) & (h.max(1) >= 0)
@@ -158,7 +164,19 @@ def _meeting(corners: F64, normals: F64, one: I64, other: I64) -> list[Contacts]
     found = []
     for triangle, h in ((one, over_one), (other, over_other)):
         found.append(Contacts(triangle[long], ends[long], h.max(1)[long] > 0, h.min(1)[long] < 0))
-    return found
+    return found, overlapping
+
+
+def _overlap(corners: F64, normals: F64) -> Mask:
+    """(p,) whether pairs of triangles (p, 2, 3, 3) that lie in one plane overlap by more than NEAR: none of their edges has the
+    other one beyond it. normals (p, 2, 3)."""
+    out = np.cross(np.roll(corners, -1, axis=2) - corners, normals[:, :, None])
+    out /= np.linalg.norm(out, axis=3, keepdims=True)
+    off = (
+        corners[:, ::-1, None] - corners[:, :, :, None]
+    )  # (p, 2, 3, 3, 3): from the start of each edge to the other's corners
+    beyond = np.einsum("ptek,ptevk->ptev", out, off).min(3)
+    return np.asarray((beyond < -NEAR).all((1, 2)))
 
 
 def _heights(corners: F64, normals: F64, a: I64, b: I64) -> F64:

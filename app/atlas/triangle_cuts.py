@@ -38,6 +38,9 @@ class CutTriangles:
     ends: NDArray[np.uint8]
     new: F64
 
+    def only(self, which: Mask) -> CutTriangles:
+        return CutTriangles(self.parent[which], self.nodes[which], self.weights[which], self.ends[which], self.new)
+
 
 class _Nodes:
     """Points of the mesh that is made: welded ones (n, 3) first, then new ones; ``on_edge``: those on edges of the mesh that was,

@@ -96,3 +96,24 @@ def test_light_is_kept_among_boxes_as_wide_as_a_texel(gpu: Gpu) -> None:
     solution.gather(256)
     assert abs(solution.book.imbalance_share) < TOO_MUCH  # within which a solution is said to be sound
     solution.release()
+
+
+@pytest.mark.parametrize("solver", ["shooting", "gathering"])
+def test_a_carpet_in_the_plane_of_the_floor_is_a_part_of_the_floor(gpu: Gpu, solver: str) -> None:
+    """And a lamp in that of the ceiling a part of the ceiling: light as where there are holes under them."""
+    walls = room()
+    carpet = [(0.5, 0, 0.5), (0.5, 0, 1), (1, 0, 1), (1, 0, 0.5)]
+    lamp = [(0.5, 1, 0), (1, 1, 0), (1, 1, 0.5), (0.5, 1, 0.5)]
+    rest = [(0, 0, 0), (0, 0, 1), (0.5, 0, 1), (0.5, 0, 0)], [(0.5, 0, 0), (0.5, 0, 0.5), (1, 0, 0.5), (1, 0, 0)]
+    above = [[(x, 1, 1 - z) for x, _, z in quad] for quad in rest]
+    materials = [grey(0.5), grey(0.8), grey(0.0, 10.0)]
+    found = []
+    for quads in ([carpet, lamp, walls[0], walls[1], *walls[2:]], [carpet, lamp, *rest, *above, *walls[2:]]):
+        ids = [1, 2] + [0] * (len(quads) - 2)
+        solution = begin(gpu, quads_scene(quads, materials, ids), texels=800, solver=solver)
+        solution.settle()
+        means = solution.means(solution.H)[:, 0]
+        found.append(np.append(means[:1], means[-4:]))
+        assert abs(solution.book.imbalance_share) < 0.01
+        solution.release()
+    assert found[0] == pytest.approx(found[1], rel=0.015)

@@ -50,7 +50,7 @@ def on_one_side(spans: NDArray[np.float64], place: float) -> bool:
 
 def test_where_nothing_meets_nothing_is_cut() -> None:
     """A box that stands on the floor hides what is under it, and one that touches a wall touches its rim."""
-    for quads in ([], box((0.5, 0, 0.3), (0.8, 0.4, 0.6)), [[(x, y, z) for y, x, z in WALL]]):
+    for quads in ([], box((0.5, 0, 0.3), (0.8, 0.4, 0.6)), [[(x, y, z) for y, x, z in WALL[::-1]]]):
         scene = scene_of(*quads)
         cut = cut_at_contacts(scene)
         assert cut.scene is scene and cut.ends is None
