@@ -31,7 +31,8 @@ def without_covered(
 
     places (n, 3), corners (m, 3): the welded triangles, of flat pieces facet (m,); overlaps (k, 2): triangles in one plane that
     overlap. Of pieces that face the same way, one that emits light covers others, else the one with less area,
-    else the one listed first; of more than MOST_PIECES covered ones, the largest are looked at.
+    else the one listed first; but one with one side covers none with two, whose other side may be seen. Of more than MOST_PIECES
+    covered ones, the largest are looked at.
     """
     over, under = _covering(scene, facet, overlaps)
     if not len(under):
@@ -83,6 +84,7 @@ def _covering(scene: Scene, facet: I32, overlaps: I64) -> tuple[I64, I64]:
     rank[np.lexsort((first, area, dark))] = np.arange(len(first))
     swapped = rank[pairs[:, 0]] > rank[pairs[:, 1]]
     pairs[swapped] = pairs[swapped][:, ::-1]
+    pairs = pairs[scene.sides[first[pairs[:, 0]]] | ~scene.sides[first[pairs[:, 1]]]]
     over, under = np.unique(pairs, axis=0).T
     return over, under
 

@@ -74,6 +74,8 @@ def test_what_faces_away_or_lies_beside_or_above_stays() -> None:
         scene = scene_of(*quads, materials=(1, 0)[: len(quads)])
         cut = cut_at_contacts(scene).scene
         assert areas(cut) == pytest.approx(areas(scene), abs=1e-6) and not cut.warnings
+    scene = scene_of(flat((0.3, 0.3), (0.6, 0.6))).with_materials((grey(0.5, double_sided=True), grey(0.2)))
+    assert cut_at_contacts(scene).scene is scene
     glass = dataclasses.replace(scene.materials[1], opacity=0.5)
     scene = scene_of(flat((0.3, 0.3), (0.6, 0.6))).with_materials((MATERIALS[0], glass))
     assert cut_at_contacts(scene).scene is scene
