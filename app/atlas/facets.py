@@ -18,6 +18,7 @@ from app.atlas.sides import (
     distinct_rows,
     groups_of,
     middle,
+    not_alone,
     numbered,
     totals,
 )
@@ -109,13 +110,6 @@ def _in_near_planes(corners: F64, normals: F64, half: NDArray[np.int64]) -> NDAr
     return half[owns[half // 3]]
 
 
-def _not_alone(rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The rows (n, k) that have an equal one; few others, that only seem to have."""
-    mixed = (rows.astype(np.uint64) * np.cumprod(np.full(rows.shape[1], SPREAD))).sum(axis=1)
-    _, which, uses = np.unique(mixed ^ (mixed >> np.uint64(29)), return_inverse=True, return_counts=True)
-    return np.flatnonzero(uses[which] > 1)
-
-
 def _t_junctions(corners: F64, normals: F64, materials: I32, half: NDArray[np.int64]) -> NDArray[np.int64]:
     """Pairs of triangles whose edges overlap in part: one long edge against several short ones.
 
@@ -133,7 +127,7 @@ def _t_junctions(corners: F64, normals: F64, materials: I32, half: NDArray[np.in
     along[~forward] *= -1
     foot = p - np.einsum("ek,ek->e", p, along)[:, None] * along
     key = np.round(np.concatenate([foot, along, normals[t]], axis=1) / (10 * FLAT)).astype(np.int64)
-    shared = _not_alone(key)
+    shared = not_alone(key)
     t, forward = t[shared], forward[shared]
     p, q, along, length = p[shared], q[shared], along[shared], length[shared]
     line = distinct_rows(*key[shared].T, materials[t])[1]

@@ -138,6 +138,17 @@ def numbered(label: NDArray[np.integer]) -> NDArray[np.int64]:
     return np.asarray((np.cumsum(used) - 1)[label], np.int64)
 
 
+def not_alone(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The rows (n, k) that have an equal one; few others, that only seem to have."""
+    mixed = (rows.astype(np.uint64) * np.cumprod(np.full(rows.shape[1], SPREAD))).sum(axis=1)
+    mixed ^= mixed >> np.uint64(29)
+    order = np.argsort(mixed)
+    same = mixed[order[1:]] == mixed[order[:-1]]
+    alone = np.ones(len(rows), bool)
+    alone[order[1:][same]] = alone[order[:-1][same]] = False
+    return np.flatnonzero(~alone)
+
+
 def runs(first: NDArray[np.int64], last: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The whole numbers from each first one up to each last one, less that, one run after the other: of which run, and they."""
     count = last - first

@@ -19,7 +19,7 @@ from app.atlas.sides import distinct_rows
 from app.scene.model import F64
 
 ON_EDGE = 1e-6  # solver space: a corner no farther from an edge lies on it, to single precision
-
+FEW = 32  # edges, or points, with which all of the others are compared
 MOST = 4096  # divisions, beside one for each triangle, beyond which none is made: piles of sheets along one line
 
 Ints = NDArray[np.int64]
@@ -63,7 +63,7 @@ def _corners_on_edges(points: F64, corners: Ints) -> tuple[Ints, Ints, Ints, F64
     once = distinct_rows(*np.sort(corners, axis=1).T)[0]  # both sides of a sheet are one
     rim = np.bincount(kind.reshape(-1, 3)[once].reshape(-1), minlength=len(first)) % 2 == 1
     at_rim = np.unique(np.concatenate([low[rim], high[rim]]))
-    used, rims, others = np.unique(corners), np.flatnonzero(rim), np.flatnonzero(~rim)
+    used, rims, others = np.flatnonzero(np.bincount(start)), np.flatnonzero(rim), np.flatnonzero(~rim)
     found = [_on(points, low, high, rims, used), _on(points, low, high, others, at_rim)]
     on, node, share = (np.concatenate(column) for column in zip(*found, strict=True))
     # to each triangle that has the edge, whichever way
@@ -80,6 +80,10 @@ def _on(points: F64, low: Ints, high: Ints, edges: Ints, asked: Ints) -> tuple[I
     """Which of the points ``asked`` lie between the ends of which of the ``edges``, and at what share of the way."""
     if not len(edges) or not len(asked):
         return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
+    if min(len(edges), len(asked)) <= FEW:
+        edges, asked = _in_boxes(points, low, high, edges, asked)
+        if not len(edges) or not len(asked):
+            return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
     half = np.linalg.norm(points[high[edges]] - points[low[edges]], axis=1) / 2 + ON_EDGE
     far, _ = cKDTree(points[asked]).query(
         (points[low[edges]] + points[high[edges]]) / 2, distance_upper_bound=half.max() + ON_EDGE, workers=-1
@@ -96,6 +100,22 @@ def _on(points: F64, low: Ints, high: Ints, edges: Ints, asked: Ints) -> tuple[I
     off = np.linalg.norm(there - share[:, None] * way, axis=1)
     on = (off <= ON_EDGE) & (share * length > ON_EDGE) & ((1 - share) * length > ON_EDGE)
     return edge[on], node[on], share[on]
+
+
+def _in_boxes(points: F64, low: Ints, high: Ints, edges: Ints, asked: Ints) -> tuple[Ints, Ints]:
+    """The edges in whose boxes any of the points ``asked`` lies, or the points that lie in the box of any of the edges, whichever
+    of both are more: compared with each of the few others."""
+    start, end, place = points[low[edges]], points[high[edges]], points[asked]
+    least, most = np.minimum(start, end) - ON_EDGE, np.maximum(start, end) + ON_EDGE
+    if len(edges) > len(asked):
+        near = np.zeros(len(edges), bool)
+        for point in place:
+            near |= ((point >= least) & (point <= most)).all(axis=1)
+        return edges[near], asked
+    near = np.zeros(len(asked), bool)
+    for lower, upper in zip(least, most, strict=True):
+        near |= ((place >= lower) & (place <= upper)).all(axis=1)
+    return edges, asked[near]
 
 
 def _divided_once(

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.charts import Charts, corner_places
-from app.atlas.sides import distinct_rows, least, middle, most
+from app.atlas.sides import distinct_rows, least, middle, most, not_alone
 from app.atlas.t_junctions import Divided, Floats, at_corners, without_t_junctions
 from app.scene.model import F32, F64, I32, Scene
 
@@ -167,7 +167,7 @@ def _morton_order(centres: F64) -> Ints:
 
 def _overlaps_in_plane(points: F64) -> Mask:
     """Whether a triangle (points (n, 3, 3)) overlaps another one of its plane, or has more neighbours than are compared."""
-    count, found, row = len(points), np.zeros(len(points), bool), np.arange(len(points))
+    found, row = np.zeros(len(points), bool), np.arange(len(points))
     normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     steep = (np.abs(normal) > 0.5).argmax(1)  # an axis that the plane is not parallel to: a unit vector has such
@@ -177,9 +177,12 @@ def _overlaps_in_plane(points: F64) -> Mask:
     flat = np.take_along_axis(points, across[:, None], 2)  # (n, 3, 2), seen along that axis
     (u0, v0), (u1, v1) = (least(flat) + TOUCHING).T, (most(flat) - TOUCHING).T
     for shift in (0.0, 0.5):  # or rounding would part equal planes
-        of = distinct_rows(*np.floor(plane / SAME_PLANE + shift).astype(np.int64).T)[1]
-        order = np.lexsort((u0, of))
-        along = SPACE * of[order]  # each plane has its own stretch of numbers
+        rounded = np.floor(plane / SAME_PLANE + shift).astype(np.int64)
+        mine = not_alone(rounded)  # few on curved surfaces
+        of = distinct_rows(*rounded[mine].T)[1]
+        count, sorted_by_u = len(mine), np.lexsort((u0[mine], of))
+        order = mine[sorted_by_u]
+        along = SPACE * of[sorted_by_u]  # each plane has its own stretch of numbers
         beyond = np.searchsorted(along + u0[order], along + u1[order])
         ahead = np.maximum(beyond - np.arange(count) - 1, 0)
         found[order[ahead > COMPARED]] = True
