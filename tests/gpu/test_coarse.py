@@ -65,8 +65,9 @@ def better(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[threadin
 
 
 @pytest.fixture
-def view(gpu: Gpu, better: threading.Event) -> Iterator[View]:
-    options = ShootingOptions(resolution=64, residual=0.1)
+def view(gpu: Gpu, better: threading.Event, request: pytest.FixtureRequest) -> Iterator[View]:
+    """Light is there with a tenth unshot, or as much as a test says."""
+    options = ShootingOptions(resolution=64, residual=getattr(request, "param", 0.1))
     session = Session(gpu, options=options, atlas=AtlasOptions(texels=TEXELS), expose_on_open=True)
     view = View(session)
     yield view
@@ -170,6 +171,7 @@ def test_a_scene_without_lamps_is_shown_flat_meanwhile(view: View, better: threa
     assert not session.coarse
 
 
+@pytest.mark.parametrize("view", [1e-4], indirect=True)  # a frame may make so many shots that a tenth would be the end
 def test_the_processor_is_left_to_better_charts_after_a_while(
     view: View, better: threading.Event, monkeypatch: pytest.MonkeyPatch
 ) -> None:
