@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atlas.sides import least, most
+from app.atlas.sides import least, most, runs
 from app.atlas.unit_square import SLIVER, area_and_centroid
 from app.scene.model import F64
 from app.util.ahead import ahead
@@ -110,17 +110,16 @@ class Cutter:
         (left, bottom), (across, up) = self._low[pairs].T, self._wide[pairs].T
         full, alone = None if self._full is None else self._full[pairs], self._alone[pairs]
         doubled = (u[1] - u[0]) * (v[2] - v[0]) - (v[1] - v[0]) * (u[2] - u[0])
-        pair, row = _counted(up)
+        pair, row = runs(np.zeros_like(up), up)
         first, end, whole_from, whole_to = _spans(u - left, v - bottom, np.sign(doubled), across, pair, row)
         if full is not None and full.any():
             filled = full[pair]
             first, whole_from = np.where(filled, 0, first), np.where(filled, 0, whole_from)
             end, whole_to = np.where(filled, across[pair], end), np.where(filled, across[pair], whole_to)
-        line, nth = _counted(np.maximum(end - first, 0))
-        nth += first[line]
-        whole = (nth >= whole_from[line]) & (nth < whole_to[line])
+        line, column = runs(first, np.maximum(end, first))
+        whole = (column >= whole_from[line]) & (column < whole_to[line])
         pair, y = pair[line], (row + bottom[pair])[line]
-        x = nth + left[pair]
+        x = column + left[pair]
         share, u_mean, v_mean = np.ones(len(x)), np.full(len(x), 0.5), np.full(len(x), 0.5)
         for some, measure in ((alone[pair], _all_of), (~(whole | alone[pair]), area_and_centroid)):
             at = np.flatnonzero(some)
@@ -138,12 +137,6 @@ def bounds(uv: F64) -> tuple[I64, I64]:
     """(f, 2) each: the first cell of each triangle's box, and the one beyond the last."""
     low = np.floor(least(uv)).astype(np.int64)
     return low, np.maximum(np.ceil(most(uv)).astype(np.int64), low + 1)
-
-
-def _counted(count: I64) -> tuple[I64, I64]:
-    """Each of n things so many times (n,): its number, and which time it is."""
-    which = np.repeat(np.arange(len(count)), count)
-    return which, np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
 
 
 def _all_of(u: F64, v: F64) -> tuple[F64, F64, F64]:
