@@ -15,8 +15,10 @@ def main() -> None:
     if before is signal.default_int_handler:  # else it is ignored, as in a background job
         signal.signal(signal.SIGINT, _stop)
     from app.cli import run
+    from app.util.interrupt import end_as_by_ctrl_c
 
     signal.signal(signal.SIGINT, before)
+    end_as_by_ctrl_c()
     sys.exit(run(sys.argv[1:]))
 
 

@@ -1,4 +1,4 @@
-"""Ctrl-C that waits for a good moment."""
+"""Ctrl-C, and a request to end, that wait for a good moment."""
 
 from __future__ import annotations
 
@@ -8,11 +8,21 @@ import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def end_as_by_ctrl_c() -> None:
+    """A request to end, as ``kill``, ``timeout`` and a system that shuts down make it, raises KeyboardInterrupt as Ctrl-C does;
+    where it is ignored it stays so."""
+    if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+
 
 @contextlib.contextmanager
 def held_back() -> Iterator[Callable[[], bool]]:
-    """While inside, Ctrl-C is only noted, and whoever works asks whether it was, between two pieces of work; a second one
-    interrupts at once. Where Ctrl-C means something else already, or in another thread, it never was."""
+    """While inside, Ctrl-C, or SIGTERM where it means the same, is only noted, and whoever works asks whether it was, between
+    two pieces of work; a second one interrupts at once. Where they mean something else already, or in another thread, it never
+    was."""
     asked = False
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -22,14 +32,14 @@ def held_back() -> Iterator[Callable[[], bool]]:
         asked = True
 
     mine = threading.current_thread() is threading.main_thread()
-    if not mine or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        yield lambda: False
-        return
-    signal.signal(signal.SIGINT, note)
+    held = [number for number in SIGNALS if mine and signal.getsignal(number) is signal.default_int_handler]
+    for number in held:
+        signal.signal(number, note)
     try:
         yield lambda: asked
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        for number in held:
+            signal.signal(number, signal.default_int_handler)
 
 
-__all__ = ["held_back"]
+__all__ = ["end_as_by_ctrl_c", "held_back"]

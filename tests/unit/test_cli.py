@@ -438,8 +438,10 @@ def until(condition: Callable[[], bool], worker: subprocess.Popen[str]) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
-@pytest.mark.parametrize("kind", ["shot", "bake"])
-def test_ctrl_c_while_shooting_keeps_what_is_there(folder: Path, kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "number"), [("shot", signal.SIGINT), ("shot", signal.SIGTERM), ("bake", signal.SIGINT)]
+)
+def test_ctrl_c_while_shooting_keeps_what_is_there(folder: Path, kind: str, number: signal.Signals) -> None:
     output = folder / ("a.png" if kind == "shot" else "out")
     more = (
         ["--size", "64x48", "--residual", "1e-9", "--level", "1", "--no-coarsen"]
@@ -451,7 +453,7 @@ def test_ctrl_c_while_shooting_keeps_what_is_there(folder: Path, kind: str) -> N
         assert worker.stderr is not None
         assert worker.stderr.readline() == "glowtree: note: 1 material is not defined: grey with albedo 0.5\n"
         time.sleep(1)  # the note is the last thing before the shots
-        worker.send_signal(signal.SIGINT)
+        worker.send_signal(number)
         out, err = worker.communicate(timeout=60)
     assert worker.returncode == 130, err
     resumable = "glowtree: note: stopped: the same line with --resume goes on from here\n"
