@@ -2,51 +2,22 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 import re
-import signal
-import subprocess
-import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
+from cli_folder import folder, json_of
 from PIL import Image
-from processes import started
-from scene_files import Gltf
 
-import app.commands.info as info_module
 from app.cli import run
-from app.scene import shapes
-from app.scene.gltf import outline_gltf
-from app.scene.load import load_scene
 
-ROOT = Path(__file__).parent.parent.parent
+__all__ = ["folder"]
+
 FEW = ["--texels", "2000", "--shots", "8"]  # enough to have run through everything
 SHOT = "shot cornell-box -o a.png "
 
-FILES = {
-    "empty.glb": "",
-    "short.glb": "glTF garbage",
-    "noise.stl": "solid nothing",
-    "a.xyz": "1 2 3",
-    "points.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\n",
-    "nan.obj": "v 0 0 0\nv 1 0 nan\nv 0 0 1\nf 1 2 3\n",
-    "dark.obj": "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n",
-    "room.obj": "".join(f"v {i & 1} {i >> 1 & 1} {i >> 2}\n" for i in range(8))
-    + "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n",
-    "nothing.toml": "[scene]\n",
-    "syntax.toml": "[[quad]\n",
-    "file": "",
-    "walk.toml": "seconds = 1\n[[key]]\nposition = [0, 0, 0]\ntarget = [0, 0, 1]\n",
-    "turned.toml": "seconds = 1\n[[key]]\nposition = [0, 0, 0]\ntarget = [0, 0, 0]\n",
-    "typo.toml": "[[material]]\nname = 'a'\nalbedoo = 1\n",
-}
 
 # arguments, and what the one line must say
 BAD = [
@@ -161,18 +132,6 @@ BAD = [
 ]
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working directory with the files of FILES, and without a screen."""
-    for name, text in FILES.items():
-        (tmp_path / name).write_text(text)
-    (tmp_path / "folder.png").mkdir()
-    monkeypatch.chdir(tmp_path)
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    return tmp_path
-
-
 def code_of(line: str) -> int:
     try:
         return run(line.split())
@@ -268,223 +227,6 @@ def test_the_exposure_is_found_unless_given(folder: Path, capfd: pytest.CaptureF
         assert run(["shot", "cornell-box", "-o", f"{name}.png", "--size", "64x64", *FEW, *more]) == 0
     light = {name: sum(Image.open(folder / f"{name}.png").convert("L").tobytes()) for name in ("auto", "given")}
     assert light["auto"] > 2 * light["given"]
-
-
-@pytest.mark.parametrize("storage", ["rgba32f", "rgba16f", "fixed8"])
-@pytest.mark.parametrize("scene", ["cornell-box", "textured-room"])
-def test_info_foretells_the_solve(folder: Path, scene: str, storage: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """Texels, tiles and atlas exactly; memory within 1 %: the tables of materials are left out."""
-    told = json_of(capsys, ["info", scene, "--json", "--texels", "9000", "--storage", storage])
-    line = ["shot", scene, "-o", "a.png", "--size", "64x48", "--json", "--texels", "9000", "--shots", "1"]
-    came = json_of(capsys, [*line, "--storage", storage])
-    assert told["texels"] == came["texels"]
-    assert told["atlas"] == came["atlas"]
-    assert told["charts"] == came["charts"]["count"]
-    assert told["memory_mib"] == pytest.approx(came["memory_mib"], rel=0.01)
-
-
-def test_info_of_a_large_scene_neither_unfolds_nor_places(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A box 40 times, turned, scaled and mirrored; counts, area and density as of the whole scene, marked as estimates."""
-    gltf, rng = Gltf(), np.random.default_rng(3)
-    box = shapes.box((1.0, 2.0, 0.5))
-    primitive = {"attributes": {"POSITION": gltf.accessor(box.positions.astype(np.float32))}, "material": 0}
-    primitive["indices"] = gltf.accessor(box.triangles.astype(np.uint16).reshape(-1))
-    turns = rng.normal(size=(40, 4))
-    places = {
-        "TRANSLATION": gltf.accessor((10 * rng.random((40, 3))).astype(np.float32)),
-        "ROTATION": gltf.accessor((turns / np.linalg.norm(turns, axis=1)[:, None]).astype(np.float32)),
-        "SCALE": gltf.accessor(np.repeat(rng.choice([-1.0, 0.5, 2.0], (40, 1)), 3, axis=1).astype(np.float32)),
-    }
-    gltf.json |= {
-        "meshes": [{"primitives": [primitive]}],
-        "nodes": [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": places}}}],
-        "materials": [
-            {
-                "doubleSided": True,
-                "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]},
-                "extras": {"lightmap_scale": 3},
-            }
-        ],
-    }
-    Path("boxes.glb").write_bytes(gltf.glb())
-    whole = load_scene("boxes.glb")
-    exact = json_of(capsys, ["info", "boxes.glb", "--json"])
-    assert exact["estimated"] == ["seconds_to_open"]
-
-    def refuse(*_: object, **__: object) -> None:
-        raise AssertionError("unfolds")
-
-    monkeypatch.setattr(info_module, "COUNTED", 100)
-    monkeypatch.setattr(info_module, "read_and_unfold", refuse)
-    told = json_of(capsys, ["info", "boxes.glb", "--json"])
-    area = 2 * whole.normals_areas[1].sum()
-    assert told["texels"] == pytest.approx((3 * told["texels_per_metre"]) ** 2 * area)
-    assert told["texels"] == pytest.approx(exact["texels"], rel=0.1)  # texels on the outlines of small rectangles
-    monkeypatch.setitem(info_module.OUTLINES, ".glb", (outline_gltf, 100))
-    monkeypatch.setattr(info_module, "load_scene", refuse)
-    estimated = ["lit_sides", "texels_per_metre", "texels", "tiles", "memory_mib", "seconds_to_open"]
-    assert told.pop("estimated") == estimated
-    outlined = json_of(capsys, ["info", "boxes.glb", "--json"])
-    assert outlined.pop("estimated") == ["triangles", "size_m", *estimated]
-    size = whole.bounds[1] - whole.bounds[0]
-    assert (outlined["size_m"] >= size - 1e-9).all() and outlined.pop("size_m") == pytest.approx(size, rel=0.2)
-    assert told.pop("size_m") == pytest.approx(size)
-    told["cameras"] = []  # that which a scene gets if it has none
-    assert outlined.pop("texels_per_metre") == pytest.approx(told.pop("texels_per_metre"))
-    assert outlined == told
-
-
-def test_info_foretells_how_quadtrees_begin(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Before anything has split. Memory without the tables of leaves and materials: within 2 %."""
-    told = json_of(capsys, ["info", "cornell-box", "--json", "--adaptive"])
-    line = ["shot", "cornell-box", "-o", "a.png", "--size", "64x48", "--json", "--adaptive", "--shots", "1"]
-    came = json_of(capsys, line)
-    assert told["texels"] == came["texels"]
-    assert told["memory_mib"] == pytest.approx(came["memory_mib"], rel=0.02)
-    # the finest level is three below the roots. A fifth of the roots' texels lie across an outline, 82 % inside of it, and count
-    # whole: 4 % more
-    finest = ["info", "cornell-box", "--json", "--density", str(2**3 * told["texels_per_metre"])]
-    assert told["texels_if_uniform"] == pytest.approx(json_of(capsys, finest)["texels"], rel=0.04)
-
-
-def test_a_budget_that_is_reached_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    line = [
-        "shot",
-        "cornell-box",
-        "-o",
-        "a.png",
-        "--size",
-        "64x48",
-        "--adaptive",
-        "--budget",
-        "65536",
-        "--gradient",
-        "1e-3",
-    ]
-    assert run([*line, "--texels", "16000", "--shots", "200"]) == 0
-    assert "the budget of 65,536 texels is reached" in capsys.readouterr().err
-
-
-def test_info_as_text(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["info", "two-rooms"]) == 0
-    rows = dict(line.strip().split("  ", 1) for line in capsys.readouterr().out.splitlines())
-    assert rows["cameras"] == "main, lit room"
-    assert rows["emitting materials"] == "1"
-
-
-def test_doctor_lists_what_is_there(capsys: pytest.CaptureFixture[str]) -> None:
-    values = json_of(capsys, ["doctor", "--json"])
-    assert values["missing"] == []
-    assert values["renderer"] and values["numpy"]
-
-
-def test_doctor_names_packages_that_are_missing(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("app.commands.doctor.PACKAGES", ("numpy", "no-such-package"))
-    assert run(["doctor"]) == 2
-    assert "missing package no-such-package: " in (out := capsys.readouterr().out)
-    assert out.rstrip().endswith("-m pip install no-such-package")
-
-
-# -- processes of their own --------------------------------------------------------------------------------------------
-
-
-def without_screen(**more: str) -> dict[str, str]:
-    """The environment of a process."""
-    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    return {**environment, "PYTHONPATH": str(ROOT), **more}
-
-
-def glowtree(*arguments: str) -> contextlib.AbstractContextManager[subprocess.Popen[str]]:
-    return started([sys.executable, "-m", "app", *arguments], without_screen())
-
-
-NO_X11 = """
-import sys
-import glcontext
-
-def no_screen():
-    raise Exception("no X11")  # as glcontext raises
-
-glcontext.default_backend = no_screen
-import app.commands.info as info_module
-from app.cli import run
-from app.scene import shapes
-from app.scene.gltf import outline_gltf
-from app.scene.load import load_scene
-sys.exit(run(["doctor"]))
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="EGL's vendors are chosen by this variable on Linux only")
-def test_doctor_without_egl_says_what_to_install() -> None:
-    """No EGL, and no X11 either: glcontext opens the screen :0 whatever DISPLAY says, and there may be one."""
-    env = without_screen(__EGL_VENDOR_LIBRARY_FILENAMES=os.devnull)
-    done = subprocess.run([sys.executable, "-c", NO_X11], env=env, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2
-    assert "apt-get install" in done.stdout and "libegl1" in done.stdout
-    assert "Traceback" not in done.stderr
-
-
-def until(condition: Callable[[], bool], worker: subprocess.Popen[str]) -> None:
-    end = time.monotonic() + 60
-    while not condition():
-        assert worker.poll() is None, worker.communicate()
-        assert time.monotonic() < end
-        time.sleep(0.05)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
-@pytest.mark.parametrize(
-    ("kind", "number"), [("shot", signal.SIGINT), ("shot", signal.SIGTERM), ("bake", signal.SIGINT)]
-)
-def test_ctrl_c_while_shooting_keeps_what_is_there(folder: Path, kind: str, number: signal.Signals) -> None:
-    output = folder / ("a.png" if kind == "shot" else "out")
-    more = (
-        ["--size", "64x48", "--residual", "1e-9", "--level", "1", "--no-coarsen"]
-        if kind == "shot"
-        else ["--noise", "1e-5"]
-    )
-    line = [kind, "room.obj", "--light", "-o", str(output), *more]
-    with glowtree(*line) as worker:
-        assert worker.stderr is not None
-        assert worker.stderr.readline() == "glowtree: note: 1 material is not defined: grey with albedo 0.5\n"
-        time.sleep(1)  # the note is the last thing before the shots
-        worker.send_signal(number)
-        out, err = worker.communicate(timeout=60)
-    assert worker.returncode == 130, err
-    resumable = "glowtree: note: stopped: the same line with --resume goes on from here\n"
-    assert "stopped early" in out and err == (resumable if kind == "bake" else "")
-    if kind == "shot":
-        assert Image.open(output).size == (64, 48)
-    else:
-        report = json.loads((output / "report.json").read_text())
-        assert report["interrupted"] and report["rays"] > 0 and not report["converged"]
-        names = ["bake.checkpoint", "irradiance.exr", "report.json", "scene.glb"]
-        assert sorted(p.name for p in output.iterdir()) == names
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
-def test_ctrl_c_while_loading_writes_nothing(folder: Path) -> None:
-    line = ["bake", "cornell-box", "-o", "out/deep", "--texels", "8000000"]  # takes many seconds to cut
-    with glowtree(*line) as worker:
-        until((folder / "out").exists, worker)
-        time.sleep(1)  # for the context
-        worker.send_signal(signal.SIGINT)
-        out, err = worker.communicate(timeout=60)
-    assert worker.returncode == 130
-    assert out == "" and err == "glowtree: stopped, nothing was written\n"
-    assert not (folder / "out").exists()
-
-
-def json_of(capsys: pytest.CaptureFixture[str], line: list[str]) -> dict[str, Any]:
-    assert run(line) == 0
-    values = json.loads(capsys.readouterr().out)
-    assert isinstance(values, dict)
-    return values
 
 
 @pytest.mark.usefixtures("few_points")
