@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 from pictures import ray, render_image
 
 from app.atlas.parametrize import parametrize
+from app.compare.reference_light import ReferenceLight
 from app.gpu import Gpu
+from app.lightmap.collapse import collapse
+from app.lightmap.gutter import fill_gutter
 from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
 from app.render.options import DisplayOptions
 from app.scene.load import load_scene
-from app.scene.model import F64, Scene
+from app.scene.model import F32, F64, Scene
 
 SIZE = (160, 120)
 PLAIN = DisplayOptions(tone_map="clamp")
@@ -90,3 +93,18 @@ def hits(scene: Scene, view: CameraView, pixels: NDArray[np.intp]) -> tuple[NDAr
 
 def some_pixels(rng: np.random.Generator, count: int) -> NDArray[np.intp]:
     return np.stack([rng.integers(0, SIZE[0], count), rng.integers(0, SIZE[1], count)], -1)
+
+
+def light_of(lightmap: Lightmap, tiles: F32) -> ReferenceLight:
+    """Irradiance (tiles, t, t, 3) of a uniform lightmap as a reference."""
+    charts = lightmap.charts
+    image = fill_gutter(*collapse(lightmap.pool, tiles))
+    uv = charts.face_uv * (image.shape[0] // charts.size[1])
+    return ReferenceLight("made", image, charts.face_triangle, charts.face_back, uv, lightmap.scene.materials)
+
+
+def smooth(lightmap: Lightmap) -> F64:
+    """Light that is linear in space [W/m²], on every texel that covers a surface."""
+    surfaces = lightmap.pool.surfaces
+    local = lightmap.space.local_from_world(surfaces.position)
+    return (surfaces.area > 0)[..., None] * (2.0 + local @ np.array([[0.5, 0, 0.2], [0.1, 0.4, 0], [0, 0.2, 0.3]]))

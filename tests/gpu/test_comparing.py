@@ -1,4 +1,4 @@
-"""A solution beside a reference: numbers at random points, pictures of both, and references that come and go."""
+"""A solution beside a reference: numbers at random points, and references that come and go."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-from boxes import PLAIN, SIZE, STEP, box, cornell, even, picture, put, put_ambient
+from boxes import PLAIN, box, cornell, even, light_of, put, put_ambient, smooth
 from forests import Forest, forest
 from gl_objects import forgotten, held
 from numpy.typing import NDArray
@@ -34,15 +34,12 @@ from app.errors import UserError
 from app.gpu import Gpu
 from app.lightmap.at_points import irradiance_of
 from app.lightmap.collapse import collapse
-from app.lightmap.gutter import fill_gutter
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
 from app.lightmap.probe import Probe
 from app.lightmap.tile_pool import TilePool
 from app.reference.metrics import lit_points, point_errors
-from app.render.false_colour import ERRORS, colour_map
-from app.render.resolve import Reference
-from app.scene.model import F32, F64, Scene
+from app.scene.model import F32, Scene
 from app.session.comparison_worker import INTERRUPTED
 from app.session.run import Stop
 from app.session.session import Session
@@ -53,21 +50,6 @@ from app.viewer.picture import picture as shot
 __all__ = ["box", "cornell", "forest", "forgotten"]
 
 SHOOTING = ShootingOptions(resolution=64, residual=0.05)
-
-
-def light_of(lightmap: Lightmap, tiles: F32) -> ReferenceLight:
-    """Irradiance (tiles, t, t, 3) of a uniform lightmap as a reference."""
-    charts = lightmap.charts
-    image = fill_gutter(*collapse(lightmap.pool, tiles))
-    uv = charts.face_uv * (image.shape[0] // charts.size[1])
-    return ReferenceLight("made", image, charts.face_triangle, charts.face_back, uv, lightmap.scene.materials)
-
-
-def smooth(lightmap: Lightmap) -> F64:
-    """Light that is linear in space [W/m²], on every texel that covers a surface."""
-    surfaces = lightmap.pool.surfaces
-    local = lightmap.space.local_from_world(surfaces.position)
-    return (surfaces.area > 0)[..., None] * (2.0 + local @ np.array([[0.5, 0, 0.2], [0.1, 0.4, 0], [0, 0.2, 0.3]]))
 
 
 # -- numbers -----------------------------------------------------------------------------------------------------------
@@ -204,78 +186,6 @@ def test_an_edit_is_measured_and_said(session: Session, tmp_path: Path) -> None:
     frames(session, lambda: session.at_rest)
     assert comparison.error.rms == pytest.approx(1.0, abs=0.1)  # twice the light
     assert comparison.notes(session.lightmap) == [f"the reference was solved with other materials: {material.name}"]
-
-
-# -- pictures ----------------------------------------------------------------------------------------------------------
-
-
-def reference_of(gpu: Gpu, box: Lightmap, tiles: F64) -> tuple[ReferenceTexels, Reference]:
-    texels = ReferenceTexels(gpu, box, light_of(box, tiles.astype(np.float32)))
-    texels.follow(whole=True)
-    return texels, Reference(texels.texture, 1e-3)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.001, 0.03, 0.5, 3.0])
-def test_the_error_has_the_colour_of_its_value(gpu: Gpu, box: Lightmap, share: float) -> None:
-    H = np.array([2.0, 1.0, 0.5])
-    texels, reference = reference_of(gpu, box, even(box, tuple(H)))
-    put(box, "t_irradiance", even(box, tuple(H * (1 + share))))
-    shown = picture(gpu, box, PLAIN.replace(layer="error", exposure=7, false_colour="luminance"), reference=reference)
-    place = np.log(np.clip(100 * share, ERRORS.low, ERRORS.high) / ERRORS.low) / np.log(ERRORS.high / ERRORS.low)
-    # the legend is sampled in steps of 1/1000 here, less than half a step of 8 bits
-    expected = colour_map(1001)[round(place * 1000)]
-    assert shown[SIZE[1] // 3, SIZE[0] // 2] / 255 == pytest.approx(expected, abs=STEP + 0.5 / 255)
-    texels.release()
-
-
-def test_where_the_reference_is_dark_errors_are_over_what_counts_as_dark(gpu: Gpu, box: Lightmap) -> None:
-    texels, reference = reference_of(gpu, box, even(box, (0.0, 0.0, 0.0)))
-    put(box, "t_irradiance", even(box, (0.2, 0.0, 0.0)))
-    shown = picture(gpu, box, PLAIN.replace(layer="error"), reference=reference._replace(dark=2.0))  # 10 %
-    expected = colour_map(1001)[round(1000 * np.log(10.0 / ERRORS.low) / np.log(ERRORS.high / ERRORS.low))]
-    assert shown[SIZE[1] // 3, SIZE[0] // 2] / 255 == pytest.approx(expected, abs=STEP + 0.5 / 255)
-    texels.release()
-
-
-def test_a_split_picture_is_half_of_each(gpu: Gpu, box: Lightmap) -> None:
-    texels, reference = reference_of(gpu, box, even(box, (0.5, 1.0, 2.0)))
-    put(box, "t_irradiance", smooth(box))
-    alone = picture(gpu, box)
-    solution, other, split = (
-        picture(gpu, box, PLAIN.replace(show=show, split=0.25), reference=reference)
-        for show in ("solution", "reference", "split")
-    )
-    middle = SIZE[0] // 4
-    assert (solution == alone).all() and (other != alone).any()
-    assert (split[:, :middle] == alone[:, :middle]).all()
-    assert (split[:, middle:] == other[:, middle:]).all()
-    put(box, "t_irradiance", even(box, (0.5, 1.0, 2.0)))
-    assert np.abs(picture(gpu, box).astype(int) - other).max() <= 1  # the reference looks as its light does
-    texels.release()
-
-
-def test_light_not_yet_shot_is_not_the_reference_s(gpu: Gpu, box: Lightmap) -> None:
-    texels, reference = reference_of(gpu, box, even(box, (0.5, 1.0, 2.0)))
-    put(box, "t_irradiance", even(box, (1.0, 1.0, 1.0)))
-    display, made = PLAIN.replace(show="split", split=0.5), []
-    for a in (0.0, 1.0):
-        put_ambient(box, (a, a, a))
-        made.append(picture(gpu, box, display, reference=reference))
-    without, added = made
-    middle = SIZE[0] // 2
-    assert (added[:, :middle] != without[:, :middle]).any()
-    assert (added[:, middle:] == without[:, middle:]).all()
-    texels.release()
-
-
-def test_layers_without_received_light_have_no_other_side(gpu: Gpu, box: Lightmap) -> None:
-    texels, reference = reference_of(gpu, box, even(box, (1.0, 1.0, 1.0)))
-    offered = {"residual": box.texture("t_residual"), "direct": box.texture("t_irradiance")}
-    for layer in ("albedo", "residual", "charts", "direct", "indirect"):
-        display = PLAIN.replace(layer=layer)
-        both = picture(gpu, box, display.replace(show="reference"), reference=reference, offered=offered)
-        assert (both == picture(gpu, box, display, offered=offered)).all()
-    texels.release()
 
 
 def test_the_reference_follows_the_leaves(gpu: Gpu, tmp_path: Path) -> None:

@@ -1,9 +1,7 @@
-"""The user interface, driven by injected events over a session that only takes notes: keys, widgets, and the rest."""
+"""The user interface, driven by injected events over a session that only takes notes: widgets, and the rest."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from desks import PICKED, SIZE, VIEW, Desk, desk, session, where
-from fake_session import FakeScene, FakeSession
+from fake_session import FakeSession
 from imgui_bundle import imgui
 
 from app.atlas.options import AtlasOptions
@@ -19,102 +17,17 @@ from app.errors import UserError
 from app.gpu import Gpu, ShaderError
 from app.options import Options, specs
 from app.render.options import DisplayOptions
-from app.scene.lights import Light
-from app.scene.sky import Sky, Sun
 from app.session.keeping import WORTH_SECONDS
-from app.solvers import SOLVERS, ShootingOptions
+from app.solvers import ShootingOptions
 from app.ui import overlays, slider, widgets
 from app.ui.app import Ui
 from app.ui.file_list import readable
-from app.ui.keys import ANY_POPUP, SHORTCUTS
+from app.ui.keys import ANY_POPUP
 from app.ui.picture_dialog import free_name
 from app.ui.state import WATCH_SECONDS, Legend, Pace, Request, Saving
 from app.viewer.saving import save_screenshot
 
 __all__ = ["desk", "session", "where"]
-
-# -- keys --------------------------------------------------------------------------------------------------------------
-
-
-EFFECTS: dict[str, Callable[[Desk], bool]] = {
-    "F1": lambda d: d.ui.state.show_help,
-    "F2": lambda d: not d.ui.state.show_ui,
-    "F5": lambda d: any("reloaded" in t.text for t in d.ui.state.toasts),
-    "F12": lambda d: Request.SCREENSHOT in d.requests,
-    "Space": lambda d: not d.session.running,
-    ".": lambda d: ("work",) in d.session.calls and not d.session.running,
-    "P": lambda d: d.ui.state.pace.is_fast(d.session.seconds),
-    "R": lambda d: ("restart",) in d.session.calls,
-    "F": lambda d: d.ui.state.flight is not None,
-    "C": lambda d: d.session.display.show == "reference",
-    "V": lambda d: d.session.display.show == "split",
-    "X": lambda d: d.session.display.layer == "error",
-    "Ctrl+P": lambda d: imgui.is_popup_open("", ANY_POPUP),
-    "Ctrl+O": lambda d: imgui.is_popup_open("", ANY_POPUP),
-    "Ctrl+Z": lambda d: d.session.display.exposure == 0,
-    "Ctrl+Shift+Z": lambda d: d.session.display.exposure == 2,
-    "Ctrl+S": lambda d: imgui.is_popup_open("", ANY_POPUP),
-    "Ctrl+Shift+S": lambda d: imgui.is_popup_open("", ANY_POPUP),
-    "Ctrl+Q": lambda d: Request.QUIT in d.requests,
-    "Esc": lambda d: d.ui.state.picked is None,
-}
-
-
-def test_help_stays_within_a_small_window(gpu: Gpu, session: FakeSession) -> None:
-    desk = Desk(gpu, session, (900, 500))
-    desk.ui.state.show_help = True
-    desk.frames(3)
-    help_window = imgui.internal.find_window_by_name("##help")
-    assert help_window.pos.x >= 0 and help_window.pos.x + help_window.size.x <= 900
-    assert help_window.pos.y >= 0 and help_window.pos.y + help_window.size.y <= 500
-    assert help_window.scroll_max.y > 0, "the rest is reached by the wheel"
-    desk.release()
-
-
-@pytest.mark.parametrize("shortcut", SHORTCUTS, ids=lambda s: s.label)
-def test_every_key_does_what_the_help_says(desk: Desk, shortcut: Any) -> None:
-    desk.session.compare()
-    desk.ui.state.picked = PICKED
-    desk.session.display = desk.session.display.replace(exposure=2.0)
-    desk.frames()
-    if shortcut.key == imgui.Key.z and shortcut.shift:
-        desk.key(imgui.Key.z, control=True)
-    if shortcut.shift:
-        desk.ui.io.add_key_event(imgui.Key.mod_shift, True)
-    assert not EFFECTS[shortcut.label](desk)
-    desk.key(shortcut.key, control=shortcut.control)
-    assert EFFECTS[shortcut.label](desk)
-
-
-@pytest.mark.parametrize("shortcut", SHORTCUTS, ids=lambda s: s.label)
-def test_keys_are_harmless_without_a_scene(gpu: Gpu, shortcut: Any) -> None:
-    desk = Desk(gpu, FakeSession(opened=False))
-    desk.key(shortcut.key, control=shortcut.control)
-    desk.click(*VIEW)
-    assert desk.session.calls == []
-    desk.release()
-
-
-def test_escape_closes_cancels_deselects_and_never_quits(desk: Desk) -> None:
-    desk.session.picked = PICKED
-    desk.click(*VIEW)
-    assert desk.ui.state.picked is PICKED
-    desk.key(imgui.Key.f1)
-    cancelled: list[bool] = []
-    desk.session.loading = SimpleNamespace(stage="unfolding", fraction=0.4, cancel=lambda: cancelled.append(True))
-    desk.key(imgui.Key.escape)
-    assert not desk.ui.state.show_help and not cancelled, "one thing at a time"
-    desk.key(imgui.Key.escape)
-    assert cancelled == [True] and desk.ui.state.picked is PICKED
-    desk.session.loading = None
-    desk.key(imgui.Key.o, control=True)
-    desk.key(imgui.Key.escape)
-    assert not imgui.is_popup_open("", ANY_POPUP) and desk.ui.state.picked is PICKED
-    desk.key(imgui.Key.escape)
-    assert desk.ui.state.picked is None
-    desk.session.opened = False
-    desk.key(imgui.Key.escape)
-    assert desk.requests == [], "with nothing left it does nothing"
 
 
 def test_a_click_on_nothing_drops_what_was_picked(desk: Desk) -> None:
@@ -157,26 +70,6 @@ def test_another_scene_asks_where_a_long_solve_would_be_lost(
 )
 def test_durations_in_words(seconds: float, words: str) -> None:
     assert widgets.duration(seconds) == words
-
-
-def test_with_ctrl_the_keys_of_flight_are_commands(desk: Desk) -> None:
-    eye = desk.session.camera.eye.copy()
-    desk.key(imgui.Key.q, control=True)
-    assert (desk.session.camera.eye == eye).all()
-
-
-def test_keys_typed_into_a_field_are_text(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
-    desk.frames()
-    desk.ui.io.add_key_event(imgui.Key.mod_ctrl, True)
-    desk.click(*where["exposure"])
-    desk.ui.io.add_key_event(imgui.Key.mod_ctrl, False)
-    desk.frames(2)
-    assert desk.ui.io.want_text_input
-    desk.key(imgui.Key.space)
-    desk.ui.io.add_input_characters_utf8("3.5")
-    desk.key(imgui.Key.enter)
-    assert desk.session.running
-    assert desk.session.display.exposure == 3.5
 
 
 def test_a_picture_of_the_view_is_saved_where_one_says(
@@ -321,15 +214,6 @@ def test_a_hand_holds_from_press_to_release(
     assert not desk.ui.held
 
 
-def test_a_key_of_flight_holds_the_view(desk: Desk) -> None:
-    desk.ui.io.add_key_event(imgui.Key.w, True)
-    desk.frames(2)
-    assert desk.ui.held and desk.ui.moving
-    desk.ui.io.add_key_event(imgui.Key.w, False)
-    desk.frames(2)
-    assert not desk.ui.held and not desk.ui.moving
-
-
 @pytest.mark.parametrize(("scale", "speed"), [(1.0, 0.4), (100.0, 5.0)])
 def test_one_walks_through_a_large_world(
     desk: Desk, monkeypatch: pytest.MonkeyPatch, scale: float, speed: float
@@ -391,26 +275,6 @@ def test_editing_a_material_tells_the_session(desk: Desk, monkeypatch: pytest.Mo
     assert call[2].albedo == (0.78, 0.78, 0.78)
 
 
-def test_the_sun_is_moved_and_the_sky_is_another(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
-    desk = Desk(gpu, FakeSession(), (1920, 1400))
-    desk.front("Lights")
-    before = desk.session.scene.sky = Sky("clear", (1.0, 0.5, 0.2), 2.0, sun=Sun(100, 20))
-    moved = {"##Sun azimuth": 230.0, "##sky strength": 3.0}
-    with monkeypatch.context() as hand:
-        hand.setattr(slider, "slide", lambda label, value, *_: moved.get(label, value))
-        desk.frames(1)
-    (sky,) = [call[1] for call in desk.session.calls if call[0] == "set_sky"]
-    assert (sky.sun, sky.strength, sky.colour) == (Sun(230, 20), 3.0, before.colour)
-    for index, kind in enumerate(("none", "uniform", "clear")):
-        desk.session.read = FakeScene(**vars(desk.session.scene) | {"sky": before})
-        chosen = {"##kind": index}
-        monkeypatch.setattr(imgui, "combo", lambda label, now, *_, c=chosen: (label in c, c.get(label, now)))
-        desk.frames(1)
-        now = desk.session.scene.sky
-        assert (now is None) if kind == "none" else now.kind == kind
-    desk.release()
-
-
 def test_a_lamp_that_was_switched_off_keeps_its_colour(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     desk.front("Materials")
     desk.ui.state.material = 3
@@ -419,45 +283,6 @@ def test_a_lamp_that_was_switched_off_keeps_its_colour(desk: Desk, monkeypatch: 
         monkeypatch.setattr(slider, "slide", lambda label, value, *_, s=strength: s if label == "##strength" else value)
         desk.frames()
     np.testing.assert_allclose(desk.session.scene.materials[3].emission, (5.0, 5 * 12 / 17, 5 * 4 / 17), rtol=1e-12)
-
-
-def test_editing_a_light_tells_the_session(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
-    lights = (Light("a", intensity=(4.0, 2.0, 1.0)), Light("b", "spot"))
-    told: list[tuple[Light, ...]] = []
-    desk.session.scene.lights = lights
-    desk.session.set_lights = told.append  # type: ignore[attr-defined]
-    desk.front("Lights")
-    assert not told
-    monkeypatch.setattr(slider, "slide", lambda label, value, *_: 2 * value if label == "##strength" else value)
-    desk.frames(1)
-    assert told[-1] == (replace(lights[0], intensity=(8.0, 4.0, 2.0)), lights[1])  # colour kept, strength doubled
-
-
-def test_a_light_is_dragged_by_its_handle(desk: Desk) -> None:
-    """In the plane that faces the eye, and the view stays."""
-    light = Light("a", position=tuple((desk.session.camera.eye + desk.session.camera.forward).tolist()))
-    desk.session.scene.lights = (light,)
-
-    def follow(lights: tuple[Light, ...]) -> None:
-        desk.session.scene.lights = lights
-
-    desk.session.set_lights = follow  # type: ignore[attr-defined]
-    eye = desk.session.camera.world_from_camera.copy()
-    left, top, width, height = desk.ui.state.view_px
-    x, y = left + width / 2, top + height / 2
-    desk.drag((x, y), (x + 100, y))
-    moved = np.subtract(desk.session.scene.lights[0].position, light.position)
-    assert moved == pytest.approx([2 * np.tan(desk.session.camera.yfov / 2) * 100 / height, 0, 0], rel=0.05)
-    assert (desk.session.camera.world_from_camera == eye).all()
-
-
-@pytest.mark.parametrize("solver", list(SOLVERS))
-def test_lamps_flicker_where_the_solver_can_follow(desk: Desk, monkeypatch: pytest.MonkeyPatch, solver: str) -> None:
-    desk.session.family = replace(desk.session.family, relights=SOLVERS[solver].relights)
-    desk.front("Lights")
-    monkeypatch.setattr(imgui, "checkbox", lambda label, on: (label == "##flicker", True))
-    desk.frames(1)
-    assert (("set_flicker", True) in desk.session.calls) == (solver in ("gathering", "local"))
 
 
 # -- the rest ----------------------------------------------------------------------------------------------------------

@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from desks import VIEW, Desk, desk, session, where
-from fake_session import FakeScene
+from fake_session import FakeScene, FakeSession
 from imgui_bundle import imgui, implot
 
+from app.gpu import Gpu
 from app.scene.area_lamps import AreaLamp, Surfaces
 from app.scene.lights import Light
+from app.scene.sky import Sky, Sun
+from app.solvers import SOLVERS
 from app.ui import area_edits, slider, widgets
 from app.ui.new_lamps import KINDS
 from app.ui.on_screen import on_screen
@@ -255,3 +258,62 @@ def test_a_dark_scene_has_neither_converged_nor_a_plot(
     where.clear()
     desk.frames(2)
     assert desk.ui.state.lights_shown
+
+
+def test_the_sun_is_moved_and_the_sky_is_another(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    desk = Desk(gpu, FakeSession(), (1920, 1400))
+    desk.front("Lights")
+    before = desk.session.scene.sky = Sky("clear", (1.0, 0.5, 0.2), 2.0, sun=Sun(100, 20))
+    moved = {"##Sun azimuth": 230.0, "##sky strength": 3.0}
+    with monkeypatch.context() as hand:
+        hand.setattr(slider, "slide", lambda label, value, *_: moved.get(label, value))
+        desk.frames(1)
+    (sky,) = [call[1] for call in desk.session.calls if call[0] == "set_sky"]
+    assert (sky.sun, sky.strength, sky.colour) == (Sun(230, 20), 3.0, before.colour)
+    for index, kind in enumerate(("none", "uniform", "clear")):
+        desk.session.read = FakeScene(**vars(desk.session.scene) | {"sky": before})
+        chosen = {"##kind": index}
+        monkeypatch.setattr(imgui, "combo", lambda label, now, *_, c=chosen: (label in c, c.get(label, now)))
+        desk.frames(1)
+        now = desk.session.scene.sky
+        assert (now is None) if kind == "none" else now.kind == kind
+    desk.release()
+
+
+def test_editing_a_light_tells_the_session(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    lights = (Light("a", intensity=(4.0, 2.0, 1.0)), Light("b", "spot"))
+    told: list[tuple[Light, ...]] = []
+    desk.session.scene.lights = lights
+    desk.session.set_lights = told.append  # type: ignore[attr-defined]
+    desk.front("Lights")
+    assert not told
+    monkeypatch.setattr(slider, "slide", lambda label, value, *_: 2 * value if label == "##strength" else value)
+    desk.frames(1)
+    assert told[-1] == (replace(lights[0], intensity=(8.0, 4.0, 2.0)), lights[1])  # colour kept, strength doubled
+
+
+def test_a_light_is_dragged_by_its_handle(desk: Desk) -> None:
+    """In the plane that faces the eye, and the view stays."""
+    light = Light("a", position=tuple((desk.session.camera.eye + desk.session.camera.forward).tolist()))
+    desk.session.scene.lights = (light,)
+
+    def follow(lights: tuple[Light, ...]) -> None:
+        desk.session.scene.lights = lights
+
+    desk.session.set_lights = follow  # type: ignore[attr-defined]
+    eye = desk.session.camera.world_from_camera.copy()
+    left, top, width, height = desk.ui.state.view_px
+    x, y = left + width / 2, top + height / 2
+    desk.drag((x, y), (x + 100, y))
+    moved = np.subtract(desk.session.scene.lights[0].position, light.position)
+    assert moved == pytest.approx([2 * np.tan(desk.session.camera.yfov / 2) * 100 / height, 0, 0], rel=0.05)
+    assert (desk.session.camera.world_from_camera == eye).all()
+
+
+@pytest.mark.parametrize("solver", list(SOLVERS))
+def test_lamps_flicker_where_the_solver_can_follow(desk: Desk, monkeypatch: pytest.MonkeyPatch, solver: str) -> None:
+    desk.session.family = replace(desk.session.family, relights=SOLVERS[solver].relights)
+    desk.front("Lights")
+    monkeypatch.setattr(imgui, "checkbox", lambda label, on: (label == "##flicker", True))
+    desk.frames(1)
+    assert (("set_flicker", True) in desk.session.calls) == (solver in ("gathering", "local"))
