@@ -8,6 +8,7 @@ xatlas may not be the next time.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
@@ -61,7 +62,7 @@ def charts_of(
             waiting()
         found = _made(scene, atlas, roots, progress)
         if not found[1].warnings:
-            cache.store(_content(scene, *found), file, CACHE_FILES)
+            cache.store(functools.partial(_content, scene, *found), file, CACHE_FILES)
     return found
 
 

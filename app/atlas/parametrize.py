@@ -104,16 +104,22 @@ def parametrize(
         method,
         lambda share: report("placing pieces side by side", UNFOLDED + 0.1 * share),
     )
-    hidden = hidden_pieces(
-        scene,
-        all_planes,
-        facet,
-        lit.triangle,
-        lit.back,
-        charts.face_uv,
-        density,
-        lambda share: report("finding what lies on surfaces", 0.8 + 0.15 * share),
-    )
+    with ThreadPoolExecutor(1) as also:
+        joins = also.submit(
+            find_seams, scene, corners, lit.triangle, lit.back, charts.face_uv, charts.face_chart, ends, layout.rim
+        )
+        hidden = hidden_pieces(
+            scene,
+            all_planes,
+            facet,
+            lit.triangle,
+            lit.back,
+            charts.face_uv,
+            density,
+            lambda share: report("finding what lies on surfaces", 0.8 + 0.15 * share),
+        )
+        report("joining edges of pieces", 0.95)
+        seams = joins.result()
     if hidden.left_out:
         soup = (
             f"{hidden.left_out} sides share a plane with thousands of loose pieces: what stands there leaves dark feet"
@@ -121,8 +127,6 @@ def parametrize(
         warnings = (*warnings, soup)
     if not roots:
         warnings += _too_small(layout, density)
-    report("joining edges of pieces", 0.95)
-    seams = find_seams(scene, corners, lit.triangle, lit.back, charts.face_uv, charts.face_chart, ends, layout.rim)
     return dataclasses.replace(charts, warnings=warnings, seams=seams, hidden_uv=hidden.uv, hidden_face=hidden.face)
 
 

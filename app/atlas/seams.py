@@ -111,10 +111,13 @@ def seam_texels(seams: Seams, finer: int = 1) -> SeamTexels:
     blocks = [slice(first, first + BLOCK) for first in range(0, len(own), BLOCK)]
     parts = ahead(lambda some: _near(own[some], way[some], length[some], some.start), blocks or [slice(0, 0)])
     seam, x, y, t, far, beyond = (np.concatenate(column) for column in zip(*parts, strict=True))
-    place = (y << 32) + x  # rows first, also where x is below 0
-    order = np.lexsort((far, place))
-    fresh = order[np.r_[True, place[order[1:]] != place[order[:-1]]][: len(order)]]
-    seam, x, y, t, beyond = seam[fresh], x[fresh], y[fresh], t[fresh, None], beyond[fresh]
+    texels, texel, _ = distinct_rows(y, x)
+    nearest = np.full(len(texels), np.inf)
+    np.minimum.at(nearest, texel, far)
+    at = np.flatnonzero(far == nearest[texel])[::-1]
+    one = np.empty(len(texels), np.int64)
+    one[texel[at]] = at  # the first of several as near
+    seam, x, y, t, beyond = seam[one], x[one], y[one], t[one, None], beyond[one]
     outward = (
         np.stack([there[:, 1], -there[:, 0]], axis=1) / length[:, None]
     )  # as long as a texel of the own chart is there

@@ -18,6 +18,7 @@ from app.scene.model import F32, F64, I32, Scene
 from app.util.ahead import ahead
 
 PIECES = 1.5  # of triangles in a texel, about
+BLOCK = 1 << 14  # faces in work at a time
 
 I64 = NDArray[np.int64]
 
@@ -65,20 +66,34 @@ class TexelSurfaces:
 
 def faces_tangents(scene: Scene, charts: Charts) -> tuple[F64, F64]:
     """∂p/∂u and ∂p/∂v of each face, (f, 3) f64 [m per texel of level 0]. Their cross product points to the lit side."""
-    corners = scene.corners[charts.face_triangle]
-    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    d1, d2 = _uv_edges(charts.face_uv)
-    scale = 1 / (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0])
-    dpdu = (d2[:, 1:] * e1 - d1[:, 1:] * e2) * scale[:, None]
-    dpdv = (d1[:, :1] * e2 - d2[:, :1] * e1) * scale[:, None]
+    count = len(charts.face_triangle)
+    dpdu, dpdv = np.empty((count, 3)), np.empty((count, 3))
+
+    def of(some: slice) -> None:
+        corners = scene.corners[charts.face_triangle[some]]
+        e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        d1, d2 = _uv_edges(charts.face_uv[some])
+        scale = 1 / (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0])
+        dpdu[some] = (d2[:, 1:] * e1 - d1[:, 1:] * e2) * scale[:, None]
+        dpdv[some] = (d1[:, :1] * e2 - d2[:, :1] * e1) * scale[:, None]
+
+    for _ in ahead(of, [slice(first, first + BLOCK) for first in range(0, count, BLOCK)]):
+        pass
     return dpdu, dpdv
 
 
 def uniform_leaves(charts: Charts, level: int = 0) -> Leaves:
     """The tiles of one level that some face covers, row by row."""
-    columns = charts.size[0] * 2**level // charts.tile
-    cutter = Cutter(charts.face_uv * (2.0**level / charts.tile))
-    key = np.unique(np.concatenate([np.empty(0, np.int64), *(part.y * columns + part.x for part in cutter.parts())]))
+    columns, rows = (side * 2**level // charts.tile for side in charts.size)
+    uv = charts.face_uv * (2.0**level / charts.tile)
+    low, high = bounds(uv)
+    d1, d2 = _uv_edges(uv)
+    alone = (high - low == 1).all(axis=1) & (d1[:, 0] * d2[:, 1] != d1[:, 1] * d2[:, 0])
+    met = np.zeros(rows * columns, bool)
+    met[low[alone, 1] * columns + low[alone, 0]] = True
+    for part in Cutter(uv[~alone]).parts():
+        met[part.y * columns + part.x] = True
+    key = np.flatnonzero(met)
     x, y = (key % columns).astype(np.int32), (key // columns).astype(np.int32)
     return Leaves(np.full(len(key), level, np.int32), x, y)
 

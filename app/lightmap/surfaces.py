@@ -65,7 +65,7 @@ def on_their_faces(scene: Scene, charts: Charts, surfaces: TexelSurfaces) -> Tex
 
 def _normals_of(normals: F64, face: I32) -> F32:
     """(n, t, t, 3) those of faces, 0 where there is none."""
-    return np.append(normals, np.zeros((1, 3)), axis=0).astype(np.float32)[face]
+    return np.append(normals, np.zeros((1, 3)), axis=0).astype(np.float32).take(face, axis=0, mode="wrap")
 
 
 def face_normals(scene: Scene, charts: Charts) -> F64:

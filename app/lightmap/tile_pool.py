@@ -200,14 +200,13 @@ class TilePool:
     @functools.cached_property
     def emission_weights(self) -> F64:
         """(materials, 3) [m²]: the area of each material, weighted with its emission texture."""
-        covered = self.surfaces.face >= 0
-        material = self.scene.material_ids[self.charts.face_triangle[self.surfaces.face[covered]]]
-        area = self.surfaces.area[covered]
-        weights = np.zeros((len(self.scene.materials), 3))
-        for channel in range(3):
-            tint = 1.0 if self.emission_tiles is None else self.emission_tiles[covered][:, channel]
-            weights[:, channel] = np.bincount(material, area * tint, len(weights))
-        return weights
+        covered = np.flatnonzero(self.surfaces.face >= 0)
+        material = self.scene.material_ids[self.charts.face_triangle].take(self.surfaces.face.take(covered))
+        area, count = self.surfaces.area.take(covered), len(self.scene.materials)
+        if self.emission_tiles is None:
+            return np.repeat(np.bincount(material, area, count)[:, None], 3, axis=1)
+        tints = self.emission_tiles.reshape(-1, 3).take(covered, axis=0).T
+        return np.stack([np.bincount(material, area * tint, count) for tint in tints], axis=1)
 
     @property
     def slots_in_use(self) -> int:

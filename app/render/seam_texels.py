@@ -55,20 +55,22 @@ def shown_at_seams(pool: TilePool, border: int) -> F32:
     found = [np.empty((0, 5), np.float32)]
     for level in np.unique(pool.leaves.level[used]).tolist() if len(seams) else ():
         near = pool.charts.seam_texels if level == 0 else seam_texels(seams, 1 << level)
-        for shift in np.ndindex(3, 3):
-            at = (
-                near.texel + (np.array(shift) - 1) * border
-            ) // tile  # the leaf, or one that has the texel in its border
-            if shift == (1, 1):
-                mine = np.ones(len(at), bool)
-            else:
-                mine = ((at != near.texel // tile) == (np.array(shift) != 1)).all(1)
+        leaf = near.texel // tile
+        inside = near.texel - leaf * tile
+        beside = inside < border, None, inside >= tile - border  # before, of the leaf itself, and after
+        for shift in np.ndindex(3, 3):  # the leaf, or one that has the texel in its border
+            mine = np.ones(len(leaf), bool)
+            for axis, step in enumerate(shift):
+                if (within := beside[step]) is not None:
+                    mine &= within[:, axis]
+            mine = np.flatnonzero(mine)
+            at = leaf[mine] + np.array(shift) - 1
             key = (level << 48) | (at[:, 1] << 24) | at[:, 0]
             place = np.minimum(np.searchsorted(keys[order], key), len(keys) - 1)
-            mine &= keys[order][place] == key
-            slot = used[order[place[mine]]]
+            there = keys[order][place] == key
+            mine, at, slot = mine[there], at[there], used[order[place[there]]]
             corner = np.stack([slot % pool.columns, slot // pool.columns], 1) * (tile + 2 * border)
-            px = corner + border + near.texel[mine] - at[mine] * tile
+            px = corner + border + near.texel[mine] - at * tile
             found.append(np.column_stack([px, near.other[mine], near.weight[mine]]).astype(np.float32))
     every = np.concatenate(found)
     return np.asarray(every[np.argsort(every[:, 1], kind="stable")])

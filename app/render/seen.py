@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.atlas.points import SideIndex
+from app.atlas.sides import least, most
 from app.lightmap.tile_pool import TilePool
 from app.scene.model import F64, Scene
 
@@ -93,10 +94,10 @@ def _rectangles(corners: F64, half: F64, size: Ints) -> tuple[Ints, Ints]:
     depth = -corners[:, :, 2]
     near = NEAREST * max(float(np.abs(corners).max(initial=0.0)), 1e-30)
     place = (corners[:, :, :2] / np.maximum(depth, near)[:, :, None] / half + 1) / 2 * size
-    low, high = np.ceil(place.min(1) - 0.5), np.floor(place.max(1) - 0.5) + 1
-    cut = (depth <= near).any(1, keepdims=True)
+    low, high = np.ceil(least(place) - 0.5), np.floor(most(place) - 0.5) + 1
+    cut = (least(depth) <= near)[:, None]
     low, high = np.where(cut, 0, low), np.where(cut, size, high)
-    high = np.where((depth <= near).all(1, keepdims=True), 0, high)
+    high = np.where((most(depth) <= near)[:, None], 0, high)
     return np.clip(low, 0, size).astype(np.int64), np.clip(high, 0, size).astype(np.int64)
 
 

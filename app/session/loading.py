@@ -30,6 +30,7 @@ from app.scene.sky import Sky
 from app.session.ray_tree import SORTING
 from app.session.versions import Version
 from app.solvers import SOLVERS
+from app.util import cache
 from app.util.background import BackgroundTask, Progress, Report
 from app.visibility.rays import tree_of
 
@@ -97,6 +98,7 @@ def read_and_unfold(
     return read, scene, charts, seconds | {"unfold": time.perf_counter() - start}
 
 
+@cache.written_beside()
 def load(
     source: str | Path | Scene,
     atlas: AtlasOptions,

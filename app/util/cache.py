@@ -6,7 +6,8 @@ import contextlib
 import hashlib
 import os
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 Arrays = dict[str, NDArray[Any]]
 
 _folders: list[Path] = []  # instead of the user's, the last one
+_own = threading.local()  # of a thread, ``writer``: who writes its answers
 
 
 def digest(label: bytes, arrays: Mapping[str, NDArray[Any]]) -> str:
@@ -59,9 +61,27 @@ def write(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
         np.savez(file, allow_pickle=False, **arrays)
 
 
-def store(answer: bytes | Mapping[str, NDArray[Any]], path: Path, files: int) -> None:
-    """Keep arrays, or a file of them, for next time, and of its kind the newest so many; a cache that cannot be written is
-    none."""
+@contextlib.contextmanager
+def written_beside() -> Iterator[None]:
+    """What this thread keeps is written by another one while inside, and is there after. It must not change until then."""
+    with ThreadPoolExecutor(1) as _own.writer:
+        try:
+            yield
+        finally:
+            del _own.writer
+
+
+def store(answer: bytes | Arrays | Callable[[], Arrays], path: Path, files: int) -> None:
+    """Keep arrays, what makes them, or a file of them, for next time, and of its kind the newest so many; a cache that cannot be
+    written is none."""
+    writer: ThreadPoolExecutor | None = getattr(_own, "writer", None)
+    if writer is None:
+        _store(answer, path, files)
+    else:
+        writer.submit(_store, answer, path, files)
+
+
+def _store(answer: bytes | Arrays | Callable[[], Arrays], path: Path, files: int) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}.tmp")
@@ -69,7 +89,7 @@ def store(answer: bytes | Mapping[str, NDArray[Any]], path: Path, files: int) ->
             if isinstance(answer, bytes):
                 partial.write_bytes(answer)
             else:
-                write(partial, answer)
+                write(partial, answer() if callable(answer) else answer)
             partial.replace(path)
         finally:
             partial.unlink(missing_ok=True)

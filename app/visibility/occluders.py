@@ -72,13 +72,12 @@ class Occluders:
         self._gpu, self._pool, self._which, self.sheer = gpu, pool, which, sheer
         vertices, triangles = occluders(pool, which)
         self._mesh = Mesh(gpu, vertices.tobytes(), OCCLUDER_FORMAT, indices=triangles.tobytes())
-        self._corners: NDArray[np.float32] = vertices["in_position"][triangles]
-        self._sides: NDArray[np.float32] = vertices["in_sides"][triangles[:, 2]]
         self.count = len(triangles)
         rows = -(-self.count // TRIANGLES_A_ROW)
         texels = np.zeros((rows * TRIANGLES_A_ROW, 3, 4), np.float32)
-        texels[: self.count, :, :3] = self._corners
-        texels[: self.count, :2, 3] = self._sides
+        self._corners, self._sides = texels[: self.count, :, :3], texels[: self.count, :2, 3]
+        self._corners[:] = np.ascontiguousarray(vertices["in_position"]).take(triangles, axis=0)
+        self._sides[:] = vertices["in_sides"][: self.count]
         self.texture = gpu.texture((3 * TRIANGLES_A_ROW, rows), 4, "f4", texels.tobytes())
         self._table = Sheer(gpu, pool, which) if sheer else None
         self._split: tuple[int, Mesh, Sheer | None] | None = None

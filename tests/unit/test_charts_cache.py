@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from app.atlas.seams import Seams, SeamTexels
 from app.scene import shapes
 from app.scene.model import Camera, Material, Scene
 from app.scene.sky import Sky
+from app.util import cache
 from app.util.background import CancelledError
 
 __all__ = ["own_cache"]
@@ -59,6 +61,25 @@ def test_what_is_kept_is_the_same_again(scene: Scene, monkeypatch: pytest.Monkey
     assert "seam_texels" in vars(again[1]), "found anew"
     assert len(first[1].seam_texels.weight) and _same(first[1].seam_texels, again[1].seam_texels)
     assert charts_of(scene.with_materials((Material("red", albedo=(1, 0, 0)), scene.materials[1])), ATLAS)
+
+
+def test_another_thread_may_write_them_meanwhile(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = ATLAS.replace(texels=2999)
+    go, writers = threading.Event(), list[threading.Thread]()
+    write = cache.write
+
+    def wait_and_write(path: Path, arrays: cache.Arrays) -> None:
+        assert go.wait(60)
+        writers.append(threading.current_thread())
+        write(path, arrays)
+
+    monkeypatch.setattr(cache, "write", wait_and_write)
+    with cache.written_beside():
+        first = charts_of(scene, other)
+        go.set()
+    assert writers and threading.main_thread() not in writers
+    monkeypatch.setattr(charts_cache, "parametrize", _refuse)
+    assert all(_same(one, other) for one, other in zip(first, charts_of(scene, other), strict=True))
 
 
 @pytest.mark.parametrize("other", ["density", "sides", "moved", "roots", "sky", "camera within"])

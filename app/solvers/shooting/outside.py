@@ -75,7 +75,8 @@ class Outside:
         self._equipment, self._lightmap, self._ledger = equipment, equipment.lightmap, ledger
         self._points: dict[bool, PointShots] = {}  # by whether they are sharp, see OutsideShot
         self._directions: dict[bool, DirectionShots] = {}
-        self._box = np.ptp(self._lightmap.scene.corners.reshape(-1, 3), axis=0)
+        low, high = self._lightmap.scene.bounds
+        self._box = high - low
 
     def set_options(self, options: ShootingOptions, resolution: int) -> None:
         """Use other knobs from the next shot on."""
