@@ -85,14 +85,15 @@ def hidden_pieces(
     return Hidden(np.concatenate(pieces), np.concatenate(owners), left_out)
 
 
-def covers(planes: Planes, own: I64, axes: F64) -> tuple[dict[int, shapely.Geometry], dict[int, shapely.Geometry]]:
-    """What lies on the fronts of some facets, own (k,), and on their backs: by the place in ``own``, in axes (k, 3, 2) of their
-    planes."""
-    flat = planes.flat
-    all_ = planes.only(np.union1d(planes.near(flat, own), own))
+def covers(
+    planes: Planes, own: I64, axes: F64, within: float
+) -> tuple[dict[int, shapely.Geometry], dict[int, shapely.Geometry]]:
+    """What lies on the fronts of some facets, own (k,), and on their backs, or no more than ``within`` before these: by the
+    place in ``own``, in axes (k, 3, 2) of their planes."""
+    all_ = planes.only(np.union1d(planes.near(within, own), own))
     mine = np.searchsorted(all_.number, own)
     up = all_.normal[mine]
-    lids, _ = _lids(all_, np.tile(mine, 2), np.concatenate([up, -up]), flat, flat, lambda share: None)
+    lids, _ = _lids(all_, np.tile(mine, 2), np.concatenate([up, -up]), within, planes.flat, lambda share: None)
     found: tuple[dict[int, shapely.Geometry], dict[int, shapely.Geometry]] = {}, {}
     for one, lid in lids:
         back, nth = divmod(one, len(own))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from app.atlas.covered import without_covered
 from app.atlas.facets import facets
 from app.atlas.flat_pieces import MOST_ENDS, MOST_PIECES, Piece, on_rims, parted_pieces
-from app.atlas.intersections import Contacts, contacts, surfaces
+from app.atlas.intersections import Contacts, contacts, standing_on_edges, surfaces
 from app.atlas.sides import Welded, numbered, scene_size
 from app.atlas.triangle_cuts import CutTriangles, cut_pieces
 from app.scene.model import F32, F64, I32, Scene
@@ -64,7 +64,8 @@ class _Met:
             flat = beside.submit(facets, points, corners, scene.material_ids, size, edges)
             met = contacts(places[corners], surfaces(edges), lambda share: tell(0.1 + 0.4 * share))
             tell(0.5)
-            return _Met(welded, places, flat.result(), *met)
+            found = met[0].with_more(standing_on_edges(places[corners], edges))
+            return _Met(welded, places, flat.result(), found, *met[1:])
         finally:
             beside.shutdown(wait=False, cancel_futures=True)
 

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from app.atlas.contacts import covers
+from app.atlas.contacts import GAP, covers
 from app.atlas.intersections import NEAR, Contacts
 from app.atlas.planes import Members, Planes
-from app.atlas.sides import FLAT, Edges, distinct_rows, runs
+from app.atlas.sides import FLAT, Edges, distinct_rows, groups_of, runs
 from app.scene.model import F64, I32, Scene
 from app.util.background import Report
 
@@ -64,7 +65,8 @@ def parted_pieces(
     first = np.array([piece.members[0] for piece, _ in pieces], np.int64)
     own, two_sided = facet[first].astype(np.int64), scene.sides[first]
     axes = np.stack([piece.axes for piece, _ in pieces])
-    hidden = covers(Planes.of(places, corners, facet, scene.sides, FLAT, edges), own, axes)
+    planes = Planes.of(places, corners, facet, scene.sides, FLAT, edges)
+    hidden, near = (covers(planes, own, axes, within) for within in (FLAT, GAP * THIN))
     out, left = [], 0
     for nth, (piece, there) in enumerate(pieces):
         report(0.5 + 0.5 * nth / len(pieces))
@@ -72,8 +74,9 @@ def parted_pieces(
         lines = shapely.linestrings(flat)
         kept, middles = np.zeros(len(flat), bool), [np.empty((0, 2, 2))]
         for back, outside in enumerate((there.front.copy(), there.back & two_sided[nth])):
+            if nth in near[back] and (not back or two_sided[nth]):
+                middles.append(_middles_of_thin(near[back][nth], piece.flat))
             if nth in hidden[back]:
-                middles.append(_middles_of_thin(hidden[back][nth], piece.flat))
                 cover = shapely.STRtree(shapely.get_parts(shapely.buffer(hidden[back][nth], NEAR)))
                 outside[cover.query(lines, predicate="covered_by")[0]] = False
             kept |= outside
@@ -146,6 +149,9 @@ def _drawn_on(segments: F64, border: shapely.Geometry) -> tuple[F64, int]:
     too many do."""
     parts = noded(segments)
     loose, away = _loose_ends(parts, border)
+    if len(loose) > 1:  # contacts shorter than NEAR are none: those beside them may end there
+        parts = noded(merged(segments))
+        loose, away = _loose_ends(parts, border)
     if len(loose) > MOST_ENDS:
         left = len(loose)
         while len(loose):  # those that lead nowhere
@@ -195,3 +201,23 @@ def noded(segments: F64) -> F64:
     places, line = shapely.get_coordinates(shapely.get_parts(whole), return_index=True)
     follows = np.flatnonzero(line[1:] == line[:-1])
     return np.stack([places[follows], places[follows + 1]], axis=1)
+
+
+def merged(segments: F64, known: I64 | tuple[()] = ()) -> F64:
+    """Segments (n, 2, 2), each once, with ends that are near to each other made one; those of known keys (k,) stay."""
+    first, kind, _ = distinct_rows(*segments.reshape(-1, 2).T)
+    places = segments.reshape(-1, 2)[first]
+    stays = np.asarray(np.isin(keys_of(places), known))
+    goal, moved = np.arange(len(places)), np.flatnonzero(~stays)
+    if stays.any():
+        far, nearest = cKDTree(places[stays]).query(places[moved], distance_upper_bound=NEAR)
+        found = np.isfinite(far)
+        goal[moved[found]] = np.flatnonzero(stays)[np.asarray(nearest)[found]]
+        moved = moved[~found]
+    pairs = cKDTree(places[moved]).query_pairs(NEAR, output_type="ndarray")
+    if len(pairs):
+        label = groups_of(len(moved), pairs)[1]
+        goal[moved] = moved[np.unique(label, return_index=True)[1]][label]
+    ends = np.asarray(np.sort(goal[kind].reshape(-1, 2), axis=1))
+    ends = ends[ends[:, 0] != ends[:, 1]]
+    return np.asarray(places[ends[distinct_rows(*ends.T)[0]]])

@@ -1,6 +1,7 @@
 """Where triangles of different surfaces meet: segments in which they touch or pierce each other, and overlaps in one plane.
 
-Lengths are over the scene's size. Triangles that are joined edge by edge are one surface, and not looked at.
+Lengths are over the scene's size. Triangles that are joined edge by edge are one surface, and not looked at but where more than
+two share an edge: a ceiling may have its wall's corners, where that goes on above it.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from app.atlas.sides import FLAT, FLAT_ANGLE, Edges, groups_of, least, most, numbered, rows_by
+from app.atlas.sides import FLAT, FLAT_ANGLE, Edges, groups_of, least, most, numbered, rows_by, runs
 from app.scene.model import F64
 from app.util.background import Report
 
 NEAR = 4 * FLAT  # what is no farther apart is in one place
+MOST_AROUND = 64  # triangles of one edge, beyond which it is not looked at
 MOST_PAIRS = 1 << 24  # of triangles whose boxes meet, beyond which none is looked at: soups of loose triangles
 DENSE = 256  # triangles of a surface, from which on it is looked at by itself
 BLOCK = 1 << 16  # pairs of triangles that are looked at at once
@@ -37,6 +39,11 @@ class Contacts:
     front: Mask
     back: Mask
 
+    def with_more(self, other: Contacts) -> Contacts:
+        return Contacts(
+            *(np.concatenate([getattr(c, f.name) for c in (self, other)]) for f in dataclasses.fields(self))
+        )
+
     def only(self, which: Mask | I64) -> Contacts:
         return Contacts(self.triangle[which], self.ends[which], self.front[which], self.back[which])
 
@@ -46,6 +53,25 @@ def surfaces(edges: Edges) -> I64:
     two = edges.first[:-1][edges.uses == 2]
     pairs = np.stack([edges.order[two] // 3, edges.order[two + 1] // 3], axis=1)
     return groups_of(len(edges.edge) // 3, pairs)[1]
+
+
+def standing_on_edges(corners: F64, edges: Edges) -> Contacts:
+    """Where more than two triangles (m, 3, 3) share an edge: each of them met there by the others."""
+    many = np.flatnonzero((edges.uses > 2) & (edges.uses <= MOST_AROUND))
+    first, last = edges.first[many], edges.first[many + 1]
+    edge, at = runs(first, last)
+    half = edges.order[at]
+    mine, at = runs(first[edge], last[edge])
+    triangle, k = np.divmod(half, 3)
+    own = corners[triangle]
+    normal = np.cross(own[:, 1] - own[:, 0], own[:, 2] - own[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+    other, beside = np.divmod(edges.order[at], 3)
+    height = np.einsum("pk,pk->p", corners[other, (beside + 2) % 3] - own[mine, 0], normal[mine])
+    front, back = (np.bincount(mine, reaches, len(half)) > 0 for reaches in (height > FLAT, height < -FLAT))
+    row = np.arange(len(half))
+    found = Contacts(triangle, np.stack([own[row, k], own[row, (k + 1) % 3]], axis=1), front, back)
+    return found.only(front | back)
 
 
 def contacts(corners: F64, surface: I64, report: Report) -> tuple[Contacts, I64, bool]:

@@ -6,7 +6,8 @@ distance s beyond it (before it: s < 0) [texels],
 
     H(s) = (1 - w) H_own + w H_other,   w = (1 + s)/2, held in [0, 1],
 
-for every texel near the edge, also those around the chart that cover nothing. Where something stands on an edge, light may jump.
+for every texel near the edge, also those around the chart that cover nothing. Where something stands on an edge, light may jump:
+texels that are nearest to such an edge keep the light of their chart, also where a seam goes on from its end.
 """
 
 from __future__ import annotations
@@ -32,10 +33,12 @@ I64 = NDArray[np.int64]
 @dataclass(frozen=True, eq=False)
 class Seams:
     """Each edge from both sides, all from one side first. own (k, 2, 2): its ends in the atlas [texels of level 0], with its
-    chart to the left; other (k, 2, 2): the same ends in the other chart, which lies to the right there."""
+    chart to the left; other (k, 2, 2): the same ends in the other chart, which lies to the right there. jumps (j, 2, 2): edges
+    that would be seams if nothing stood there, in each of their charts."""
 
     own: F64 = field(default_factory=lambda: np.empty((0, 2, 2)))
     other: F64 = field(default_factory=lambda: np.empty((0, 2, 2)))
+    jumps: F64 = field(default_factory=lambda: np.empty((0, 2, 2)))
 
     def __len__(self) -> int:
         return len(self.own)
@@ -88,8 +91,7 @@ def find_seams(
     a, b = a[meets], b[meets]
     ta, tb = triangle[face[a]], triangle[face[b]]
     smooth = scene.material_ids[ta] == scene.material_ids[tb]
-    if ends is not None:
-        smooth &= (ends[ta, k[a]] != JUMPS) & (ends[tb, k[b]] != JUMPS)
+    jumps = np.zeros(len(a), bool) if ends is None else (ends[ta, k[a]] == JUMPS) | (ends[tb, k[b]] == JUMPS)
     if scene.normals is None:
         normals = scene.normals_areas[0]
         smooth &= np.einsum("ek,ek->e", normals[ta], normals[tb]) > np.cos(CREASE)
@@ -97,15 +99,18 @@ def find_seams(
         for mine, theirs in ((first, second), (second, first)):
             apart = scene.normals[ta, mine[a]] - scene.normals[tb, theirs[b]]
             smooth &= np.abs(apart).max(1) < SAME_NORMAL
-    a, b = a[smooth], b[smooth]
+    a, b, jumps = a[smooth], b[smooth], jumps[smooth]
     one = np.stack([uv[face[a], first[a]], uv[face[a], second[a]]], axis=1)
     other = np.stack([uv[face[b], second[b]], uv[face[b], first[b]]], axis=1)
-    return Seams(np.concatenate([one, other[:, ::-1]]), np.concatenate([other, one[:, ::-1]]))
+    own, other = np.concatenate([one, other[:, ::-1]]), np.concatenate([other, one[:, ::-1]])
+    jumps = np.tile(jumps, 2)
+    return Seams(own[~jumps], other[~jumps], own[jumps])
 
 
 def seam_texels(seams: Seams, finer: int = 1) -> SeamTexels:
-    """The texels near seams where there are so many of them along an edge of a texel of level 0; each by its nearest seam."""
-    own, other = seams.own * finer, seams.other * finer
+    """The texels near seams where there are so many of them along an edge of a texel of level 0; each by its nearest seam, if
+    no edge at which light may jump is nearer."""
+    own, other = np.concatenate([seams.own, seams.jumps]) * finer, np.concatenate([seams.other, seams.jumps]) * finer
     way, there = own[:, 1] - own[:, 0], other[:, 1] - other[:, 0]
     length = np.linalg.norm(way, axis=1)
     blocks = [slice(first, first + BLOCK) for first in range(0, len(own), BLOCK)]
@@ -123,7 +128,7 @@ def seam_texels(seams: Seams, finer: int = 1) -> SeamTexels:
     )  # as long as a texel of the own chart is there
     goes_on = other[seam, 0] + t * there[seam] + np.maximum(beyond, 0.0)[:, None] * outward[seam]
     weight = np.clip((1 + beyond) / 2, 0.0, 1.0)
-    some = weight > 0
+    some = (weight > 0) & (seam < len(seams))
     return SeamTexels(np.stack([x, y], axis=1)[some], goes_on[some] / finer, weight[some])
 
 

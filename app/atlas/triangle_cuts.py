@@ -14,7 +14,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from app.atlas.flat_pieces import Piece, axes_of, keys_of, noded
+from app.atlas.flat_pieces import Piece, axes_of, keys_of, merged, noded
 from app.atlas.intersections import NEAR
 from app.atlas.sides import FLAT, distinct_rows
 from app.scene.model import F64, I32
@@ -164,7 +164,7 @@ def _cut(nodes: _Nodes, sheet: _Sheet, corners: I32) -> CutTriangles:
     number = dict(zip(keys_of(flat).reshape(-1).tolist(), own.reshape(-1).tolist(), strict=True))
     around = _outlines(nodes, sheet, own, number)
     parts = _snapped(sheet.parts, around[:, 0])
-    lines = _merged(
+    lines = merged(
         noded(np.concatenate([around, parts])), keys_of(np.concatenate([around[:, 0], parts.reshape(-1, 2)]))
     )
     cells = shapely.get_parts(shapely.polygonize(shapely.linestrings(lines)))
@@ -217,23 +217,6 @@ def _snapped(parts: F64, places: F64) -> F64:
     far, nearest = cKDTree(places).query(parts.reshape(-1, 2), distance_upper_bound=2 * NEAR)
     ends = np.where(np.isfinite(far)[:, None], places[np.minimum(nearest, len(places) - 1)], parts.reshape(-1, 2))
     return np.asarray(ends.reshape(-1, 2, 2))
-
-
-def _merged(segments: F64, known: I64) -> F64:
-    """Segments (n, 2, 2) with ends that are near to each other made one; those of known keys (k,) stay."""
-    first, kind, _ = distinct_rows(*segments.reshape(-1, 2).T)
-    places = segments.reshape(-1, 2)[first]
-    stays = np.asarray(np.isin(keys_of(places), known))
-    goal, moved = np.arange(len(places)), np.flatnonzero(~stays)
-    far, nearest = cKDTree(places[stays]).query(places[moved], distance_upper_bound=NEAR)
-    found = np.isfinite(far)
-    goal[moved[found]] = np.flatnonzero(stays)[np.asarray(nearest)[found]]
-    moved = moved[~found]
-    for one, other in cKDTree(places[moved]).query_pairs(NEAR):
-        goal[moved[max(one, other)]] = goal[moved[min(one, other)]]
-    ends = np.asarray(np.sort(goal[kind].reshape(-1, 2), axis=1))
-    ends = ends[ends[:, 0] != ends[:, 1]]
-    return np.asarray(places[ends[distinct_rows(*ends.T)[0]]])
 
 
 def _weights(places: F64, corners: F64) -> F64:

@@ -79,6 +79,29 @@ def test_charts_end_at_edges_that_are_there_where_a_third_surface_has_them_too()
     assert parametrize(scene).chart_count < charts.chart_count
 
 
+def test_charts_end_where_a_sheet_shares_the_corners_of_the_floor_that_it_stands_on() -> None:
+    """Floor and sheet are one surface: the floor goes on beside it, and a wall joins both."""
+    floor = [[(x, 0, z), (x, 0, z + 0.5), (x + 1, 0, z + 0.5), (x + 1, 0, z)] for x in (0, 1) for z in (0, 0.5)]
+    sheet = [(1, 0, 0), (1, 0.5, 0), (1, 0.5, 0.5), (1, 0, 0.5)]
+    roof = [(0, 1, 0), (2, 1, 0), (2, 1, 1), (0, 1, 1)]
+    wall = [(0, 0, 0), (1, 0, 0), (1, 0.5, 0), (0, 0.5, 0)]
+    scene = quads_scene([*floor, sheet, wall, roof], [grey(0.5, double_sided=True)])
+    cut, charts = charts_of(scene)
+    on_floor = charts.face_chart[(cut.corners[charts.face_triangle, :, 1] == 0).all(1)]
+    assert on_one_side(spans(cut, charts, 0)[np.unique(on_floor)], 1.0)
+    assert parametrize(scene).chart_count < charts.chart_count
+
+
+def test_a_beam_parts_a_wall_whose_diagonals_meet_its_edges_near_a_corner(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A contact shorter than what is told apart is none; the others around the beam are joined all the same."""
+    monkeypatch.setattr(flat_pieces, "MOST_ENDS", 0)
+    scene = scene_of(*box((0.5, 0.4, -1e-4), (0.52, 0.42, 0.5)))
+    cut = cut_at_contacts(scene)
+    assert cut.ends is not None and cut.scene.warnings == scene.warnings
+    start = cut.scene.corners[(cut.ends == JUMPS).any(1)]
+    assert {0.5, 0.52} <= set(start[(np.abs(start[..., 2]) < 1e-9)][:, 0].round(5).tolist())
+
+
 def test_what_pierces_is_cut_and_cuts() -> None:
     """A box through the floor: its sides end there, and the floor has a hole in it, which is a chart by itself."""
     scene = scene_of(*box((0.5, -0.2, 0.3), (0.8, 0.4, 0.6)))
@@ -131,6 +154,18 @@ def test_a_thin_door_parts_the_floor_along_its_middle() -> None:
     for chart in np.unique(charts.face_chart[floor]):
         mine = beside[(charts.face_chart == chart) & floor]
         assert mine.max() <= 1.0 + 1e-5 or mine.min() >= 1.0 - 1e-5
+
+
+def test_a_board_a_little_before_a_wall_parts_it() -> None:
+    """Where it ends above the floor, the wall below it is in the dark: its texels may not be those of the wall above."""
+    board = box((2e-4, 0.05, 0.1), (0.02, 0.06, 0.9))
+    scene = scene_of(
+        *board, [(0, 0.5, 0), (1, 0.5, 0), (1, 0.5, 1), (0, 0.5, 1)][::-1], *box((-0.1, 0.7, 0.7), (1, 0.8, 0.8))
+    )
+    cut, charts = charts_of(scene)
+    wall = charts.face_chart[(np.abs(cut.corners[charts.face_triangle, :, 0]) < 1e-9).all(1)]
+    y = spans(cut, charts, 1)[np.unique(wall)]
+    assert on_one_side(y, 0.055) and y.min() == 0
 
 
 def test_grass_does_not_shred_a_floor(monkeypatch: pytest.MonkeyPatch) -> None:

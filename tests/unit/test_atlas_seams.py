@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import shapely
 import trimesh
 from numpy.typing import NDArray
 from solver_scenes import grey, quads_scene, room
@@ -13,11 +14,12 @@ from solver_scenes import grey, quads_scene, room
 from app.atlas.charts import Charts
 from app.atlas.cuts import cut_at_contacts
 from app.atlas.parametrize import parametrize
+from app.atlas.seams import seam_texels
 from app.lightmap.collapse import collapse
 from app.lightmap.gutter import fill_gutter
 from app.lightmap.seams import finished, jumps
 from app.lightmap.tile_pool import TilePool
-from app.scene.model import F32, Scene
+from app.scene.model import F32, F64, Scene
 from app.scene.validate import Part, validate
 
 SCREEN = [(1.0, 0, 0.3), (1.0, 0.5, 0.3), (1.0, 0.5, 0.6), (1.0, 0, 0.6)]
@@ -68,6 +70,18 @@ def test_seams_lie_where_nothing_stands() -> None:
     wall = [(x, y, round(z)) for x, y, z in SCREEN]
     _, _, charts = lit(quads_scene([*room((2.0, 1.0, 1.0)), wall], [grey(0.5, double_sided=True)]))
     assert len(charts.seams) == 2 * 2, "on both long walls, above it"
+
+
+def test_light_jumps_where_something_stands_up_to_where_a_seam_begins() -> None:
+    """Texels of the foot of the screen that lie near the end of a seam are not part of it."""
+    _, _, charts = lit(with_screen())
+    near = seam_texels(charts.seams)
+
+    def distance(edges: F64) -> NDArray[np.float64]:
+        return np.asarray(shapely.distance(shapely.points(near.texel + 0.5), shapely.multilinestrings(list(edges))))
+
+    assert len(near.texel) and len(charts.seams.jumps)
+    assert (distance(charts.seams.own) <= distance(charts.seams.jumps) + 1e-9).all()
 
 
 def test_a_crease_is_no_seam() -> None:
