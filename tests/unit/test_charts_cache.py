@@ -63,8 +63,7 @@ def test_what_is_kept_is_the_same_again(scene: Scene, monkeypatch: pytest.Monkey
     assert charts_of(scene.with_materials((Material("red", albedo=(1, 0, 0)), scene.materials[1])), ATLAS)
 
 
-def test_another_thread_may_write_them_meanwhile(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
-    other = ATLAS.replace(texels=2999)
+def test_anATLAS_thread_may_write_them_meanwhile(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     go, writers = threading.Event(), list[threading.Thread]()
     write = cache.write
 
@@ -74,12 +73,14 @@ def test_another_thread_may_write_them_meanwhile(scene: Scene, monkeypatch: pyte
         write(path, arrays)
 
     monkeypatch.setattr(cache, "write", wait_and_write)
-    with cache.written_beside():
-        first = charts_of(scene, other)
-        go.set()
+    with cache.elsewhere(tmp_path):
+        with cache.written_beside():
+            first = charts_of(scene, ATLAS)
+            go.set()
+        monkeypatch.setattr(charts_cache, "parametrize", _refuse)
+        again = charts_of(scene, ATLAS)
     assert writers and threading.main_thread() not in writers
-    monkeypatch.setattr(charts_cache, "parametrize", _refuse)
-    assert all(_same(one, other) for one, other in zip(first, charts_of(scene, other), strict=True))
+    assert all(_same(one, other) for one, other in zip(first, again, strict=True))
 
 
 @pytest.mark.parametrize("other", ["density", "sides", "moved", "roots", "sky", "camera within"])
