@@ -50,9 +50,10 @@ def charts_of(
     roots: bool = False,
     progress: Callable[[str, float], None] | None = None,
     waiting: Callable[[], None] | None = None,
+    cut: Callable[[Scene], None] | None = None,
 ) -> tuple[Scene, Charts]:
-    """The scene, cut where its surfaces meet, and its charts; see ``cut_at_contacts`` and ``parametrize``. waiting: is called
-    first where there are many triangles, whose charts are not kept."""
+    """The scene, cut where its surfaces meet, and its charts; see ``cut_at_contacts`` and ``parametrize``. Where there are many
+    triangles, whose charts are not kept, waiting is called first, and cut with the scene as soon as it is cut."""
     if len(scene.triangles) < FEWEST:
         return _made(scene, atlas, roots, progress)
     file = cache.entry("charts", cache.digest(program(), _given(scene, atlas, roots)))
@@ -60,17 +61,23 @@ def charts_of(
     if found is None:
         if waiting is not None:
             waiting()
-        found = _made(scene, atlas, roots, progress)
+        found = _made(scene, atlas, roots, progress, cut)
         if not found[1].warnings:
             cache.store(functools.partial(_content, scene, *found), file, CACHE_FILES)
     return found
 
 
 def _made(
-    scene: Scene, atlas: AtlasOptions, roots: bool, progress: Callable[[str, float], None] | None
+    scene: Scene,
+    atlas: AtlasOptions,
+    roots: bool,
+    progress: Callable[[str, float], None] | None,
+    tell: Callable[[Scene], None] | None = None,
 ) -> tuple[Scene, Charts]:
     report = progress or (lambda stage, share: None)
     cut = cut_at_contacts(scene, lambda share: report("cutting where surfaces meet", 0.15 * share))
+    if tell is not None:
+        tell(cut.scene)
     charts = parametrize(
         cut.scene,
         ends=cut.ends,

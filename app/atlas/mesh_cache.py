@@ -6,12 +6,13 @@ Its weights are in the file only for rows that are a part of a triangle; those o
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 
 from app.atlas.charts import Charts
 from app.atlas.charts_cache import program
-from app.atlas.visible_mesh import Clusters, VisibleMesh, visible_mesh
+from app.atlas.visible_mesh import Clusters, Drawn, VisibleMesh, visible_mesh
 from app.scene.model import F64, Scene
 from app.util import cache
 
@@ -21,16 +22,17 @@ CLUSTERS = "clusters_"  # before the names of what is theirs
 PARTS = "parts"  # the rows (k,) whose weights (k, 3, 3) are kept
 
 
-def kept_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
-    """That of ``visible_mesh``, from the cache if it is there."""
+def kept_mesh(scene: Scene, charts: Charts, local: F64, drawn: Callable[[], Drawn] | None = None) -> VisibleMesh:
+    """That of ``visible_mesh``, from the cache if it is there. drawn: gives what is drawn of the triangles, where that is being
+    worked out."""
     if len(scene.triangles) < FEWEST:
-        return visible_mesh(scene, charts, local)
+        return visible_mesh(scene, charts, local, None if drawn is None else drawn())
     own = {name: getattr(charts, name) for name in ("face_triangle", "face_back", "face_uv")}
     given = {"local": local, "triangles": scene.triangles, "materials": scene.material_ids, **own}
     file = cache.entry("mesh", cache.digest(program(), given))
     found = _read(cache.read(file))
     if found is None:
-        found = visible_mesh(scene, charts, local)
+        found = visible_mesh(scene, charts, local, None if drawn is None else drawn())
         cache.store(_content(found), file, CACHE_FILES)
     return found
 

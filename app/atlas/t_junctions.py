@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from app.atlas.sides import distinct_rows
+from app.atlas.sides import Edges, distinct_rows, runs
 from app.scene.model import F64
 
 ON_EDGE = 1e-6  # solver space: a corner no farther from an edge lies on it, to single precision
@@ -58,22 +58,31 @@ def at_corners(values: Floats, weights: F64 | None) -> Floats:
 def _corners_on_edges(points: F64, corners: Ints) -> tuple[Ints, Ints, Ints, F64]:
     """Which points lie on which edges: triangle, its edge from corner k to k + 1, point, share of the way there (q,) each."""
     start, end = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
-    first, kind, _ = distinct_rows(np.minimum(start, end), np.maximum(start, end))
-    low, high = np.minimum(start, end)[first], np.maximum(start, end)[first]
-    once = distinct_rows(*np.sort(corners, axis=1).T)[0]  # both sides of a sheet are one
-    rim = np.bincount(kind.reshape(-1, 3)[once].reshape(-1), minlength=len(first)) % 2 == 1
+    edges = Edges.of(corners.astype(np.int32))
+    one, uses = edges.order[edges.first[:-1]], edges.uses
+    low, high = np.minimum(start[one], end[one]), np.maximum(start[one], end[one])
+    again = edges.edge.reshape(-1, 3)[_there_again(corners, edges)]  # both sides of a sheet are one
+    rim = (uses - np.bincount(again.reshape(-1), minlength=len(uses))) % 2 == 1
     at_rim = np.unique(np.concatenate([low[rim], high[rim]]))
     used, rims, others = np.flatnonzero(np.bincount(start)), np.flatnonzero(rim), np.flatnonzero(~rim)
     found = [_on(points, low, high, rims, used), _on(points, low, high, others, at_rim)]
     on, node, share = (np.concatenate(column) for column in zip(*found, strict=True))
     # to each triangle that has the edge, whichever way
-    order = np.argsort(kind, kind="stable")
-    begin, uses = np.searchsorted(kind[order], on), np.bincount(kind, minlength=len(first))[on]
-    which = np.repeat(np.arange(len(on)), uses)
-    half = order[begin[which] + np.arange(len(which)) - np.repeat(np.cumsum(uses) - uses, uses)]
+    which, nth = runs(edges.first[on], edges.first[on + 1])
+    half = edges.order[nth]
     node, share = node[which], np.where(start[half] == low[on[which]], share[which], 1 - share[which])
     own = (corners[half // 3] == node[:, None]).any(1)  # a needle's tip
     return half[~own] // 3, half[~own] % 3, node[~own], share[~own]
+
+
+def _there_again(corners: Ints, edges: Edges) -> Ints:
+    """The triangles that have the same corners as one before."""
+    across = np.roll(corners, 1, axis=1).reshape(-1)[edges.order]  # of each half-edge
+    two = edges.first[:-1][edges.uses == 2]
+    two = two[across[two] == across[two + 1]]
+    many = np.flatnonzero(np.repeat(edges.uses > 2, edges.uses))
+    maybe = np.unique(edges.order[np.concatenate([two, two + 1, many])] // 3)
+    return np.delete(maybe, distinct_rows(*np.sort(corners[maybe], axis=1).T)[0])
 
 
 def _on(points: F64, low: Ints, high: Ints, edges: Ints, asked: Ints) -> tuple[Ints, Ints, F64]:
@@ -105,17 +114,22 @@ def _on(points: F64, low: Ints, high: Ints, edges: Ints, asked: Ints) -> tuple[I
 def _in_boxes(points: F64, low: Ints, high: Ints, edges: Ints, asked: Ints) -> tuple[Ints, Ints]:
     """The edges in whose boxes any of the points ``asked`` lies, or the points that lie in the box of any of the edges, whichever
     of both are more: compared with each of the few others."""
-    start, end, place = points[low[edges]], points[high[edges]], points[asked]
+    along = np.ascontiguousarray(points.T)
+    start, end, place = (along.take(of, axis=1) for of in (low[edges], high[edges], asked))
     least, most = np.minimum(start, end) - ON_EDGE, np.maximum(start, end) + ON_EDGE
     if len(edges) > len(asked):
-        near = np.zeros(len(edges), bool)
-        for point in place:
-            near |= ((point >= least) & (point <= most)).all(axis=1)
-        return edges[near], asked
-    near = np.zeros(len(asked), bool)
-    for lower, upper in zip(least, most, strict=True):
-        near |= ((place >= lower) & (place <= upper)).all(axis=1)
-    return edges, asked[near]
+        met = [_that_meet(least, most, point, point) for point in place.T]
+        return edges[np.unique(np.concatenate(met))], asked
+    met = [_that_meet(place, place, lower, upper) for lower, upper in zip(least.T, most.T, strict=True)]
+    return edges, asked[np.unique(np.concatenate(met))]
+
+
+def _that_meet(least: F64, most: F64, lower: F64, upper: F64) -> Ints:
+    """Which of the boxes from least to most, (3, n) each, meet the one from lower to upper (3,)."""
+    met = np.flatnonzero((least[0] <= upper[0]) & (most[0] >= lower[0]))
+    for k in (1, 2):
+        met = met[(least[k, met] <= upper[k]) & (most[k, met] >= lower[k])]
+    return met
 
 
 def _divided_once(

@@ -94,30 +94,49 @@ class VisibleMesh:
         return at_corners(values[self.triangle[rows]], None if self.weights is None else self.weights[rows])
 
 
-def visible_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:
-    """local (positions, 3): of the scene, solver space."""
-    divided, places = _divided(local, scene.triangles)
-    vertices, corners = _shared_vertices(scene, charts, places, divided)
-    count, weights = len(corners), divided.weights
-    if count < CLUSTERED:
-        return VisibleMesh(vertices, corners, divided.parent, weights, None)
-    points = places[divided.corners].astype(np.float64)
-    fixed = _overlaps_in_plane(points)
-    cluster = np.empty(count, np.int64)
-    for mine, order in ((fixed, np.arange(fixed.sum())), (~fixed, _morton_order(middle(points[~fixed])))):
-        cluster[np.flatnonzero(mine)[order]] = np.arange(len(order)) // CLUSTER
-    order = np.lexsort((cluster, ~fixed))  # stable: within a cluster in the scene's order
-    of, is_fixed = cluster[order], fixed[order]
-    first = np.flatnonzero(np.r_[True, (of[1:] != of[:-1]) | (is_fixed[1:] != is_fixed[:-1])])
-    clusters = Clusters(
-        lower=np.minimum.reduceat(least(points)[order], first),
-        upper=np.maximum.reduceat(most(points)[order], first),
-        first=np.r_[first, count],
-        fixed=int(is_fixed[first].sum()),
-    )
-    return VisibleMesh(
-        vertices, corners[order], divided.parent[order], None if weights is None else weights[order], clusters
-    )
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """What is drawn of a scene's triangles, wherever their texels are: they, or parts of them, with corners at points (p, 3), in
+    clusters where they are many, whose triangles are those of ``order`` one after another."""
+
+    triangles: Divided
+    points: F32
+    order: Ints | None
+    clusters: Clusters | None
+
+    @staticmethod
+    def of(local: F64, triangles: I32) -> Drawn:
+        """local (positions, 3): solver space; triangles (m, 3) of these."""
+        divided, places = _divided(local, triangles)
+        count = len(divided.corners)
+        if count < CLUSTERED:
+            return Drawn(divided, places, None, None)
+        points = places[divided.corners].astype(np.float64)
+        fixed = _overlaps_in_plane(points)
+        cluster = np.empty(count, np.int64)
+        for mine, order in ((fixed, np.arange(fixed.sum())), (~fixed, _morton_order(middle(points[~fixed])))):
+            cluster[np.flatnonzero(mine)[order]] = np.arange(len(order)) // CLUSTER
+        order = np.lexsort((cluster, ~fixed))  # stable: within a cluster in the scene's order
+        of, is_fixed = cluster[order], fixed[order]
+        first = np.flatnonzero(np.r_[True, (of[1:] != of[:-1]) | (is_fixed[1:] != is_fixed[:-1])])
+        clusters = Clusters(
+            lower=np.minimum.reduceat(least(points)[order], first),
+            upper=np.maximum.reduceat(most(points)[order], first),
+            first=np.r_[first, count],
+            fixed=int(is_fixed[first].sum()),
+        )
+        return Drawn(divided, places, order, clusters)
+
+
+def visible_mesh(scene: Scene, charts: Charts, local: F64, drawn: Drawn | None = None) -> VisibleMesh:
+    """local (positions, 3): of the scene, solver space; drawn: of these, if it is known."""
+    drawn = drawn or Drawn.of(local, scene.triangles)
+    divided, order, clusters = drawn.triangles, drawn.order, drawn.clusters
+    vertices, corners = _shared_vertices(scene, charts, drawn.points, divided)
+    parent, weights = divided.parent, divided.weights
+    if order is not None:
+        corners, parent, weights = corners[order], parent[order], None if weights is None else weights[order]
+    return VisibleMesh(vertices, corners, parent, weights, clusters)
 
 
 def coarse_mesh(scene: Scene, charts: Charts, local: F64) -> VisibleMesh:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +17,7 @@ from app.atlas.coarse import coarse_charts
 from app.atlas.mesh_cache import kept_mesh
 from app.atlas.options import MAX_TEXELS, AtlasOptions
 from app.atlas.parametrize import check, default_texels
-from app.atlas.visible_mesh import coarse_mesh
+from app.atlas.visible_mesh import Drawn, coarse_mesh
 from app.errors import UserError
 from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
@@ -24,7 +26,7 @@ from app.render.exposure import first_exposure
 from app.render.flat import FlatScene
 from app.render.seen import seen_texels
 from app.scene.load import load_scene
-from app.scene.model import Scene
+from app.scene.model import F64, Scene
 from app.scene.options import FileOptions
 from app.scene.sky import Sky
 from app.session.ray_tree import SORTING
@@ -63,11 +65,12 @@ def read_and_unfold(
     make: Callable[[Scene], Scene] | None = None,
     show: Callable[[FlatScene], None] | None = None,
     waiting: Callable[[Scene, Scene], None] | None = None,
+    cut: Callable[[Scene], None] | None = None,
 ) -> tuple[Scene, Scene, Charts, dict[str, float]]:
     """The scene as it was read, what ``make`` makes of it, cut where its surfaces meet, its charts, and the seconds of both
     stages. file: its unit and axes, guessed if None. roots: whether texels are the coarsest of quadtrees. show: is given what can
-    be drawn as soon as the scene is read; waiting: the scene as read and as made, where its charts will take a while. Raises
-    UserError (SceneError)."""
+    be drawn as soon as the scene is read; waiting: the scene as read and as made, where its charts will take a while, and cut:
+    the scene as cut, before these are there. Raises UserError (SceneError)."""
     start = time.perf_counter()
 
     def reading(share: float) -> None:
@@ -94,6 +97,7 @@ def read_and_unfold(
         roots=roots,
         progress=lambda stage, share: tell(stage, 0.1 + 0.5 * share),
         waiting=None if waiting is None else lambda: waiting(read, uncut),
+        cut=cut,
     )
     return read, scene, charts, seconds | {"unfold": time.perf_counter() - start}
 
@@ -120,8 +124,12 @@ def load(
     tell = _Telling(progress or (lambda stage, share: None))
     options = options or LightmapOptions()
     check(atlas.density, atlas.texels)
-    with ThreadPoolExecutor(1) as beside:
+    with ThreadPoolExecutor(1) as beside, _threads(1) as meanwhile:
         early: list[Future[Loaded | None]] = []
+        drawn: list[Future[Drawn]] = []
+
+        def drawing(scene: Scene) -> None:
+            drawn.append(meanwhile.submit(Drawn.of, _local(scene), scene.triangles))
 
         def waiting(read: Scene, scene: Scene) -> None:
             if coarse is not None and scene.emits and len(scene.triangles) >= COARSE_FROM:
@@ -138,6 +146,7 @@ def load(
             make=make,
             show=show,
             waiting=waiting,
+            cut=drawing,
         )
         shown = early[0].result() if early else None
     start = time.perf_counter()
@@ -146,7 +155,8 @@ def load(
         tell("cutting into texels", 0.6 + 0.2 * share)
 
     cutting(0.0)
-    pool, arrays, exposure = _in_texels(scene, charts, options, cutting, expose=expose and shown is None)
+    more: dict[str, Any] = {"expose": expose and shown is None, "drawn": drawn[0].result if drawn else None}
+    pool, arrays, exposure = _in_texels(scene, charts, options, cutting, **more)
     exposure = exposure if shown is None else shown.exposure
     seconds["texels"] = time.perf_counter() - start
     if rays:
@@ -201,15 +211,21 @@ def _show_coarse(
 
 
 def _in_texels(
-    scene: Scene, charts: Charts, options: LightmapOptions, report: Report, *, expose: bool, coarse: bool = False
+    scene: Scene,
+    charts: Charts,
+    options: LightmapOptions,
+    report: Report,
+    *,
+    expose: bool,
+    coarse: bool = False,
+    drawn: Callable[[], Drawn] | None = None,
 ) -> tuple[TilePool, dict[str, Array], float | None]:
     """A scene cut into texels, as it is uploaded, and with ``expose`` the exposure that its light will need [EV]. coarse: texels
-    that are not there for long, nothing of which is kept on disk."""
-    local = SolverSpace.of(scene).local_from_world(scene.positions)
+    that are not there for long, nothing of which is kept on disk. drawn: as of ``kept_mesh``."""
     exposure = None
-    beside = ThreadPoolExecutor(2)
-    try:
-        mesh = beside.submit(coarse_mesh if coarse else kept_mesh, scene, charts, local)
+    with _threads(2) as beside:
+        make_mesh = coarse_mesh if coarse else functools.partial(kept_mesh, drawn=drawn)
+        mesh = beside.submit(make_mesh, scene, charts, _local(scene))
         seams = beside.submit(lambda: charts.seam_texels)
         pool = quadtree_pool(scene, charts, report) if options.adaptive else TilePool(scene, charts, report=report)
         report(1.0)
@@ -221,8 +237,21 @@ def _in_texels(
             camera = scene.cameras[0]
             exposure = first_exposure(pool, seen_texels(pool, camera.world_from_camera, camera.yfov))
         return pool, arrays.result(), exposure
+
+
+def _local(scene: Scene) -> F64:
+    """Its positions in the solver space."""
+    return SolverSpace.of(scene).local_from_world(scene.positions)
+
+
+@contextlib.contextmanager
+def _threads(count: int) -> Iterator[ThreadPoolExecutor]:
+    """So many, for which who leaves does not wait: who cancels, least of all."""
+    threads = ThreadPoolExecutor(count)
+    try:
+        yield threads
     finally:
-        beside.shutdown(wait=False, cancel_futures=True)  # who cancels does not wait for them
+        threads.shutdown(wait=False, cancel_futures=True)
 
 
 class Loading(BackgroundTask[Loaded]):

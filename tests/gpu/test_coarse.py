@@ -47,10 +47,10 @@ def better(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[threadin
     """Better charts wait for this, but for a second at most once the test is over; coarse ones are made for any scene."""
     go_on, made = threading.Event(), charts_cache._made
 
-    def waiting(scene: Any, atlas: Any, roots: Any, progress: Any) -> Any:
+    def waiting(scene: Any, atlas: Any, roots: Any, progress: Any, *more: Any) -> Any:
         while not go_on.wait(0.01):
             progress("waiting", 0.1)
-        return made(scene, atlas, roots, progress)
+        return made(scene, atlas, roots, progress, *more)
 
     monkeypatch.setattr(charts_cache, "_made", waiting)
     monkeypatch.setattr(charts_cache, "FEWEST", 0)

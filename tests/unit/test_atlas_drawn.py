@@ -8,6 +8,8 @@ from atlas_scenes import TURN, moved, own_cache, scene_of, split_grid  # noqa: F
 
 import app.atlas.visible_mesh
 from app.atlas.parametrize import parametrize
+from app.atlas.sides import Edges
+from app.atlas.t_junctions import _there_again
 from app.atlas.visible_mesh import CLUSTER, VisibleMesh, visible_mesh
 from app.lightmap.tile_pool import SolverSpace
 from app.render.camera import CameraView
@@ -217,3 +219,13 @@ def test_clusters_are_small(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (count[:-1] == CLUSTER).all() and count.sum() == len(points)
     extent = np.prod(clusters.upper - clusters.lower, axis=1)
     assert np.median(extent) < 0.05 * np.prod(np.ptp(points.reshape(-1, 3), axis=0))
+
+
+def test_a_sheet_that_is_there_again_is_one() -> None:
+    quad = np.array([[0, 1, 2], [0, 2, 3]])
+    for there, again in (
+        (quad, 0),
+        (np.concatenate([quad, quad[:, ::-1]]), 2),
+        (np.concatenate([quad, quad[:1]] * 2), 4),
+    ):
+        assert len(_there_again(there, Edges.of(there.astype(np.int32)))) == again

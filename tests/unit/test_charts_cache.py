@@ -63,7 +63,7 @@ def test_what_is_kept_is_the_same_again(scene: Scene, monkeypatch: pytest.Monkey
     assert charts_of(scene.with_materials((Material("red", albedo=(1, 0, 0)), scene.materials[1])), ATLAS)
 
 
-def test_anATLAS_thread_may_write_them_meanwhile(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_thread_may_write_them_meanwhile(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     go, writers = threading.Event(), list[threading.Thread]()
     write = cache.write
 
