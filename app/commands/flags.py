@@ -147,7 +147,9 @@ def stop_flags(parser: Parser, family: Family) -> None:
     stop = parser.add_argument_group(f"stop (whichever comes first; --{family.threshold} is always on)")
     after = f"after N {family.unit}"
     stop.add_argument(f"--{family.unit}", dest="work", type=positive(int), metavar="N", help=after)
-    stop.add_argument("--time", type=positive(float), metavar="S", help="after S seconds of solving")
+    stop.add_argument(
+        "--time", type=positive(float), metavar="S", help="after S seconds of solving, or one piece of work"
+    )
     for flag, what in (("--error", "median of local errors"), ("--error-rms", "relative RMS")):
         help = f"once the expected error, the {what}, is P per cent"
         stop.add_argument(flag, type=positive(float), metavar="P", help=help)

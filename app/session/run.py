@@ -20,6 +20,7 @@ from app.scene.sky import Sky
 from app.session.energy import Effort, EnergyWatch
 from app.session.history import COLUMNS, History
 from app.session.pacing import Pacer
+from app.session.time_left import TimeLeft
 from app.solvers import EnergyBalance, Family, Progress, Solver
 from app.solvers.run import solve_until
 from app.util.interrupt import held_back
@@ -312,9 +313,12 @@ class Run:
         keeper: Keeper | None,
     ) -> None:
         told, ask_at, self.settled = start, 0.0, False
+        left = None if stop.seconds is None else TimeLeft(stop.seconds, self.family.grain)
 
         def over(_: Progress) -> bool:
             nonlocal told, ask_at
+            if left is not None and left.near:
+                self._gpu.ctx.finish()
             now = time.perf_counter()
             self.seconds = now - start
             self.poll(energy=False)
@@ -326,8 +330,10 @@ class Run:
             if tell and now - told > TELL_SECONDS:
                 told = now
                 tell()
-            if stop.seconds is not None and self.seconds >= stop.seconds:
-                return True
+            if left is not None:
+                left.piece(self.solver.issued, self.seconds)
+                if left.over:
+                    return True
             if self.converged:
                 self.progress = (
                     self.solver.settle()
@@ -338,10 +344,15 @@ class Run:
             self.settle()
             enough = good(ASK_SHARE * self.seconds)
             self.seconds = time.perf_counter() - start
+            if left is not None:
+                left.piece(self.solver.issued, self.seconds)
             ask_at, self.settled = ASK_AGAIN * self.seconds, False
             return enough
 
-        solve_until(self.solver, NO_LIMIT, over, most=stop.work)
+        def batch() -> int:
+            return NO_LIMIT if left is None else left.room(NO_LIMIT)
+
+        solve_until(self.solver, batch, over, most=stop.work)
 
     def _not_finite(self) -> NotFiniteError:
         return NotFiniteError(self._message(f"{self.progress.done} {self.family.unit}"))

@@ -11,6 +11,7 @@ from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.options import Options
 from app.solvers.base import HEMISPHERE, EnergyBalance, Inspection, Progress, Rays, Rect, Solver
+from app.solvers.gathering.hits import GROUP
 from app.solvers.gathering.inspectable import SEEN
 from app.solvers.gathering.options import GatheringOptions
 from app.solvers.gathering.solver import BATCH as RAYS
@@ -32,9 +33,9 @@ class Family:
     title: what the viewer calls it. options: the class of its options, each a flag and a widget. make: makes one for a
     lightmap, or raises UserError before it has touched the light there. unit: of its work, in the plural, as in ``--shots``.
     remains: what is left of what it has to do, as in "0.1 % unshot"; part_of: of what that is a share. batch: work that it does
-    at once when nothing waits for it. keeps_light: whether it can begin with light that another solver has left in the
-    lightmap; else it begins anew. threshold: the option that says how little may remain when it has converged. pictures:
-    captions of the images of its Inspection, and what they show.
+    at once when nothing waits for it; grain: it works in whole groups of so many. keeps_light: whether it can begin with light
+    that another solver has left in the lightmap; else it begins anew. threshold: the option that says how little may remain when
+    it has converged. pictures: captions of the images of its Inspection, and what they show.
     shows: options that change the light that is shown without any work. layers: names of what its solvers know of every texel.
     distributes: whether what remains is light that is still to be distributed, in the energy balance; else it is an error.
     per_error: how little may remain where an expected error is asked for, as a share of that.
@@ -53,6 +54,7 @@ class Family:
     remains: str
     batch: int
     threshold: str
+    grain: int = 1
     keeps_light: bool = False
     pictures: Mapping[str, str] = field(default_factory=dict)
     shows: tuple[str, ...] = ()
@@ -90,6 +92,7 @@ SOLVERS: dict[str, Family] = {
         unit="rays",
         remains="noise",
         batch=RAYS,
+        grain=GROUP,
         threshold="noise",
         shows=("smooth",),
         layers=("direct", "variance", "rays"),

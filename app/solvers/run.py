@@ -10,17 +10,17 @@ from app.util.parts import run_to_end
 
 
 def solve_until(
-    solver: Solver[Any], batch: int, over: Callable[[Progress], bool], *, most: int | None = None
+    solver: Solver[Any], batch: int | Callable[[], int], over: Callable[[Progress], bool], *, most: int | None = None
 ) -> Progress:
-    """Work, ``batch`` at a time, until ``over`` says so of the progress that has arrived; it is asked before each piece of work,
-    the first too. most: work in all, in the family's unit; what was issued and came to nothing is made up for. Returns the
-    progress that had arrived in the end: nothing waits for the GPU, unless ``most`` is reached."""
+    """Work, ``batch`` at a time or what it says then, until ``over`` says so of the progress that has arrived; it is asked before
+    each piece of work, the first too. most: work in all, in the family's unit; what was issued and came to nothing is made up
+    for. Returns the progress that had arrived in the end: nothing waits for the GPU, unless ``most`` is reached."""
     while not over(now := solver.poll()):
-        amount = batch
+        amount = batch if isinstance(batch, int) else batch()
         if most is not None:
             if solver.issued >= most:
                 now = solver.poll(wait=True)
-            amount = min(batch, most - solver.issued)
+            amount = min(amount, most - solver.issued)
             if amount <= 0:
                 break
         run_to_end(solver.work(amount))
