@@ -22,7 +22,7 @@ from app.atlas.sides import FLAT, Edges, distinct_rows, groups_of, runs
 from app.scene.model import F64, I32, Scene
 from app.util.background import Report
 
-MOST_PIECES = 4096  # that are parted, beyond which none is: each takes a millisecond
+MOST_PIECES = 8192  # that are parted, beyond which none is: each takes a millisecond
 THIN = 0.01  # width of a body that parts what it stands on along its middle: a texel's, of some 50,000 in a room
 LONG = 4  # its length, over that
 MOST_ENDS = 64  # of feet in one flat piece, that are drawn on: those of grass are not
