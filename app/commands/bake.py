@@ -175,7 +175,7 @@ def _checkpoint(session: Session, flags: argparse.Namespace, console: Console) -
             console.warn(f"{flags.output} has a bake that was not finished: this one begins anew, --resume goes on")
     elif checkpoint.resume():
         run = session.run
-        done = f"{run.progress.done} {session.family.unit}, {run.progress.remaining:.2%} {session.family.remains}"
+        done = f"{session.family.words(run.progress.done)}, {run.progress.remaining:.2%} {session.family.remains}"
         console.warn(f"goes on after {run.seconds:.0f} s: {done}")
     else:
         console.warn(f"{flags.output} has no bake to go on with: this one begins")

@@ -145,7 +145,7 @@ def json_flag(parser: Parser) -> None:
 
 def stop_flags(parser: Parser, family: Family) -> None:
     stop = parser.add_argument_group(f"stop (whichever comes first; --{family.threshold} is always on)")
-    after = f"after N {family.unit}"
+    after = f"after {family.words('N')}"
     stop.add_argument(f"--{family.unit}", dest="work", type=positive(int), metavar="N", help=after)
     stop.add_argument(
         "--time", type=positive(float), metavar="S", help="after S seconds of solving, or one piece of work"

@@ -98,7 +98,7 @@ def solve(
         if stats.note is not None and stats.note not in said:
             said.add(stats.note)
             console.warn(stats.note)
-        tell(f"{stats.done} {stats.unit}, {stats.remaining:.3%} {stats.remains}", session.run.share_done(stop))
+        tell(f"{session.family.words(stats.done)}, {stats.remaining:.3%} {stats.remains}", session.run.share_done(stop))
 
     with console.progress(session.family.title.lower()) as tell:
         try:

@@ -39,7 +39,7 @@ def solve(source: Path, target: Path) -> int:
         stop = Stop()
 
         def tell(stats: Stats) -> None:
-            done = f"{stats.done:,} {stats.unit}, {stats.remaining:.3%} {stats.remains}"
+            done = f"{session.family.words(stats.done)}, {stats.remaining:.3%} {stats.remains}"
             say(done, LOADING + (1 - LOADING) * session.run.share_done(stop))
 
         session.solve(stop, tell)

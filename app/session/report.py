@@ -113,6 +113,6 @@ def summary(session: Session, result: dict[str, Any]) -> str:
         compared += f", expected to be off by {expected['rms']:.1%} RMS and {expected['median']:.1%} in the median"
     state = "stopped early" if result["interrupted"] else "converged" if result["converged"] else "stopped as asked"
     return (
-        f"{stats.done} {stats.unit} in {stats.seconds:.1f} s, {stats.remaining:.2%} {stats.remains} ({state}), "
+        f"{session.family.words(stats.done)} in {stats.seconds:.1f} s, {stats.remaining:.2%} {stats.remains} ({state}), "
         f"{result['texels']} texels, energy imbalance {result['imbalance']:+z.2%}{compared}, {result['renderer']}"
     )

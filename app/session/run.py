@@ -355,4 +355,4 @@ class Run:
         solve_until(self.solver, batch, over, most=stop.work)
 
     def _not_finite(self) -> NotFiniteError:
-        return NotFiniteError(self._message(f"{self.progress.done} {self.family.unit}"))
+        return NotFiniteError(self._message(self.family.words(self.progress.done)))

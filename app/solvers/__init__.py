@@ -31,7 +31,8 @@ class Family:
     """A row of the table of solvers.
 
     title: what the viewer calls it. options: the class of its options, each a flag and a widget. make: makes one for a
-    lightmap, or raises UserError before it has touched the light there. unit: of its work, in the plural, as in ``--shots``.
+    lightmap, or raises UserError before it has touched the light there. unit: of its work, in the plural, as in ``--shots``;
+    each: what does so many, where that is not all, as in "56 rays a texel".
     remains: what is left of what it has to do, as in "0.1 % unshot"; part_of: of what that is a share. batch: work that it does
     at once when nothing waits for it; grain: it works in whole groups of so many. keeps_light: whether it can begin with light
     that another solver has left in the lightmap; else it begins anew. threshold: the option that says how little may remain when
@@ -54,6 +55,7 @@ class Family:
     remains: str
     batch: int
     threshold: str
+    each: str = ""
     grain: int = 1
     keeps_light: bool = False
     pictures: Mapping[str, str] = field(default_factory=dict)
@@ -67,6 +69,11 @@ class Family:
     for_coarse: Callable[[Gpu, Lightmap, Any], Solver[Any]] | None = None
     rays: bool = False
     everywhere: bool = True
+
+    def words(self, work: int | str) -> str:
+        """So much work: ``1 shot``, ``56 rays a texel``."""
+        count = work if isinstance(work, str) else f"{work:,}"
+        return f"{count} {self.unit.removesuffix('s') if work == 1 else self.unit}{self.each and f' a {self.each}'}"
 
 
 SOLVERS: dict[str, Family] = {
@@ -90,6 +97,7 @@ SOLVERS: dict[str, Family] = {
         options=GatheringOptions,
         make=Gathering,
         unit="rays",
+        each="texel",
         remains="noise",
         batch=RAYS,
         grain=GROUP,

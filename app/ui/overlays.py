@@ -139,9 +139,9 @@ def _status(view: View, state: State) -> list[tuple[str, theme.RGBA]]:
         if view.session.run.running
         else ("paused", theme.TEXT)
     )
-    parts = [f"{widgets.percent(stats.remaining)} {stats.remains}", f"{stats.done:,} {stats.unit}"]
+    parts = [f"{widgets.percent(stats.remaining)} {stats.remains}", view.session.family.words(stats.done)]
     if state.measured:
-        parts += [f"{widgets.number(stats.per_second, 3)} {stats.unit}/s"]
+        parts += [f"{widgets.number(stats.per_second, 3)}/s"]
     if state.measured and state.live:
         parts += [f"{state.fps:.0f} fps"]
     wrong = verdict_of(stats.imbalance, view.session.family, stats.remaining, coarse=view.session.coarse).level > 1

@@ -41,4 +41,19 @@ def test_an_even_balance_needs_no_word() -> None:
 def test_what_is_rounded_to_zero_has_no_minus(imbalance: float, words: str) -> None:
     stats = SimpleNamespace(done=1, unit="shots", seconds=0.0, remaining=0.0, remains="unshot")
     result = {"interrupted": False, "converged": True, "texels": 9, "imbalance": imbalance, "renderer": "none"}
-    assert f"energy imbalance {words}, none" in summary(cast(Any, SimpleNamespace(stats=stats)), result)
+    assert f"energy imbalance {words}, none" in summary(
+        cast(Any, SimpleNamespace(stats=stats, family=SOLVERS["shooting"])), result
+    )
+
+
+@pytest.mark.parametrize(
+    ("solver", "work", "words"),
+    [
+        ("shooting", 1, "1 shot"),
+        ("shooting", 1886, "1,886 shots"),
+        ("gathering", 56, "56 rays a texel"),
+        ("pairs", 1, "1 bounce"),
+    ],
+)
+def test_work_is_said_in_words(solver: str, work: int, words: str) -> None:
+    assert SOLVERS[solver].words(work) == words

@@ -67,7 +67,7 @@ def _choice(state: State, shown: str, choices: tuple[str, ...], *, one: bool) ->
             state.plot = choice
         imgui.same_line()
     if not one:
-        widgets.dim(f"{widgets.number(state.stats.per_second, 3)} {state.stats.unit}/s")
+        widgets.dim(f"{widgets.number(state.stats.per_second, 3)}/s")
     elif imgui.small_button("Energy" if state.plot_alone == "remaining" else state.stats.remains.capitalize()):
         state.plot_alone = next(plot for plot in PLOTS if plot != state.plot_alone)
 

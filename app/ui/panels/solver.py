@@ -95,12 +95,12 @@ def _progress(view: View, state: State, *, lit: bool) -> None:
     imgui.text_unformatted(f"converged, {left}" if stats.converged else left)
     rate = f", {widgets.number(stats.per_second, 3)}/s" if state.measured and not stats.converged else ""
     imgui.same_line()
-    widgets.right(f"{stats.done:,} {stats.unit}{rate}", theme.DIM)
+    widgets.right(f"{view.session.family.words(stats.done)}{rate}", theme.DIM)
     if stats.note is not None and not view.session.light.adaptive:
         widgets.one_line(plain(stats.note), theme.AMBER)
     elif stats.edit_work is not None:
         fresh = "" if stats.fresh_work is None else f", from nothing {stats.fresh_work:,}"
-        widgets.one_line(f"the edit: {stats.edit_work:,} {stats.unit}{fresh}", theme.DIM)
+        widgets.one_line(f"the edit: {view.session.family.words(stats.edit_work)}{fresh}", theme.DIM)
         widgets.tooltip("Only the difference that an edit makes is solved for, negative where light goes")
     elif stats.doing and not view.session.light.adaptive:
         widgets.one_line(stats.doing, theme.DIM)
