@@ -37,7 +37,8 @@ class Charts:
     chart_rects (c, 4) i32: x, y, width, height of each chart in whole texels.
     dark_faces: number of sides left out: nothing in the scene lies in front of them, or they are the inside of a closed body,
     see enclosed.py.
-    method: how the charts were made, e.g. ``12 rectangles, 932 xatlas charts``.
+    method: how the charts were made, e.g. ``12 rectangles, 932 xatlas charts``. lasting: whether another try would come to the
+    same: not where xatlas failed, which may have been for want of time.
     seams: edges across which a surface goes on in another chart.
     hidden_uv (k, 3, 2) f64, hidden_face (k,): pieces of faces that something lies on, no part of any texel, see contacts.py.
     """
@@ -54,6 +55,7 @@ class Charts:
     dark_faces: int
     method: str
     warnings: tuple[str, ...] = ()
+    lasting: bool = True
     seams: Seams = field(default_factory=Seams)
     hidden_uv: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3, 2)))
     hidden_face: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))

@@ -1,8 +1,8 @@
 """Charts of many triangles are kept on disk, with the triangles that were cut for them: reading takes a tenth of making them.
 
 They are known by all that they follow from: the scene's geometry, cameras that may be within closed bodies (see enclosed.py), how
-finely the scene is cut, and the program that does it. Those that come with warnings are not kept: a machine that was too busy for
-xatlas may not be the next time.
+finely the scene is cut, and the program that does it. Those of which xatlas failed to make some are not kept: a machine that was
+too busy for it may not be the next time.
 """
 
 from __future__ import annotations
@@ -56,15 +56,24 @@ def charts_of(
     triangles, whose charts are not kept, waiting is called first, and cut with the scene as soon as it is cut."""
     if len(scene.triangles) < FEWEST:
         return _made(scene, atlas, roots, progress)
-    file = cache.entry("charts", cache.digest(program(), _given(scene, atlas, roots)))
+    file = _file(scene, atlas, roots)
     found = _read(scene, cache.read(file))
     if found is None:
         if waiting is not None:
             waiting()
         found = _made(scene, atlas, roots, progress, cut)
-        if not found[1].warnings:
+        if found[1].lasting:
             cache.store(functools.partial(_content, scene, *found), file, CACHE_FILES)
     return found
+
+
+def kept_charts(scene: Scene, atlas: AtlasOptions, *, roots: bool) -> tuple[Scene, Charts] | None:
+    """The same where they are kept; else None."""
+    return None if len(scene.triangles) < FEWEST else _read(scene, cache.read(_file(scene, atlas, roots)))
+
+
+def _file(scene: Scene, atlas: AtlasOptions, roots: bool) -> Path:
+    return cache.entry("charts", cache.digest(program(), _given(scene, atlas, roots)))
 
 
 def _made(
@@ -111,6 +120,7 @@ def _content(scene: Scene, cut: Scene, charts: Charts) -> cache.Arrays:
     changed = {SCENE + name: getattr(cut, name) for name in GEOMETRY if getattr(cut, name) is not getattr(scene, name)}
     notes = {SCENE + "warnings": np.array(cut.warnings[len(scene.warnings) :], np.str_)}
     own = {field.name: getattr(charts, field.name) for field in dataclasses.fields(Charts) if field.name not in APART}
+    own["warnings"] = np.array(charts.warnings, np.str_)
     seams = {SEAMS + name: value for name, value in vars(charts.seams).items()}
     seams |= {NEAR + name: value for name, value in vars(charts.seam_texels).items()}
     return {name: np.asarray(value) for name, value in (own | seams | changed | notes).items()}
@@ -123,7 +133,11 @@ def _read(scene: Scene, data: cache.Arrays | None) -> tuple[Scene, Charts] | Non
     changed, seams, near = (_named(data, prefix) for prefix in (SCENE, SEAMS, NEAR))
     warnings = (*scene.warnings, *map(str, changed.pop("warnings")))
     own = {name: _plain(array) for name, array in data.items() if not name.startswith((SCENE, SEAMS, NEAR))}
-    own |= {"size": tuple(data["size"].tolist()), "seams": Seams(**seams)}
+    own |= {
+        "size": tuple(data["size"].tolist()),
+        "seams": Seams(**seams),
+        "warnings": tuple(map(str, data["warnings"])),
+    }
     charts = Charts(**own)
     charts.__dict__["seam_texels"] = SeamTexels(**near)  # as if they had been asked for
     return dataclasses.replace(scene, **changed, warnings=warnings), charts  # type: ignore[arg-type]  # names are not known

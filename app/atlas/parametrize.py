@@ -9,6 +9,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,6 +121,7 @@ def parametrize(
         )
         report("joining edges of pieces", 0.95)
         seams = joins.result()
+    lasting = not warnings  # these are of xatlas
     if hidden.left_out:
         soup = (
             f"{hidden.left_out} sides share a plane with thousands of loose pieces: what stands there leaves dark feet"
@@ -127,7 +129,8 @@ def parametrize(
         warnings = (*warnings, soup)
     if not roots:
         warnings += _too_small(layout, density)
-    return dataclasses.replace(charts, warnings=warnings, seams=seams, hidden_uv=hidden.uv, hidden_face=hidden.face)
+    notes: dict[str, Any] = {"warnings": warnings, "lasting": lasting}
+    return dataclasses.replace(charts, seams=seams, hidden_uv=hidden.uv, hidden_face=hidden.face, **notes)
 
 
 def _too_small(layout: Layout, density: float) -> tuple[str, ...]:

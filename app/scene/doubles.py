@@ -16,6 +16,7 @@ HASH = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np
 # Of a triangle's corners, 9 a + 3 b + c: it winds the other way.
 ODD_ORDERS = 0 * 9 + 2 * 3 + 1, 1 * 9 + 0 * 3 + 2, 2 * 9 + 1 * 3 + 0
 BOTH = 2  # in place of a front
+SAME, TWICE = " (same corners and material)", ": light would be counted twice there"
 WINS = ": what emits stays before what has two sides, and that before what is listed first"
 
 Array = NDArray[Any]
@@ -53,13 +54,13 @@ def doubles(
     hidden |= lit[place, :BOTH].all(axis=1) & ~emits
     hidden |= there[place, BOTH] & ~emits & (front != BOTH)
     again[alike[order[hidden]]] = True
-    for count, what, which in (
-        (listed, "listed before", ""),
-        (int(again.sum()) - listed, "in the place of one of another material", WINS),
-    ):
-        if count:
-            verb = "was" if count == 1 else "were"
-            notes.append(f"{counted(count, 'triangle', 'triangles')} {what} {verb} dropped{which}")
+    if listed:
+        verb, were = ("repeats", "was") if listed == 1 else ("repeat", "were")
+        notes.append(f"{counted(listed, 'triangle', 'triangles')} {verb} others{SAME} and {were} left out{TWICE}")
+    if others := int(again.sum()) - listed:
+        verb = "was" if others == 1 else "were"
+        what = "in the place of one of another material"
+        notes.append(f"{counted(others, 'triangle', 'triangles')} {what} {verb} dropped{WINS}")
     return again
 
 

@@ -53,21 +53,23 @@ class _Reader:
 
     def warnings(self, used: list[GltfMaterial]) -> list[str]:
         images = self.file.document.images
-        missing = [
-            (images[i].uri if (images[i].uri or "data:")[:5] != "data:" else None) or images[i].name or f"image {i}"
-            for i, pixels in self._pixels.items()
-            if pixels is None
-        ]
+        missing, broken = list[str](), list[str]()
+        for i, pixels in self._pixels.items():
+            if pixels is None:
+                file = images[i].uri if (images[i].uri or "data:")[:5] != "data:" else None
+                lost = missing if file and image_data(self.file, images[i]) is None else broken
+                lost.append(file or images[i].name or f"image {i}")
         unlit = sum(m.extensions.unlit is not None for m in used)
         notes = [
             (self._without_picture, "texture", "textures", "without a picture that can be read: ignored"),
             (self._far_texcoords, "texture", "textures", "with TEXCOORD_2 or higher: ignored"),
             (unlit, "unlit material", "unlit materials", "treated as diffuse"),
         ]
-        lost = (
-            [f"{without_pictures(missing)}: the material's factor is used, or albedo 0.5 without it"] if missing else []
-        )
-        return lost + [f"{counted(n, one, many)} {text}" for n, one, many, text in notes if n]
+        said = [f"{counted(n, one, many)} {text}" for n, one, many, text in notes if n]
+        if missing or broken:
+            instead = "the material's factor is used, or albedo 0.5 without it"
+            said.insert(0, f"{without_pictures(missing, broken)}: {instead}")
+        return said
 
     def material(self, index: int, source: GltfMaterial) -> Material:
         rough, gloss = source.pbr_metallic_roughness, source.extensions.specular_glossiness

@@ -28,10 +28,16 @@ class ImageError(ValueError):
     """A picture that is missing, broken or too large; the caller counts it and goes on without."""
 
 
-def without_pictures(names: Sequence[str]) -> str:
-    """That these could not be read, for a note."""
-    shown = ", ".join(f"'{name}'" for name in names[:NAMES_SHOWN]) + (", ..." if len(names) > NAMES_SHOWN else "")
-    return f"{counted(len(names), 'picture', 'pictures')} could not be read ({shown})"
+def without_pictures(missing: Sequence[str], broken: Sequence[str]) -> str:
+    """That these are not there, and those could not be read, for a note."""
+    said = []
+    for names, what in (
+        (missing, f"{'is' if len(missing) == 1 else 'are'} missing in the scene's folder"),
+        (broken, "could not be read"),
+    ):
+        shown = ", ".join(f"'{name}'" for name in names[:NAMES_SHOWN]) + (", ..." if len(names) > NAMES_SHOWN else "")
+        said += [f"{counted(len(names), 'picture', 'pictures')} {what} ({shown})"] if names else []
+    return ", ".join(said)
 
 
 def linear_from_srgb(srgb: F32) -> F32:

@@ -39,11 +39,13 @@ Lines = dict[str, str]  # of one material, by lower-case key
 
 @dataclass(frozen=True)
 class _Pictures:
-    """Those of all maps inside ``root``: each that was read, as colours or as opacity, and the maps of each that is lost."""
+    """Those of all maps inside ``root``: each that was read, as colours or as opacity; the maps of each that is lost; which of
+    these is missing."""
 
     root: Path
     read: dict[tuple[Path, bool], F32 | None] = field(default_factory=dict)
     lost: dict[str, set[str]] = field(default_factory=dict)
+    missing: set[str] = field(default_factory=set)
 
     def of(self, folder: Path, key: str, file: str) -> F32 | None:
         """The one of a map line in a library in ``folder``; None if there is none to read, which is noted."""
@@ -53,12 +55,15 @@ class _Pictures:
         pixels = None if found is None else self.read[found, opacity]
         if pixels is None:
             self.lost.setdefault(file, set()).add(key)
+        if found is None:
+            self.missing.add(file)
         return pixels
 
     def notes(self) -> list[str]:
         """Which are lost, and what is used instead."""
         instead = "; ".join(text for key, text in INSTEAD.items() if any(key in keys for keys in self.lost.values()))
-        return [f"{without_pictures(list(self.lost))}: {instead}"] if self.lost else []
+        missing, broken = ([file for file in self.lost if (file in self.missing) == kind] for kind in (True, False))
+        return [f"{without_pictures(missing, broken)}: {instead}"] if self.lost else []
 
 
 def read_materials(

@@ -8,12 +8,19 @@ and gathering, brought down what was too much (12.5 % to 6.5, 3.7 and 0.05 %), m
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from app.atlas.charts import Charts
 from app.options import specs
 from app.solvers import Family
 
 FINE, TOO_MUCH = 0.005, 0.02  # of the emitted power
+# Pixels: 10,000 boxes that are two wide lose 7 % of the sky's light, and those that are eight wide 1 %
+FEW, SMALL = 8, 0.1
+MOST = 2048  # that the option allows
 
 
 @dataclass(frozen=True)
@@ -24,21 +31,34 @@ class Verdict:
     text: str | None = None
 
 
-def verdict_of(imbalance: float, family: Family, remaining: float = 0.0, *, coarse: bool = False) -> Verdict:
+def verdict_of(
+    imbalance: float, family: Family, remaining: float = 0.0, *, coarse: bool = False, finer: int | None = None
+) -> Verdict:
     """imbalance: of the emitted power, above 0 where light is lost. family: of the solver. remaining: what is noise or missing
     in a solution that goes on: where no light is shot, it is in the imbalance, of which less says nothing yet. coarse: in
-    texels that better ones are about to replace, of which there is nothing to do about it."""
+    texels that better ones are about to replace, of which there is nothing to do about it. finer: see ``finer_maps``."""
     if abs(imbalance) < FINE:
         return Verdict(0)
     if coarse or (not family.distributes and abs(imbalance) < remaining):
         return Verdict(1)
     what = "is lost" if imbalance > 0 else "comes from nothing"
     return Verdict(
-        2 if abs(imbalance) >= TOO_MUCH else 1, f"{abs(imbalance):.1%} of the light {what}: {_remedy(family)}"
+        2 if abs(imbalance) >= TOO_MUCH else 1, f"{abs(imbalance):.1%} of the light {what}: {_remedy(family, finer)}"
     )
 
 
-def _remedy(family: Family) -> str:
+def finer_maps(charts: Charts, across: float, resolution: int) -> int | None:
+    """The resolution of maps in which no tenth of the area is on charts that are less than FEW pixels wide; None where that is so
+    already. Maps of light from outside are twice as wide. across: what they show [m]."""
+    size = charts.chart_rects[:, 2:] / charts.density
+    width, area = size.min(axis=1), size.prod(axis=1)
+    order = np.argsort(width)
+    least = float(width[order[np.searchsorted(np.cumsum(area[order]), SMALL * area.sum())]])
+    needed = math.ceil(FEW * across / (2 * least))
+    return None if needed <= resolution else min(1 << (needed - 1).bit_length(), MOST)
+
+
+def _remedy(family: Family, finer: int | None) -> str:
     """Why light is lost or comes from nothing, and what would do."""
     if not family.everywhere:
         return "what is far from the observer is known coarsely, or as a mean; --solver gathering lights all of it"
@@ -48,7 +68,8 @@ def _remedy(family: Family) -> str:
     elif "level" in {spec.name for spec in specs(family.options)}:
         why, smaller = f"patches and {why}", "--density, --level"
     other = " or --solver gathering" if family.distributes else ""
-    return f"{why} large beside what stands between them; smaller ones ({smaller}){other} would do"
+    pixels = "" if finer is None else f", finer maps (--resolution {finer})"
+    return f"{why} large beside what stands between them; smaller ones ({smaller}){pixels}{other} would do"
 
 
-__all__ = ["FINE", "TOO_MUCH", "Verdict", "verdict_of"]
+__all__ = ["FINE", "TOO_MUCH", "Verdict", "finer_maps", "verdict_of"]

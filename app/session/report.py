@@ -96,7 +96,8 @@ def _error(session: Session) -> dict[str, Any]:
 
 def notes(session: Session) -> list[str]:
     """What the solver has to say of the solution, and what its energy balance says of it."""
-    note, verdict = session.run.progress.note, verdict_of(session.stats.imbalance, session.family)
+    note = session.run.progress.note
+    verdict = verdict_of(session.stats.imbalance, session.family, finer=session.finer_maps)
     found = [] if note is None else [note]
     if verdict.text is not None and verdict.level > 1:
         found.append(verdict.text)

@@ -13,6 +13,7 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
 from app.options import Options
 from app.scene.model import Material, Scene
+from app.session.balance import finer_maps
 from app.session.compared import Compared
 from app.session.error_estimate import SECONDS, RunningEstimate
 from app.session.run import Keeper, Run, Stop
@@ -180,6 +181,15 @@ class SolvedScene:
         """All that the light depends on: another one where the light is another."""
         shown = tuple(getattr(self.solver.options, name) for name in self.family.shows)
         return self.solver.issued, self.lightmap.version, self.edited_scene, shown
+
+    @property
+    def finer_maps(self) -> int | None:
+        """The resolution that maps of light from outside would need, where they are coarse for what it falls on."""
+        resolution = self.solver.resolved.get("resolution")
+        beyond = self.scene.lit_by_sky or any(light.from_afar for light in self.scene.lights_and_sun)
+        if resolution is None or not beyond or not self.family.distributes:
+            return None
+        return finer_maps(self.charts, 2 * self.lightmap.space.scale, resolution)
 
     # -- what is known -------------------------------------------------------------------------------------------------
 

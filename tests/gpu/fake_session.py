@@ -103,7 +103,7 @@ class FakeSession:
     def __init__(self, *, opened: bool = True, gpu: Gpu | None = None) -> None:
         self.gpu, self.opened, self.running, self.name, self.message = gpu, opened, True, "fake box", None
         self.loading: SimpleNamespace | None = None
-        self.coarse, self.state = False, "of this light"
+        self.coarse, self.state, self.finer_maps = False, "of this light", None
         self.seconds = 0.3  # of solving
         self.surfaces, self.fixed = Surfaces(), None
         self.calls: list[tuple[object, ...]] = []

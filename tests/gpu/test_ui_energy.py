@@ -67,7 +67,8 @@ def test_window_and_report_say_the_same(desk: Desk, monkeypatch: pytest.MonkeyPa
     desk.session.imbalance = 0.13
     desk.frames()
     run = SimpleNamespace(progress=SimpleNamespace(note=None))
-    (note,) = notes(SimpleNamespace(family=desk.session.family, stats=SimpleNamespace(imbalance=0.13), run=run))  # type: ignore[arg-type]
+    stats, family = SimpleNamespace(imbalance=0.13), desk.session.family
+    (note,) = notes(SimpleNamespace(family=family, stats=stats, run=run, finer_maps=None))  # type: ignore[arg-type]
     assert plain(note) in said and note.startswith("13.0% of the light is lost: ")
     assert "--" in note and not any("--" in text for text in said)
     assert "Gathering" in plain(note) and "Density" in plain(note)

@@ -6,6 +6,7 @@ import dataclasses
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import platformdirs
@@ -14,7 +15,7 @@ from atlas_scenes import box_room, own_cache, scene_of
 
 from app.atlas import charts_cache
 from app.atlas.charts import Charts
-from app.atlas.charts_cache import charts_of
+from app.atlas.charts_cache import charts_of, kept_charts
 from app.atlas.options import AtlasOptions
 from app.atlas.seams import Seams, SeamTexels
 from app.scene import shapes
@@ -110,6 +111,23 @@ def test_a_camera_outside_may_go_elsewhere(scene: Scene, monkeypatch: pytest.Mon
     first = charts_of(dataclasses.replace(scene, cameras=(camera_at(0, 0, 9),)), ATLAS)
     monkeypatch.setattr(charts_cache, "parametrize", _refuse)
     assert _same(charts_of(dataclasses.replace(scene, cameras=(camera_at(0, 0, 8),)), ATLAS)[1], first[1])
+
+
+@pytest.mark.parametrize("lasting", [True, False])
+def test_notes_are_kept_with_charts_unless_another_try_may_do_without(
+    lasting: bool, scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = charts_cache.parametrize
+
+    def noted(*given: Any, **options: Any) -> Charts:
+        return dataclasses.replace(made(*given, **options), warnings=("small",), lasting=lasting)
+
+    monkeypatch.setattr(charts_cache, "parametrize", noted)
+    with cache.elsewhere(tmp_path):
+        first = charts_of(scene, ATLAS)
+        kept = kept_charts(scene, ATLAS, roots=False)
+    assert (kept is not None) == lasting and first[1].warnings == ("small",)
+    assert kept is None or _same(kept[1], first[1])
 
 
 def test_a_damaged_file_is_made_again(scene: Scene) -> None:

@@ -10,10 +10,13 @@ from cli_folder import folder, json_of
 from scene_files import Gltf
 
 import app.commands.info as info_module
+from app.atlas import charts_cache
+from app.atlas.options import AtlasOptions
 from app.cli import run
 from app.scene import shapes
 from app.scene.gltf import outline_gltf
 from app.scene.load import load_scene
+from app.util import cache
 
 __all__ = ["folder"]
 
@@ -135,3 +138,21 @@ def test_doctor_names_packages_that_are_missing(
     assert run(["doctor"]) == 2
     assert "missing package no-such-package: " in (out := capsys.readouterr().out)
     assert out.rstrip().endswith("-m pip install no-such-package")
+
+
+def test_info_of_a_large_scene_says_what_cutting_found_where_that_is_kept(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A carpet in the plane of the floor: it is cut out of that."""
+    monkeypatch.setattr(info_module, "COUNTED", 1)
+    monkeypatch.setattr(charts_cache, "FEWEST", 1)
+    squares = ("-2 0 -2", "-2 0 2", "2 0 2", "2 0 -2"), ("-1 0 -1", "-1 0 1", "1 0 1", "1 0 -1")
+    lines = [f"v {corner}" for square in squares for corner in square] + ["f 1 2 3 4", "usemtl carpet", "f 5 6 7 8"]
+    Path("room.obj").write_text("\n".join(lines))
+    line = ["info", "room.obj", "--light", "--unit", "m", "--up", "y", "--texels", "500", "--json"]
+    with cache.elsewhere(folder):
+        told = json_of(capsys, line)
+        assert "overlap" in told["not_looked_for"] and not any("same plane" in note for note in told["warnings"])
+        charts_cache.charts_of(load_scene("room.obj", default_light=True), AtlasOptions(texels=500))
+        told = json_of(capsys, line)
+    assert "not_looked_for" not in told and any("same plane" in note for note in told["warnings"])

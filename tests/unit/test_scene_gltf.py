@@ -195,7 +195,7 @@ def test_picture_in_a_file_beside_and_never_outside(tmp_path: Path) -> None:
         gltf.json["images"] = [{"uri": uri}]
         scene = load(folder, gltf.glb())
         assert (scene.materials[0].albedo_texture is not None) == readable
-        assert any(f"1 picture could not be read ('{uri}')" in w for w in scene.warnings) != readable
+        assert any(f"1 picture is missing in the scene's folder ('{uri}')" in w for w in scene.warnings) != readable
         gltf.json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = [1, 1, 1, 1]  # stands for the picture
         assert load(folder, gltf.glb()).materials[0].albedo[1] == (1.0 if readable else 0.5)
 

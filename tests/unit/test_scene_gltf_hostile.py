@@ -58,8 +58,8 @@ def merge(path: str, value: Any) -> Callable[[Gltf], None]:
 
 
 REPAIRED: dict[str, tuple[Callable[[Gltf], None], str]] = {
-    "missing picture": (merge("images.0", {"uri": "none.png"}), "1 picture could not be read"),
-    "missing picture, no factor": (drop_factor, "1 picture could not be read"),
+    "missing picture": (merge("images.0", {"uri": "none.png"}), "1 picture is missing"),
+    "missing picture, no factor": (drop_factor, "1 picture is missing"),
     "broken picture": (merge("images.0.bufferView", 0), "1 picture could not be read"),
     "no picture": (merge("textures.0", {}), "1 texture without a picture"),
     "far coordinates": (merge("materials.0.emissiveTexture", {"index": 0, "texCoord": 2}), "TEXCOORD_2"),

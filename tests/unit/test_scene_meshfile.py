@@ -78,7 +78,7 @@ def test_obj_without_its_pictures(tmp_path: Path) -> None:
     scene = load(tmp_path, OBJ)
     assert [m.albedo for m in scene.materials] == [(0.2, 0.2, 0.2), (0.5, 0.5, 0.5)]
     assert scene.warnings == (
-        "2 pictures could not be read ('a.png', '../b.png'): Kd is used, or albedo 0.5 without it",
+        "2 pictures are missing in the scene's folder ('a.png', '../b.png'): Kd is used, or albedo 0.5 without it",
     )
 
 
@@ -91,14 +91,15 @@ def test_a_picture_of_several_maps_is_read_once_and_missed_once(
     written(tmp_path, "a.png", png([[[188, 188, 188]]]))
     read = Mock(wraps=read_image)
     monkeypatch.setattr("app.scene.mtl.read_image", read)
-    assert (
-        load(tmp_path, OBJ).warnings[0] == "1 picture could not be read ('b.png'): Ke is used, or no light without it"
-    )
+    missing = "1 picture is missing in the scene's folder ('b.png')"
+    assert load(tmp_path, OBJ).warnings[0] == f"{missing}: Ke is used, or no light without it"
     assert read.call_count == 1
     written(tmp_path, "room.mtl", library.split("newmtl paint")[0])
     (tmp_path / "a.png").unlink()
     instead = "Kd is used, or albedo 0.5 without it; Ke is used, or no light without it; "
     instead += "d or Tr is used, or opacity 1 without them"
+    assert f"{missing.replace('b', 'a')}: {instead}" in load(tmp_path, OBJ).warnings
+    written(tmp_path, "a.png", b"no picture")
     assert f"1 picture could not be read ('a.png'): {instead}" in load(tmp_path, OBJ).warnings
 
 
@@ -253,7 +254,7 @@ def test_pictures_are_found_however_they_are_named(tmp_path: Path, file: str) ->
     (tmp_path / place / "paint.png").unlink()
     (tmp_path / place / "#1.png").unlink()
     (note,) = load(tmp_path, text).warnings
-    assert note.startswith("1 picture could not be read ('") and file.strip('"') in note
+    assert note.startswith("1 picture is missing in the scene's folder ('") and file.strip('"') in note
 
 
 # A square of 4 m² in the plane y = 0, a concave polygon of 5 corners and 10 m², and a triangle of 2 m²

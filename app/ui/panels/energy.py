@@ -88,7 +88,9 @@ def _flux(power: F64, view: View) -> float:
 
 def _imbalance(view: View, stats: Stats) -> None:
     """What is nowhere, or came from nowhere; how bad that is, and what to do."""
-    verdict = verdict_of(stats.imbalance, view.session.family, stats.remaining, coarse=view.session.coarse)
+    session = view.session
+    coarse, finer = session.coarse, session.finer_maps
+    verdict = verdict_of(stats.imbalance, session.family, stats.remaining, coarse=coarse, finer=finer)
     icon, colour = LEVELS[verdict.level]
     imgui.text_colored(imgui.ImVec4(*colour), f"{icon} Imbalance")
     _explain()
