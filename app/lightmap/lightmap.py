@@ -116,11 +116,14 @@ class Lightmap(LightTextures):
         return H + self.ambient(whole=whole) if ambient else H
 
     def ambient(self, *, whole: bool = True) -> F32:
-        """a of every tile (tiles, t, t, 3) f32 [W/m²], or of all (3,). Waits for the GPU."""
+        """a of every tile (tiles, t, t, 3) f32 [W/m²]. Waits for the GPU."""
         self.refresh_ambient(whole=whole)
         texture = self._textures["t_ambient"]
-        if texture.size != self.size:
-            return np.frombuffer(texture.read(), np.float32)[:3] * np.float32(self.unit)
+        if not self.ambient_of_each:  # as common/even_ambient.glsl
+            H = self.light_of(self._textures["t_irradiance"])
+            alike, over, most = np.frombuffer(texture.read(), np.float32).reshape(3, 4)[:, :3]
+            alike, most = alike * np.float32(self.unit), most * np.float32(self.unit)
+            return np.asarray(np.maximum(alike + np.clip(over * H, -most, most), -np.abs(H)), np.float32)
         a = self._tiles_of(texture)
         if whole:
             return a[..., :3]

@@ -6,8 +6,8 @@ Tile pool textures hold the leaf tiles of t×t texels side by side [Coombe03, 4.
     t_normal_ids     RG32UI   unit normal (octahedral, 2×snorm16), facet << MATERIAL_BITS | material (facet from 1)
     t_irradiance     storage  H [W/m²]: light received so far, so that radiosity B = E + ρH at any ρ, also 0
     t_residual       storage  r [W/m²]: exitance that is still pending, where a solver has such a term: not yet shot
-    t_ambient        RGBA32F  a: what the rest of the solve will about add to H, and pictures and bakes show with it; one texel
-                              for all, unless a solver knows it of each
+    t_ambient        RGBA32F  a: what the rest of the solve will about add to H, and pictures and bakes show with it; an even one
+                              of 3×1 for all, see common/even_ambient.glsl, unless it is known of each
     t_albedo, t_emission      only where a material has such a texture: the factor is in the material table
 
 and tables: t_pages and t_leaves (where a place of the virtual atlas is in the tile pool, and what its slots hold), t_facets,
@@ -33,6 +33,8 @@ from app.scene.sky import Sky
 
 LOOKED_AT = 8192  # texels, to find what lamps without area give at most
 LIGHT = ("t_irradiance", "t_residual")
+EVEN_AMBIENT = (3, 1)  # size of an ambient term for all texels
+FORESEEN_EDGE = 4
 QUAD_FORMAT = {"in_rect": "4f", "in_from": "2f"}  # see common/rects.vert.glsl
 BYTES = {"f4": 4, "u4": 4, "f2": 2, "f1": 1}
 
@@ -41,7 +43,9 @@ class LightTextures:
     """The textures, and targets that draw into them.
 
     columns, rows: of the tile pool in tiles; size: in texels; unit: W/m² per stored unit of H and r; version: counts changes of
-    the leaves. ambient_of: of a solver that makes an ambient term, see ``refresh_ambient``.
+    the leaves; ambients: counts ambient terms that took the place of quite another one, of all texels at once. ambient_of: of a
+    solver that makes an ambient term, see ``refresh_ambient``; foresee: shows the irradiance of each block of FORESEEN_EDGE
+    texels along an edge [stored units], a texture, as what is to come until that solver knows better.
     """
 
     def __init__(self, gpu: Gpu, pool: TilePool, storage: str, textures: Mapping[str, Texture] | None) -> None:
@@ -50,10 +54,11 @@ class LightTextures:
         self.space: SolverSpace = pool.space
         self._textures = dict(textures or {name: upload(gpu, array) for name, array in pool.arrays.items()})
         self._emit = Pass(gpu, "lightmap/emit", defines=self.defines("MATERIAL_BITS", "EMISSION_TEXTURE"))
-        self._textures["t_ambient"] = gpu.texture((1, 1), 4, "f4")
+        self._textures["t_ambient"] = gpu.texture(EVEN_AMBIENT, 4, "f4")
         self.ambient_target = gpu.target(self._textures["t_ambient"])
         self.ambient_of: Callable[[bool, bool], None] | None = None
-        self.version = 0
+        self.foresee: Callable[[Texture], None] | None = None
+        self.version = self.ambients = 0
         self._targets: list[Framebuffer] = []
         self.set_storage(storage)
 
@@ -83,14 +88,29 @@ class LightTextures:
         if self.ambient_of is not None:
             self.ambient_of(whole, wait)
 
-    def hold_ambient(self) -> None:
-        """Have an ambient term of each texel from now on, none yet. Raises GpuError; that of before stays then."""
-        if self._textures["t_ambient"].size != self.size:
-            texture = self.gpu.texture(self.size, 4, "f4")
-            target = self.gpu.target(texture)
-            self.gpu.release_all(self.ambient_target, self._textures["t_ambient"])
-            self._textures["t_ambient"], self.ambient_target = texture, target
-            target.clear()
+    def hold_ambient(self, *, of_each: bool = True) -> None:
+        """Have an ambient term of each texel from now on, or an even one: none yet where it was the other. Raises GpuError; that
+        of before stays then."""
+        if of_each != self.ambient_of_each:
+            self.take_ambient(*self.make_ambient(of_each=of_each))
+
+    def make_ambient(self, *, of_each: bool = True) -> tuple[Texture, Framebuffer]:
+        """An ambient term to be taken later, none yet. Raises GpuError."""
+        texture = self.gpu.texture(self.size if of_each else EVEN_AMBIENT, 4, "f4")
+        target = self.gpu.target(texture)
+        target.clear()
+        return texture, target
+
+    def take_ambient(self, texture: Texture, target: Framebuffer) -> None:
+        """Have this ambient term from now on, the lightmap's own, in place of quite another one."""
+        self.gpu.release_all(self.ambient_target, self._textures["t_ambient"])
+        self._textures["t_ambient"], self.ambient_target = texture, target
+        self.ambients += 1
+
+    @property
+    def ambient_of_each(self) -> bool:
+        """Whether the ambient term is one of each texel."""
+        return self._textures["t_ambient"].size != EVEN_AMBIENT
 
     @property
     def light_target(self) -> Framebuffer:
@@ -194,7 +214,7 @@ class LightTextures:
     def resize(self, moves: Moves) -> None:
         """Take over a tile pool that has got another number of slots. The light goes with its leaves."""
         self.gpu.release_all(*self._targets)
-        of_each = self._textures["t_ambient"].size != (1, 1)
+        of_each = self.ambient_of_each
         for name in (*self.pool.tile_arrays(np.empty(0, np.int64)), *LIGHT, *(["t_ambient"] if of_each else [])):
             self._textures[name] = self.moved(self._textures[name], moves)
         self._make_targets()

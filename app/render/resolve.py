@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from app.gpu import Framebuffer, Gpu, Mesh, Pass, Texture
 from app.gpu.shader import FULLSCREEN
 from app.lightmap.lightmap import Lightmap
-from app.lightmap.textures import QUAD_FORMAT, quads, upload, write_pages
+from app.lightmap.textures import EVEN_AMBIENT, QUAD_FORMAT, quads, upload, write_pages
 from app.lightmap.tile_pool import TABLE_WIDTH
 from app.render.ages import LeafAges
 from app.render.edge_texels import EdgeTexels
@@ -61,7 +61,7 @@ class DisplayTexels:
         self._unlit_target = gpu.target(self._unlit)
         self._unlit_of: object = None  # what it shows
         self._version, self._keys = lightmap.version, self._leaf_keys()
-        self._nothing = gpu.texture((1, 1), 4, "f4", bytes(16))
+        self._nothing = gpu.texture(EVEN_AMBIENT, 4, "f4", bytes(48))
         self._tables = {
             "t_sides": gpu.texture((len(sides), 1), 1, "u4", sides.tobytes()),
             "t_charts": self._chart_table(),
@@ -110,7 +110,8 @@ class DisplayTexels:
         if self._version != lightmap.version:
             self._follow_leaves()
         shader, uniforms = curve(display, scale, exposed=layer.light is not None)
-        first, rows = self._band(whole, (layer_name, shader, instead), uniforms)
+        shows = layer_name, shader, instead, lightmap.ambients if layer.light is not None else 0
+        first, rows = self._band(whole, shows, uniforms)
         uniforms |= {
             "u_unit": lightmap.unit,
             "u_target_texel": 1.0 / (lightmap.charts.density * lightmap.space.scale),

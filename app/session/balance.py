@@ -25,10 +25,12 @@ MOST = 2048  # that the option allows
 
 @dataclass(frozen=True)
 class Verdict:
-    """Of an imbalance. level: 0 is fine, 1 worth a look, 2 too much. text: what it is and what to do, unless it is fine."""
+    """Of an imbalance. level: 0 is fine, 1 worth a look, 2 too much. text: what it is and what to do, unless it is fine. known:
+    whether it says anything of the solution yet."""
 
     level: int
     text: str | None = None
+    known: bool = True
 
 
 def verdict_of(
@@ -39,8 +41,10 @@ def verdict_of(
     texels that better ones are about to replace, of which there is nothing to do about it. finer: see ``finer_maps``."""
     if abs(imbalance) < FINE:
         return Verdict(0)
-    if coarse or (not family.distributes and abs(imbalance) < remaining):
-        return Verdict(1)
+    if coarse:
+        return Verdict(0, "coarse texels: better ones are on their way", known=False)
+    if not family.distributes and abs(imbalance) < remaining:
+        return Verdict(0, f"no more than the {family.remains} that is left", known=False)
     what = "is lost" if imbalance > 0 else "comes from nothing"
     return Verdict(
         2 if abs(imbalance) >= TOO_MUCH else 1, f"{abs(imbalance):.1%} of the light {what}: {_remedy(family, finer)}"

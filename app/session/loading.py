@@ -19,6 +19,7 @@ from app.atlas.options import MAX_TEXELS, AtlasOptions
 from app.atlas.parametrize import check, default_texels
 from app.atlas.visible_mesh import Drawn, coarse_mesh
 from app.errors import UserError
+from app.lightmap.carry_over import TexelPlaces
 from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import Array, SolverSpace, TilePool
@@ -26,7 +27,7 @@ from app.render.exposure import first_exposure
 from app.render.flat import FlatScene
 from app.render.seen import seen_texels
 from app.scene.load import load_scene
-from app.scene.model import F64, Scene
+from app.scene.model import F32, F64, Scene
 from app.scene.options import FileOptions
 from app.scene.sky import Sky
 from app.session.ray_tree import SORTING
@@ -36,13 +37,15 @@ from app.util import cache
 from app.util.background import BackgroundTask, Progress, Report
 from app.visibility.rays import tree_of
 
+UPLOADING, LOADED = "copying to the GPU", 0.9  # what comes after loading, and the share of opening that is done then
 COARSE_FROM = 32_768  # triangles: charts of fewer are there within about two seconds
 
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
     """The scene as it was read, the tile pool of it as it was made and cut, what of that is uploaded, how it was cut and is held,
-    the exposure to open it with [EV] if that was asked for, and how long each stage took [s]."""
+    the exposure to open it with [EV] if that was asked for, how long each stage took [s], the coarse
+    texels that were there before, of which light may be carried over, and where its blocks are among these."""
 
     read: Scene
     pool: TilePool
@@ -51,6 +54,8 @@ class Loaded:
     options: LightmapOptions
     exposure: float | None
     seconds: dict[str, float]
+    known: TexelPlaces | None = None
+    places: F32 | None = None
 
 
 def read_and_unfold(
@@ -113,6 +118,7 @@ def load(
     sky: Sky | None = None,
     expose: bool = False,
     rays: bool = False,
+    foresees: bool = False,
     make: Callable[[Scene], Scene] | None = None,
     progress: Progress | None = None,
     show: Callable[[FlatScene], None] | None = None,
@@ -120,12 +126,13 @@ def load(
 ) -> Loaded:
     """Read a scene, or take one as it is; unfold it, cut it into texels, with ``expose`` find its exposure, and with ``rays``
     build the tree that they walk. file, make, show: as of ``read_and_unfold``. coarse: is given the scene in coarse texels, from
-    another thread, where better ones will take a while and there is light to show. Raises UserError (SceneError)."""
+    another thread, where better ones will take a while and there is light to show. foresees: whether that will be carried over.
+    Raises UserError (SceneError)."""
     tell = _Telling(progress or (lambda stage, share: None))
     options = options or LightmapOptions()
     check(atlas.density, atlas.texels)
     with ThreadPoolExecutor(1) as beside, _threads(1) as meanwhile:
-        early: list[Future[Loaded | None]] = []
+        early: list[Future[tuple[Loaded, TexelPlaces] | None]] = []
         drawn: list[Future[Drawn]] = []
 
         def drawing(scene: Scene) -> None:
@@ -148,23 +155,24 @@ def load(
             waiting=waiting,
             cut=drawing,
         )
-        shown = early[0].result() if early else None
+        shown, known = (early[0].result() if early else None) or (None, None)
     start = time.perf_counter()
 
     def cutting(share: float) -> None:
         tell("cutting into texels", 0.6 + 0.2 * share)
 
     cutting(0.0)
+    known = known if foresees else None
     more: dict[str, Any] = {"expose": expose and shown is None, "drawn": drawn[0].result if drawn else None}
-    pool, arrays, exposure = _in_texels(scene, charts, options, cutting, **more)
+    pool, arrays, exposure, places = _in_texels(scene, charts, options, cutting, known=known, **more)
     exposure = exposure if shown is None else shown.exposure
     seconds["texels"] = time.perf_counter() - start
     if rays:
         start = time.perf_counter()
-        tree_of(pool, lambda share: tell(SORTING, 0.8 + 0.2 * share))
+        tree_of(pool, lambda share: tell(SORTING, 0.8 + (LOADED - 0.8) * share))
         seconds["rays"] = time.perf_counter() - start
-    tell("copying to the GPU", 1.0)
-    return Loaded(read, pool, arrays, atlas, options, exposure, seconds)
+    tell(UPLOADING, LOADED)
+    return Loaded(read, pool, arrays, atlas, options, exposure, seconds, known, places)
 
 
 class _Telling:
@@ -190,9 +198,9 @@ def _show_coarse(
     rays: bool,
     alive: Report,
     show: Callable[[Loaded], None],
-) -> Loaded | None:
+) -> tuple[Loaded, TexelPlaces] | None:
     """Show a scene in coarse texels, unless it has too many small pieces for that, or they cannot be had: better ones come all
-    the same. alive: raises to end the work."""
+    the same. Where they are, as long as none of them has changed. alive: raises to end the work."""
     start = time.perf_counter()
     texels = min(atlas.texels or MAX_TEXELS, default_texels(len(scene.triangles), True))
     try:
@@ -200,14 +208,15 @@ def _show_coarse(
         if charts is None:
             return None
         alive(0.0)
-        pool, arrays, exposure = _in_texels(scene, charts, options, alive, expose=expose, coarse=True)
+        pool, arrays, exposure, _ = _in_texels(scene, charts, options, alive, expose=expose, coarse=True)
         if rays:
             tree_of(pool, alive)
     except (UserError, MemoryError):
         return None
     loaded = Loaded(read, pool, arrays, atlas, options, exposure, {"coarse": time.perf_counter() - start})
+    places = TexelPlaces(pool)
     show(loaded)
-    return loaded
+    return loaded, places
 
 
 def _in_texels(
@@ -218,10 +227,12 @@ def _in_texels(
     *,
     expose: bool,
     coarse: bool = False,
+    known: TexelPlaces | None = None,
     drawn: Callable[[], Drawn] | None = None,
-) -> tuple[TilePool, dict[str, Array], float | None]:
-    """A scene cut into texels, as it is uploaded, and with ``expose`` the exposure that its light will need [EV]. coarse: texels
-    that are not there for long, nothing of which is kept on disk. drawn: as of ``kept_mesh``."""
+) -> tuple[TilePool, dict[str, Array], float | None, F32 | None]:
+    """A scene cut into texels, as it is uploaded, with ``expose`` the exposure that its light will need [EV], and where its
+    blocks are in the texels that are ``known``. coarse: texels that are not there for long, nothing of which is kept on disk.
+    drawn: as of ``kept_mesh``."""
     exposure = None
     with _threads(2) as beside:
         make_mesh = coarse_mesh if coarse else functools.partial(kept_mesh, drawn=drawn)
@@ -233,10 +244,11 @@ def _in_texels(
         pool.visible_mesh = mesh.result()
         seams.result()
         arrays = beside.submit(lambda: (pool.arrays, pool.emission_weights)[0])
+        places = None if known is None else known.of_blocks(pool)
         if expose:
             camera = scene.cameras[0]
             exposure = first_exposure(pool, seen_texels(pool, camera.world_from_camera, camera.yfov))
-        return pool, arrays.result(), exposure
+        return pool, arrays.result(), exposure, places
 
 
 def _local(scene: Scene) -> F64:
@@ -279,6 +291,7 @@ class Loading(BackgroundTask[Loaded]):
         self.coarse: Loaded | None = None
         self.version, make = version, None if version is None else version.make
         more: dict[str, Any] = {"default_light": default_light, "expose": expose, "rays": SOLVERS[solver].rays}
+        more |= {"foresees": SOLVERS[solver].foresees}
         more |= {"show": self._show, "coarse": self._show_coarse if coarse else None}
         super().__init__(
             "this scene",

@@ -14,10 +14,11 @@ from app.lightmap.lightmap import Lightmap
 from app.lightmap.options import LightmapOptions
 from app.lightmap.textures import upload
 from app.options import Options
-from app.session.loading import Loaded, Loading
+from app.session.loading import LOADED, UPLOADING, Loaded, Loading
 from app.solvers import SOLVERS, Solver
 from app.util.parts import run_to_end
 
+COMPILING, DRAWING = "making the solver ready", "making the picture ready"  # stages, after UPLOADING
 Prepare = Callable[
     [Lightmap], Callable[[], None]
 ]  # what else a lightmap needs before it is shown; returns what undoes it
@@ -60,7 +61,7 @@ class Opening:
         self._gpu = gpu
         self.prepare: Prepare | None = None
         self.loading: Loading | None = None
-        self._parts: Generator[None, None, Ready] | None = None
+        self._parts: Generator[tuple[str, float], None, Ready] | None = None
         self._coarse = False  # whether these parts are of coarse texels
         self._warm = set[tuple[int, str]]()  # solvers all of whose programs have drawn, since which reload of these
 
@@ -98,7 +99,9 @@ class Opening:
                 self._coarse = coarse is not None and not loading.ended
                 of = coarse if coarse is not None and self._coarse else loading.result
                 self._parts = self._upload(of, loading.solver, options, coarse=self._coarse)
-            next(self._parts)
+            stage, share = next(self._parts)
+            if not self._coarse:
+                loading.stage, loading.fraction = stage, LOADED + (1 - LOADED) * share
         except StopIteration as last:
             self._parts = None
             if not self._coarse:
@@ -118,10 +121,10 @@ class Opening:
 
     def _upload(
         self, loaded: Loaded, solver_name: str, options: Mapping[str, Options], *, coarse: bool = False
-    ) -> Generator[None, None, Ready]:
+    ) -> Generator[tuple[str, float], None, Ready]:
         """Upload what was loaded, and draw once with each program of the solver, since drivers compile it then, unless all have
-        drawn; in coarse texels the first shot does. Yields after each part. Raises UserError; then, and when given up between two
-        parts, nothing stays on the GPU."""
+        drawn; in coarse texels the first shot does. Yields, after each part, the stage of the next and the share that is done.
+        Raises UserError; then, and when given up between two parts, nothing stays on the GPU."""
         began, gpu, family = time.perf_counter(), self._gpu, SOLVERS[solver_name]
         make = family.for_coarse if coarse and family.for_coarse is not None else family.make
         with contextlib.ExitStack() as undo:
@@ -130,27 +133,28 @@ class Opening:
             for name, array in loaded.arrays.items():
                 textures[name] = upload(gpu, array)
                 uploads.callback(gpu.release_all, textures[name])
-                yield
+                yield UPLOADING, 0.5 * len(textures) / len(loaded.arrays)
             lightmap = Lightmap(gpu, loaded.pool, loaded.options, textures=textures)
             uploads.pop_all()
             undo.callback(lightmap.release)
             gpu.ctx.finish()
-            yield
+            yield COMPILING, 0.5
             compiled = gpu.shaders.compiled
             solver = make(gpu, lightmap, options[solver_name])
             if gpu.shaders.compiled > compiled:
                 self._warm.clear()  # solvers share programs: others may need these, too
             undo.callback(solver.release)
-            yield
+            yield COMPILING, 0.6
             warm = gpu.shaders.generation, solver_name
             if not coarse and warm not in self._warm:
-                yield from solver.warm_up()
+                for done, _ in enumerate(solver.warm_up(), 1):
+                    yield COMPILING, 0.9 - 0.3 / (1 + done)  # nobody knows of how many
                 solver.reset()
-                yield
+                yield DRAWING, 0.9
                 self._warm.add(warm)
             if self.prepare is not None:
                 undo.callback(self.prepare(lightmap))
                 gpu.ctx.finish()
-                yield
+                yield DRAWING, 1.0
             undo.pop_all()
         return Ready(loaded, lightmap, solver, solver_name, began)

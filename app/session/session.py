@@ -17,6 +17,7 @@ from typing import Any
 from app.atlas.options import AtlasOptions
 from app.errors import UserError
 from app.gpu import Gpu
+from app.lightmap.carry_over import carry_over
 from app.lightmap.options import LightmapOptions
 from app.options import Options
 from app.scene.area_lamps import Surfaces, keys_of, with_surfaces
@@ -185,6 +186,8 @@ class Session(EditableScene):
             lightmap.set_sky(self.scene.sky)
             lightmap.set_lights(self.scene.lights)
             solver.reset()
+        if refined and loaded.known is not None and loaded.places is not None and self.solver.issued > 0:
+            carry_over(self.gpu, self.lightmap, lightmap, loaded.known, loaded.places)
         self._remained = self.run.progress.remaining if refined else math.inf
         self.close()
         self.reading = self.reading if same_scene else self._reading

@@ -42,6 +42,7 @@ class Family:
     per_error: how little may remain where an expected error is asked for, as a share of that.
     relights: whether its next piece of work shows all light of other lamps, so that they may flicker from frame to frame.
     for_coarse: makes one for coarse texels that better ones replace soon, where that is another; it takes less care.
+    foresees: whether it shows light that is still to come, and may be told of it, see LightTextures.
     rays: whether it looks along rays, and so needs a tree of the scene's triangles (visibility/rays.py) before it is made.
     everywhere: whether it lights all surfaces alike, wherever they are seen from; else what is far is known roughly.
     quadratic: whether its work grows with the square of the texels.
@@ -67,6 +68,7 @@ class Family:
     per_error: float | None = None
     relights: bool = False
     for_coarse: Callable[[Gpu, Lightmap, Any], Solver[Any]] | None = None
+    foresees: bool = False
     rays: bool = False
     everywhere: bool = True
 
@@ -89,6 +91,7 @@ SOLVERS: dict[str, Family] = {
         threshold="residual",
         pictures=PICTURES,
         shows=("ambient",),
+        foresees=True,
         layers=("residual",),
     ),
     "gathering": Family(

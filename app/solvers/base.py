@@ -70,7 +70,8 @@ class EnergyBalance:
     """Where all emitted power is, RGB [W]: emitted = absorbed + escaped + unshot + imbalance. The imbalance is the error of form
     factors and visibility.
 
-    reflectance: area-weighted mean albedo, RGB; area: of all texels [m²].
+    reflectance: area-weighted mean albedo, RGB; area: of all texels [m²]. estimated: whether what enters from outside is not
+    known yet.
     """
 
     emitted: F64
@@ -79,6 +80,7 @@ class EnergyBalance:
     unshot: F64
     reflectance: F64
     area: float
+    estimated: bool = False
 
     @property
     def imbalance(self) -> F64:

@@ -53,10 +53,8 @@ def put(lightmap: Lightmap, name: str, tiles: F64) -> None:
 def put_ambient(lightmap: Lightmap, a: tuple[float, float, float]) -> None:
     """The same ambient light (RGB) [W/m²] on all texels, whatever a solver finds."""
     lightmap.ambient_of = None
-    texture = lightmap.texture("t_ambient")
-    texture.write(
-        np.tile(np.array([*np.array(a) / lightmap.unit, 0.0], np.float32), texture.width * texture.height).tobytes()
-    )
+    lightmap.hold_ambient(of_each=False)
+    lightmap.texture("t_ambient").write(np.array([*np.array(a) / lightmap.unit, *[0.0] * 9], np.float32).tobytes())
 
 
 def even(lightmap: Lightmap, H: tuple[float, float, float]) -> F64:

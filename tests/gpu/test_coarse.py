@@ -129,6 +129,42 @@ def test_coarse_light_appears_and_gives_way_to_better(view: View, better: thread
         assert mean_irradiance(session) == pytest.approx(coarse, rel=0.1)
 
 
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_better_texels_begin_with_the_coarse_light(
+    view: View, better: threading.Event, monkeypatch: pytest.MonkeyPatch, adaptive: bool
+) -> None:
+    """Before any of them has got light, and when the first has, what coarse texels had is shown everywhere: until rays can be
+    traced, that is."""
+    session = view.session
+    monkeypatch.setattr("app.solvers.shooting.ambient.tree_is_near", lambda pool: False)
+    monkeypatch.setattr(loading, "default_texels", lambda sides, roots: TEXELS // (4 if adaptive else 1))
+    session.light = LightmapOptions(adaptive=adaptive, depth=1)
+
+    def shown() -> tuple[float, float]:
+        """Mean, and what all but 1 % of the surfaces have at least [W/m²]."""
+        light = session.lightmap.irradiance(ambient=True, whole=False).mean(-1)
+        area = session.lightmap.pool.surfaces.area
+        return float((light * area).sum() / area.sum()), float(np.quantile(light[area > 0], 0.01))
+
+    session.open("cornell-box")
+    frames(session, lambda: session.opened and session.solver.issued > 4)
+    session.run.running = False
+    coarse = shown()
+    better.set()
+    frames(session, lambda: session.loading is None)
+    assert session.solver.issued == 0 and session.run.progress.remaining == 1.0  # the books begin anew
+    mean, least = shown()
+    assert mean == pytest.approx(coarse[0], rel=0.1 if adaptive else 0.05)  # texels are of other places, and there few
+    assert least > 0.8 * coarse[1]
+    session.work(8)
+    assert session.lightmap.irradiance().max() > 0.0
+    now = shown()
+    assert 0.999 * mean < now[0] < 1.2 * mean and 0.999 * least < now[1], "no place is darker than it was"
+    material = dataclasses.replace(session.materials[1], albedo=(0.1, 0.2, 0.7))
+    session.set_material(1, material)
+    assert not session.lightmap.ambient_of_each, "of walls that are others now nothing was foreseen"
+
+
 def test_few_shots_show_most_of_a_lamp(gpu: Gpu, view: View, monkeypatch: pytest.MonkeyPatch) -> None:
     """Other light has it shoot from fifty places."""
     session, left = view.session, []

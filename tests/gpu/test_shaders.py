@@ -84,6 +84,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "MARGIN": (4,),
     "GATHERED": FLAG,
     "TRACED": FLAG,
+    "FORESEEN": FLAG,
     "FINER": FLAG,
     "RADIUS": (0, 1, RADIUS),
     "DEVIATIONS": (1.5,),

@@ -16,6 +16,7 @@ import app.visibility.rays as rays
 from app.atlas.options import AtlasOptions
 from app.gpu import Gpu
 from app.scene.model import F64
+from app.session.loading import LOADED, UPLOADING
 from app.session.ray_tree import SORTING
 from app.session.run import Stop
 from app.session.session import Session
@@ -234,7 +235,7 @@ def test_who_opens_and_waits_hears_of_it(gpu: Gpu, build: SlowBuild) -> None:
         session = Session(gpu, solver=name, atlas=AtlasOptions(texels=900))
         session.open_now("furnace", lambda stage, share: told.append((stage, share)))
         assert (SORTING in dict(told)) == (name == "gathering") == ("rays" in session.load_seconds)
-        assert told[-1] == ("copying to the GPU", 1.0)
+        assert told[-1] == (UPLOADING, LOADED)
         session.release()
     shares = [share for _, share in told[-5:]]
     assert shares == sorted(shares)

@@ -62,8 +62,8 @@ def test_an_imbalance_has_the_colour_and_sign_that_it_deserves(
 
 def test_window_and_report_say_the_same(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
-    real = widgets.wrapped
-    monkeypatch.setattr(widgets, "wrapped", lambda text, *more: said.append(text) or real(text, *more))
+    real = widgets.one_line
+    monkeypatch.setattr(widgets, "one_line", lambda text, *more: said.append(text) or real(text, *more))
     desk.session.imbalance = 0.13
     desk.frames()
     run = SimpleNamespace(progress=SimpleNamespace(note=None))
@@ -138,8 +138,16 @@ def test_progress_never_goes_back_but_for_an_edit(gpu: Gpu, monkeypatch: pytest.
     session.release()
 
 
+def test_what_a_sky_sends_in_is_said_to_be_an_estimate() -> None:
+    balance = EnergyBalance(*(np.full(3, power) for power in (10.0, 5.0, 1.0, 4.0)), np.zeros(3), 1.0, estimated=True)
+    (label, *_), *_ = energy.shares(balance, 0.4, balance.escaped, distributes=True)
+    assert label == "Emitted, about"
+
+
 def test_what_is_still_noise_or_missing_is_no_verdict() -> None:
     """A solution that has hardly begun is not called wrong; what is shot too much stays wrong."""
     gathering, shooting = SOLVERS["gathering"], SOLVERS["shooting"]
-    assert verdict_of(-0.5, gathering, 0.9) == verdict_of(-0.5, shooting, coarse=True) == Verdict(1)
+    for early in (verdict_of(-0.5, gathering, 0.9), verdict_of(-0.5, shooting, coarse=True)):
+        assert not early.known and early.level == 0
+    assert verdict_of(0.001, shooting, coarse=True) == Verdict(0)
     assert verdict_of(-0.5, gathering, 0.1).level == verdict_of(-0.5, shooting, 0.9).level == 2

@@ -15,6 +15,7 @@ from app.gpu import Gpu
 from app.scene.model import F64, Scene
 from app.solvers.shooting import ambient
 from app.solvers.shooting.gather_points import GatherPoints
+from app.visibility.rays import tree_of
 
 LIT, LAMP = slice(0, 6), 6  # objects: walls of the room with the lamp, floor and ceiling first
 CEILING, DARK = 1, slice(7, 13)
@@ -34,25 +35,24 @@ def shown(solution: Solution) -> F64:
 
 
 def test_it_is_even_until_there_is_a_tree_to_gather_by(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After a batch the mean of what is shown is within a fifth of what there will be, of which a third is not yet shot. It is
-    what is overshot, but where no residual below zero is held, which that takes: 8 bits lose a part of the light later."""
+    """After a batch the mean of what is shown is within a fifth of what there will be, of which a third is not yet shot: what
+    lamps have yet to give where they gave before, the rest everywhere. Nothing is overshot where no residual below zero is held,
+    which that takes."""
     monkeypatch.setattr(ambient, "tree_is_near", lambda pool: False)
     lamp = [[0.3, 0.95, 0.3], [0.7, 0.95, 0.3], [0.7, 0.95, 0.7], [0.3, 0.95, 0.7]]
     scene = quads_scene([*room((1.0, 1.0, 1.0)), lamp], [grey(0.6), grey(0.0, 10.0)], [0] * 6 + [1])
 
-    def mean(box: Solution) -> F64:
+    def mean(box: Solution, *, ambient: bool = False) -> F64:
         area = box.lightmap.pool.surfaces.area[..., None]
-        return np.asarray((box.lightmap.irradiance() * area).sum((0, 1, 2)) / area.sum())
+        return np.asarray((box.lightmap.irradiance(ambient=ambient) * area).sum((0, 1, 2)) / area.sum())
 
     early = {}
     for storage in ("fixed8", "rgba32f"):
         box = begin(gpu, scene, texels=800, residual=1e-2, storage=storage)
         box.step(16)
-        term = box.lightmap.ambient()
-        assert term.shape == (3,) and box.lightmap.texture("t_ambient").size == (1, 1)
-        overshot = box.solver.batch.ambient.overshoot.read()
-        assert overshot == (bytes(16) if storage == "fixed8" else box.lightmap.texture("t_ambient").read())
-        early[storage] = mean(box), mean(box) + term
+        assert not box.lightmap.ambient_of_each
+        assert (box.solver.batch.ambient.overshoot.read() == bytes(16)) == (storage == "fixed8")
+        early[storage] = mean(box), mean(box, ambient=True)
     box.settle()
     for arrived, shown in early.values():
         assert (arrived < 0.8 * mean(box)).all()
@@ -84,6 +84,29 @@ def test_all_walls_show_their_light_from_the_first_batch_on(gpu: Gpu, adaptive: 
     rooms.release()
 
 
+def test_no_frame_shows_less_while_points_look_for_the_first_time(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They look some in each frame: what all of them found takes the place of the even term at once, and is no darker."""
+    monkeypatch.setattr(ambient, "POINTS_A_FRAME", 8)
+    monkeypatch.setattr(ambient, "POINTS_A_LOOK", 8)
+    rooms = begin(gpu, two_closed_rooms(), texels=2000)
+    rooms.step(8)
+    tree_of(rooms.lightmap.pool)  # is there: the first frame would begin to look
+    frames = []
+    while rooms.solver.batch.ambient._looked <= ambient.FIRST_SWEEPS:
+        covered = rooms.lightmap.pool.surfaces.area > 0
+        now = rooms.lightmap.irradiance(ambient=True, whole=False)[covered].astype(np.float64)
+        frames.append((rooms.lightmap.ambient_of_each, now, rooms.means(now)[LIT, 0]))
+    begun = [of_each for of_each, _, _ in frames]
+    first = begun.index(True)
+    assert first > 20 and begun == sorted(begun)
+    even, found = frames[0], frames[first]
+    assert all(np.array_equal(even[1], now) for _, now, _ in frames[:first]), "nothing is seen of it before"
+    np.testing.assert_allclose(found[2], even[2], rtol=0.5)  # the even term is as much off, of one wall
+    assert found[2].mean() > 0.9 * even[2].mean()  # and of all by the closed room beside, which it lights
+    assert all(now[2].min() > 0.9 * found[2].min() for now in frames[first:])
+    rooms.release()
+
+
 def test_light_that_has_arrived_is_no_more_to_come(gpu: Gpu) -> None:
     """Frames that do not look anew show what was foreseen, or what has arrived where that is more; never the sum of both."""
     rooms = begin(gpu, two_closed_rooms(), texels=2000)
@@ -103,26 +126,32 @@ def test_points_that_have_not_looked_yet_tell_nothing(gpu: Gpu) -> None:
     points of other leaves saw. But for a few, whose own points have not looked yet."""
     rooms = begin(gpu, two_closed_rooms(), texels=2000)
     rooms.step(8)
-    lightmap, nothing_to_come = rooms.lightmap, gpu.texture((2, 1), 4, "f4", bytes(32))
+    lightmap, nothing_to_come = rooms.lightmap, gpu.texture((3, 1), 4, "f4", bytes(48))
     even = gpu.texture((1, 1), 4, "f4", bytes(16))
     lightmap.hold_ambient()
     points = GatherPoints(gpu, lightmap)
 
     def foreseen(rows: int, each: int) -> F64:
         for row in range(0, rows, each):
-            points.look(nothing_to_come, even, row, each)
+            points.look(even, row, each)
+            points.spread(lightmap.ambient_target, nothing_to_come, row, each)
         return lightmap.light_of(lightmap.texture("t_ambient")).sum(-1, dtype=np.float64)
 
-    points.see_light(0, points.rows)
+    points.see_light(lightmap.texture("t_ambient"), 0, points.rows)
     in_bands, whole = foreseen(points.rows, 1), foreseen(points.rows, points.rows)
     bright = whole > 0.1 * whole.max()
     assert bright.mean() > 0.2 and np.quantile(in_bands[bright] / whole[bright], 0.05) > 0.9
     lightmap.clear()
     points.leaves_changed()
     lightmap.ambient_target.clear()
-    points.see_light(0, points.rows)
+    points.see_light(lightmap.texture("t_ambient"), 0, points.rows)
     assert foreseen(1, 1).max() == 0.0
+    even_to_come = gpu.texture((3, 1), 4, "f4", np.float32([1.0] * 3 + [0.0] * 9).tobytes())
+    points.spread(lightmap.ambient_target, even_to_come, 0, points.rows)
+    there = lightmap.light_of(lightmap.texture("t_ambient")) / lightmap.unit
+    assert (there[lightmap.pool.surfaces.area > 0] == 1.0).mean() > 0.8, "but where it did, it is even"
     points.release()
+    gpu.release_all(even_to_come)
     gpu.release_all(nothing_to_come, even)
     rooms.release()
 
@@ -139,11 +168,12 @@ def test_what_few_rays_find_makes_no_spots(gpu: Gpu) -> None:
     light[of == 6, :3] = 144e3
     lightmap.texture("t_residual").write(pool.image_from_tiles(light).tobytes())
     even = gpu.texture((1, 1), 4, "f4", np.ones(4, np.float32).tobytes())
-    nothing_to_come = gpu.texture((2, 1), 4, "f4", bytes(32))
+    nothing_to_come = gpu.texture((3, 1), 4, "f4", bytes(48))
     lightmap.hold_ambient()
     points = GatherPoints(gpu, lightmap)
-    points.see_light(0, points.rows)
-    points.look(nothing_to_come, even, 0, points.rows)
+    points.see_light(lightmap.texture("t_ambient"), 0, points.rows)
+    points.look(even, 0, points.rows)
+    points.spread(lightmap.ambient_target, nothing_to_come, 0, points.rows)
     found = pool.tiles_from_image(
         np.frombuffer(lightmap.texture("t_ambient").read(), np.float32).reshape(*lightmap.size[::-1], 4)
     )[of == CEILING, 0]

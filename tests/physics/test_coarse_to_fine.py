@@ -65,7 +65,7 @@ def test_light_that_will_come_back_is_shot_ahead(gpu: Gpu) -> None:
             box.step(8)
             box.solver.poll()
             if box is without:
-                box.solver.batch.ambient.overshoot_target.clear()
+                box.solver.batch.ambient.even_target.clear()
             elif box.solver.issued % 64 == 0:
                 lowest = min(lowest, flux_of(box).min())
         box.solver.poll(wait=True)

@@ -1,9 +1,10 @@
 """The ambient term is the irradiance that unshot light will make, shown and baked with H from the first shots on [Cohen88, 5].
 
 Of what surfaces have yet to shoot it is gathered by points that know what they see, see gather_points.py; of what lamps and
-sources outside have yet to give, it goes where such light came from the start. Where the storage can hold a residual below zero
-that of patches is overshot [Feda92]: a patch shoots, with its residual, what it will reflect of an even ambient term. That one is
-shown, with any storage, until there is a tree of the triangles that the rays of points walk.
+sources outside have yet to give, it goes where such light came from the start. Until there is a tree of the triangles that the
+rays of points walk, and all points have looked FIRST_SWEEPS times, what surfaces have yet to shoot is shown as an even term; or
+what other texels of the same scene had is shown as all that is to come. Where the storage can hold a residual below zero that of
+patches is overshot [Feda92]: a patch shoots, with its residual, what it will reflect of an even ambient term.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from app.lightmap.tile_pool import TABLE_WIDTH
 from app.solvers.shooting.choose import Bins
 from app.solvers.shooting.gather_points import GatherPoints
 from app.solvers.shooting.ledger import Ledger
+from app.solvers.shooting.point_spread import PointSpread
 from app.solvers.shooting.records import BLOCK_LEVEL, RECORDS
 from app.solvers.shooting.shooters import ShooterBatch
 from app.util.background import BackgroundTask
@@ -25,11 +27,12 @@ from app.visibility.bvh import Bvh
 from app.visibility.rays import tree_is_near, tree_of
 
 SWEEPS = 6  # looks of each point until nothing changes: as many reflections
+FIRST_SWEEPS = 4  # until what they find takes the place of an even term: with fewer reflections it would be darker
 # Of one frame, where not all must be: points that look around. Fewer passes do more at once: frames wait until there are so many.
 POINTS_A_FRAME, POINTS_A_LOOK = 512, 2048
 # What a point takes, of the time of a look: to see what its texels have to pass on; to find what its rays hit
 SEEING, TRACING = 0.25, 8.0
-FIRST = 4  # times as many points of a frame where it is not known yet what their rays hit
+FIRST = 4  # times as many points of a frame until what they find is shown, or is known what their rays hit
 TRACED_AT_ONCE = 512  # points, at most: with ten thousands of triangles on a software rasteriser 50 ms
 # Share of the light that is passed on until points look again: of that, what they foresaw is shown
 PASSED_ON = 1 / 16
@@ -38,9 +41,9 @@ PASSED_ON = 1 / 16
 class Ambient:
     """Whoever makes it releases it.
 
-    overshoot: one texel, what is overshot, see even_ambient.frag.glsl. shown: whether the lightmap is given any. held: while
-    light is taken from those who shoot and has not arrived: points look after that. strongest: share of the light that a shot
-    passes on at most.
+    even: one texel, the even term of all that is unshot, see even_ambient.frag.glsl. shown: whether the lightmap is given any.
+    held: while light is taken from those who shoot and has not arrived: it is looked at after that. strongest: share of the light
+    that a shot passes on at most.
     """
 
     def __init__(
@@ -49,9 +52,11 @@ class Ambient:
         """gathers: whether points gather it, once there is a tree that their rays walk; else it stays an even one."""
         self._gathers = gathers
         self._gpu, self._lightmap, self._shooters, self._ledger = gpu, lightmap, shooters, ledger
-        self.overshoot, self._lamps, self._to_come = (gpu.texture((n, 1), 4, "f4") for n in (1, 1, 2))
-        self.overshoot_target = gpu.target(self.overshoot)
-        self._lamps_target, self._to_come_target = gpu.target(self._lamps), gpu.target(self._to_come)
+        self.even, self._lamps, self._to_come, self._direct = (gpu.texture((n, 1), 4, "f4") for n in (1, 1, 3, 3))
+        self._nothing = gpu.texture((1, 1), 4, "f4", bytes(16))
+        self.even_target = gpu.target(self.even)
+        self._lamps_target = gpu.target(self._lamps)
+        self._to_come_target, self._direct_target = gpu.target(self._to_come), gpu.target(self._direct)
         self._estimate = Pass(gpu, "solvers/shooting/even_ambient", slots=RECORDS)
         self._add_lamps = Pass(
             gpu,
@@ -61,7 +66,9 @@ class Ambient:
         self._find_to_come = Pass(gpu, "solvers/shooting/to_come", slots=RECORDS)
         self._lamp_blocks = gpu.texture((1, 1), 1, "u4")
         self._lamp_count = 0
-        self._points: GatherPoints | None = None  # once it is shown
+        self._points: GatherPoints | None = None
+        self._looked = 0  # sweeps since light began; what they find is hidden for as long as they are few
+        self._hidden: tuple[Texture, Framebuffer] | None = None
         self._tree: BackgroundTask[Bvh] | None = None
         self.shown, self.held = shown, False
         self.note: str | None = None
@@ -69,30 +76,27 @@ class Ambient:
         self._passed_on = 1.0  # share of the light, at most, since points began to look
         self._owed = 0.0  # points that frames asked to look
         self.strongest = 1.0
-        lightmap.ambient_of = self.refresh
+        lightmap.ambient_of, lightmap.foresee = self.refresh, self.foresee
+
+    @property
+    def overshoot(self) -> Texture:
+        """One texel, the irradiance of which patches overshoot."""
+        return self._nothing if self._lightmap.storage == "fixed8" else self.even
 
     def update(self, bins: Bins, shots: int | None = None) -> None:
-        """Estimate what is overshot from what is unshot in the bins, and from so many shots of a batch since; None: anything may
-        be other than it was. Points look that frames asked for while light was held."""
+        """Estimate the even term from what is unshot in the bins, and from so many shots of a batch since; None: anything may be
+        other than it was. Points look that frames asked for while light was held."""
         self.changed(1.0 if shots is None else shots * self.strongest)
-        lightmap, shows = self._lightmap, self.shown and self.note is None and self._points is None
-        if lightmap.storage != "fixed8":
-            self._find_even(self.overshoot_target, bins, shots or 0)
-            if shows:
-                self._gpu.ctx.copy_framebuffer(lightmap.ambient_target, self.overshoot_target)
-        elif shows:
-            self._find_even(lightmap.ambient_target, bins, shots or 0)
-        if self._owed and self._points is not None:
-            self._look_for_frames(self._points)
-
-    def _find_even(self, target: Framebuffer, bins: Bins, shots: int) -> None:
-        """The even ambient term, of one texel."""
         ledger = self._ledger
         self._estimate.draw(
-            target,
+            self.even_target,
             textures={"t_unshot": bins.unshot, "t_ledger": ledger.texture, "t_shooters": self._shooters.texture},
-            uniforms={"u_shots": shots, "u_albedo": ledger.albedo, "u_area": ledger.area},
+            uniforms={"u_shots": shots or 0, "u_albedo": ledger.albedo, "u_area": ledger.area},
         )
+        if self.shown and self.note is None and not self._lightmap.ambient_of_each:
+            self._find_what_is_to_come(self._lightmap.ambient_target)
+        if self._owed and self._points is not None:
+            self._look_for_frames(self._points)
 
     def changed(self, share: float = 1.0) -> None:
         """Other light is unshot than when the lightmap was given its ambient term. share: of all light, that was passed on."""
@@ -119,9 +123,25 @@ class Ambient:
         if not self.held:
             self._look_for_frames(points)
 
+    def foresee(self, irradiance: Texture) -> None:
+        """Show that of each block [stored units], a: above 0 where it is known, as what is to come until all points have looked.
+        Not where memory does not do. Nothing may have been shot."""
+        lightmap = self._lightmap
+        if not self.shown or self.note is not None:
+            return
+        try:
+            spread = PointSpread(self._gpu, lightmap)
+            lightmap.hold_ambient()
+        except UserError:
+            return
+        self._to_come_target.clear()
+        spread.find_around(0, spread.rows)
+        spread.draw(lightmap.ambient_target, irradiance, self._to_come, 0, spread.rows, foreseen=True)
+        spread.release()
+
     def _look_for_frames(self, points: GatherPoints) -> None:
         """As many looks as frames asked for, once they are enough, and where as much was passed on that it is seen."""
-        first = not points.knows(self._next_row % points.rows)
+        first = self._looked < FIRST_SWEEPS or not points.knows(self._next_row % points.rows)
         if self._next_row == 0 and self._passed_on < PASSED_ON:
             self._owed = 0.0
         elif first or self._owed >= min(POINTS_A_LOOK, points.rows * points.columns):
@@ -130,20 +150,35 @@ class Ambient:
 
     def _look(self, points: GatherPoints, budget: float) -> None:
         """Looks that take as long as so many, in turn: in the first half of a sweep it is seen what texels have to pass on, in
-        the other points look at that."""
-        self._see_to_come()
+        the other points look at that. At first what they find is hidden, since parts of it beside what was shown before would
+        be seen."""
+        if self._looked < FIRST_SWEEPS and self._hidden is None:
+            try:
+                self._hidden = self._lightmap.make_ambient()
+            except UserError as error:
+                self._do_without(error)
+                return
+        self._find_what_is_to_come(self._to_come_target)
+        if self._looked == 0:
+            self._find_what_is_to_come(self._direct_target, even=False)
         while self._sweeps and budget > 0:
             half, row = divmod(self._next_row, points.rows)
             cost = SEEING if half == 0 else 1.0 if points.knows(row) else TRACING
             some = int(max(min(budget / (cost * points.columns), points.rows - row), 1))
+            ambient, target = self._hidden or (self._lightmap.texture("t_ambient"), self._lightmap.ambient_target)
             if half == 0:
-                points.see_light(row, some)
+                points.see_light(ambient if self._looked else self._direct, row, some)
             else:
-                points.look(self._to_come, self.overshoot, row, some)
+                points.look(self.even, row, some)
+                points.spread(target, self._to_come, row, some)
             budget -= cost * some * points.columns
             self._next_row = (self._next_row + some) % (2 * points.rows)
             if self._next_row == 0:
                 self._sweeps -= 1
+                self._looked += 1
+                if self._hidden is not None and self._looked >= FIRST_SWEEPS:
+                    self._lightmap.take_ambient(*self._hidden)
+                    self._hidden = None
                 self._passed_on *= float(np.mean(self._ledger.albedo))  # of it, what is reflected once more
 
     def _points_now(self, wait: bool) -> GatherPoints | None:
@@ -151,7 +186,6 @@ class Ambient:
         none."""
         pool = self._lightmap.pool
         if self._points is None and (wait or tree_is_near(pool)):
-            self._lightmap.hold_ambient()
             self._points = GatherPoints(self._gpu, self._lightmap)
         elif self._points is None and self._tree is None:
             self._tree = BackgroundTask("rays in this scene", lambda tell: tree_of(pool, lambda share: tell("", share)))
@@ -165,15 +199,27 @@ class Ambient:
         if self._points is not None:
             self._points.release()
             self._points = None
+        self._show_none()
+
+    def _show_none(self) -> None:
+        """Until it is known what to show."""
+        self._drop_hidden()
+        self._lightmap.hold_ambient(of_each=False)
         self._lightmap.ambient_target.clear()
+
+    def _drop_hidden(self) -> None:
+        """Points begin to look anew."""
+        self._looked = self._next_row = 0
+        self._gpu.release_all(*(self._hidden or ()))
+        self._hidden = None
 
     @property
     def memory(self) -> int:
         """Bytes on the GPU of what gathers it."""
         return 0 if self._points is None else self._points.memory
 
-    def _see_to_come(self) -> None:
-        """What lamps and sources outside have yet to give."""
+    def _find_what_is_to_come(self, target: Framebuffer, *, even: bool = True) -> None:
+        """See what lamps and sources outside have yet to give, and the even term of the rest, or nothing of that."""
         ledger, lightmap = self._ledger, self._lightmap
         self._lamps_target.clear()
         if self._lamp_count:
@@ -186,10 +232,12 @@ class Ambient:
                 blend="add",
             )
         self._find_to_come.draw(
-            self._to_come_target,
-            textures={"t_lamps": self._lamps, "t_ledger": ledger.texture},
+            target,
+            textures={"t_lamps": self._lamps, "t_ledger": ledger.texture, "t_even": self.even},
             uniforms={
                 "u_area": ledger.area,
+                "u_albedo": ledger.albedo,
+                "u_rest": float(even),
                 "u_outside": tuple((ledger.foreseen / ledger.watt).tolist()),
             },
         )
@@ -219,6 +267,8 @@ class Ambient:
         self.find_lamps()
         if self._points is not None:
             self._next_row = 0
+            if self._hidden is not None:
+                self._drop_hidden()
             try:
                 self._points.resize()
             except UserError as error:
@@ -229,26 +279,33 @@ class Ambient:
         self.shown, self.note = shown, None
         self.changed()
         if not shown:
-            self._lightmap.ambient_target.clear()
+            self._show_none()
 
     @property
     def carried(self) -> list[tuple[Texture, Framebuffer]]:
         """What goes with leaves that split or merge, see LeafFollower."""
-        held = self._points is not None
-        return [(self._lightmap.texture("t_ambient"), self._lightmap.ambient_target)] if held else []
+        lightmap = self._lightmap
+        return [(lightmap.texture("t_ambient"), lightmap.ambient_target)] if lightmap.ambient_of_each else []
+
+    def forget_foreseen(self) -> None:
+        """Lamps and surfaces are others than in those texels where the light was that is foreseen."""
+        if self._looked < FIRST_SWEEPS and self._lightmap.ambient_of_each:
+            self._show_none()
 
     def clear(self) -> None:
         """Nothing has been shot."""
         self.held = False
         self.changed()
-        self.overshoot_target.clear()
+        self.even_target.clear()
+        self._show_none()
 
     def release(self) -> None:
         if self._lightmap.ambient_of == self.refresh:  # not yet of another solver
-            self._lightmap.ambient_of = None
+            self._lightmap.ambient_of = self._lightmap.foresee = None
         if self._tree is not None:
             self._tree.cancel()
         if self._points is not None:
             self._points.release()
-        self._gpu.release_all(self.overshoot_target, self.overshoot, self._lamps_target, self._lamps)
-        self._gpu.release_all(self._to_come_target, self._to_come, self._lamp_blocks)
+        self._drop_hidden()
+        self._gpu.release_all(self.even_target, self.even, self._nothing, self._lamps_target, self._lamps)
+        self._gpu.release_all(self._to_come_target, self._to_come, self._direct_target, self._direct, self._lamp_blocks)

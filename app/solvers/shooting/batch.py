@@ -187,6 +187,7 @@ class Batch:
         self.ledger.weigh()
         self.groups.weigh(at_least)
         self.ambient.find_lamps()
+        self.ambient.forget_foreseen()
 
     def shoot_finer(self) -> None:
         """Finer patches shoot from now on, those of lamps for themselves: strong shots again."""

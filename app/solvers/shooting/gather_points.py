@@ -11,8 +11,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from app.errors import UserError
-from app.gpu import Gpu, Pass, Texture
+from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
+from app.solvers.shooting.point_spread import EDGE, PointSpread
 from app.solvers.shooting.records import BLOCK_LEVEL
 from app.visibility.rays import RayScene
 
@@ -31,11 +32,8 @@ class GatherPoints:
         self._gpu, self._lightmap = gpu, lightmap
         self._rays = RayScene(gpu, lightmap.pool)
         bits, tile, own = (lightmap.defines(name) for name in ("MATERIAL_BITS", "TILE", "ALBEDO_TEXTURE"))
-        blocks = {"BLOCK_LEVEL": BLOCK_LEVEL}
-        self._find_around = Pass(gpu, "solvers/shooting/around", defines=bits | tile | blocks)
         self._see_light = Pass(gpu, "solvers/shooting/to_pass_on", defines=bits | own)
-        self._smooth = Pass(gpu, "solvers/shooting/smooth_ambient", defines=tile | blocks)
-        self._spread = Pass(gpu, "solvers/shooting/spread_ambient", defines=blocks)
+        self._smooth = Pass(gpu, "solvers/shooting/smooth_ambient", defines=tile | {"BLOCK_LEVEL": BLOCK_LEVEL})
         try:
             self._fit()
         except UserError:
@@ -44,26 +42,25 @@ class GatherPoints:
 
     def _fit(self) -> None:
         gpu, lightmap = self._gpu, self._lightmap
-        self.columns, self.rows = (edge >> BLOCK_LEVEL for edge in lightmap.size)
-        points = self.columns, self.rows
+        self._spread = PointSpread(gpu, lightmap)
+        points = self.columns, self.rows = self._spread.columns, self._spread.rows
         self._ray_edge = min(RAY_EDGE, gpu.limits.max_texture // max(points))
         looks = {"BLOCK_LEVEL": BLOCK_LEVEL, "RAY_EDGE": self._ray_edge} | lightmap.defines("MATERIAL_BITS")
         traced = looks | lightmap.defines("TILE") | dict(self._rays.defines)
         self._trace = Pass(gpu, "solvers/shooting/gather_hits", defines=traced)
         self._gather = Pass(gpu, "solvers/shooting/gather_ambient", defines=looks)
         self._hits = gpu.texture((self.columns * self._ray_edge, self.rows * self._ray_edge), 1, "u4")
-        self._around = gpu.texture(lightmap.size, 4, "u4")
         self._to_pass_on = gpu.texture(lightmap.size, 4, "f4")
         self._gathered, self._smoothed = gpu.texture(points, 4, "f4"), gpu.texture(points, 4, "f4")
-        self._textures = self._hits, self._around, self._to_pass_on, self._gathered, self._smoothed
+        self._textures = self._hits, self._to_pass_on, self._gathered, self._smoothed
         self._targets = {texture: gpu.target(texture) for texture in self._textures}
         self.leaves_changed()
 
     @property
     def memory(self) -> int:
         """Bytes on the GPU."""
-        points, texels = self.columns * self.rows, self._around.width * self._around.height
-        return points * (4 * self._ray_edge**2 + 2 * 16) + 2 * 16 * texels + self._rays.memory
+        points, texels = self.columns * self.rows, self._to_pass_on.width * self._to_pass_on.height
+        return points * (4 * self._ray_edge**2 + 2 * 16) + 16 * texels + self._spread.memory + self._rays.memory
 
     def leaves_changed(self) -> None:
         """Points are elsewhere, and what rays hit is."""
@@ -75,33 +72,34 @@ class GatherPoints:
         """Whether it is known what the rays of points in a row hit."""
         return bool(self._traced[row])
 
-    def see_light(self, first: int, rows: int) -> None:
-        """See what texels have yet to pass on, those that so many rows of points stand for."""
-        reads = "t_normal_ids", "t_materials", "t_albedo", "t_irradiance", "t_residual", "t_ambient"
-        self._draw(self._see_light, self._to_pass_on, self._lightmap.textures(*reads), (first, rows), 1 << BLOCK_LEVEL)
+    def see_light(self, ambient: Texture, first: int, rows: int) -> None:
+        """See what texels have yet to pass on, those that so many rows of points stand for, of this ambient light too."""
+        reads = "t_normal_ids", "t_materials", "t_albedo", "t_irradiance", "t_residual"
+        seen = self._lightmap.textures(*reads) | {"t_ambient": ambient}
+        self._draw(self._see_light, self._to_pass_on, seen, (first, rows), EDGE)
 
-    def look(self, to_come: Texture, even: Texture, first: int, rows: int) -> None:
-        """Let points in so many rows look around at the light that was seen, and the texels there have the ambient light that
-        they find. to_come: see to_come.frag.glsl; even: even_ambient.frag.glsl."""
-        lightmap, band, edge = self._lightmap, (first, rows), 1 << BLOCK_LEVEL
+    def look(self, even: Texture, first: int, rows: int) -> None:
+        """Let points in so many rows look around at the light that was seen. even: see even_ambient.frag.glsl."""
+        lightmap, band = self._lightmap, (first, rows)
         places = lightmap.textures("t_facets", *PLACES)
-        pages = lightmap.textures("t_pages", "t_leaves")
         beside: dict[str, object] = {"u_pages": (float(lightmap.columns), lightmap.pool.pages_per_texel)}
         rays: dict[str, object] = {"u_rows": lightmap.size[1], "u_points": self.columns}
         if not self._traced[first : first + rows].all():
-            reads = self._rays.textures | pages | lightmap.textures(*PLACES)
+            reads = self._rays.textures | lightmap.textures("t_pages", "t_leaves", *PLACES)
             self._draw(self._trace, self._hits, reads, band, self._ray_edge, rays | beside)
-            self._draw(self._find_around, self._around, places | pages, band, edge, beside)
+            self._spread.find_around(first, rows)
             self._traced[first : first + rows] = True
         found = {"t_hits": self._hits, "t_to_pass_on": self._to_pass_on, "t_even": even}
         self._draw(self._gather, self._gathered, found | places, band, 1, rays)
-        self._draw(self._smooth, self._smoothed, {"t_gathered": self._gathered} | pages, band, 1, beside)
-        found = {"t_around": self._around, "t_gathered": self._smoothed, "t_to_come": to_come}
-        self._spread.draw(
-            lightmap.ambient_target,
-            textures=found | lightmap.textures("t_irradiance"),
-            scissor=self._scissor(band, edge),
-        )
+
+    def spread(self, target: Framebuffer, to_come: Texture, first: int, rows: int) -> None:
+        """Let the texels of so many rows of points have the ambient light that these found, in ``target``. to_come: see
+        to_come.frag.glsl. What points that have not looked yet would find, others around them tell, or it is even."""
+        lightmap = self._lightmap
+        beside: dict[str, object] = {"u_pages": (float(lightmap.columns), lightmap.pool.pages_per_texel)}
+        found = {"t_gathered": self._gathered} | lightmap.textures("t_pages", "t_leaves")
+        self._draw(self._smooth, self._smoothed, found, (first, rows), 1, beside)
+        self._spread.draw(target, self._smoothed, to_come, first, rows)
 
     def _draw(
         self,
@@ -113,12 +111,9 @@ class GatherPoints:
         uniforms: Mapping[str, object] | None = None,
     ) -> None:
         """A band of rows of points, of which each is a square of so many pixels."""
-        scissor = self._scissor(band, edge)
-        program.draw(self._targets[into], textures=textures, uniforms=uniforms, scissor=scissor)
-
-    def _scissor(self, band: tuple[int, int], edge: int) -> tuple[int, int, int, int]:
         first, rows = band
-        return 0, first * edge, self.columns * edge, rows * edge
+        scissor = 0, first * edge, self.columns * edge, rows * edge
+        program.draw(self._targets[into], textures=textures, uniforms=uniforms, scissor=scissor)
 
     def resize(self) -> None:
         """For a lightmap that has got another number of slots."""
@@ -130,4 +125,5 @@ class GatherPoints:
         self._rays.release()
 
     def _release_points(self) -> None:
+        self._spread.release()
         self._gpu.release_all(*self._targets.values(), *self._textures)

@@ -181,6 +181,7 @@ class Outside:
         """Enter in the ledger what was sent out, and what is to come."""
         to_come = {kind: flux[self._at] for kind, flux in self._to_come.items()}
         self._ledger.to_come = sum((self._share_received(k) * flux for k, flux in to_come.items()), np.zeros(3))
+        self._ledger.estimated = any(to_come[kind].any() for kind in (SUNS, SKY))
         self._ledger.foreseen = np.zeros(3) if self._in_turns else self._ledger.to_come
         self._ledger.points = self._points_before + self._to_come[POINTS][0] - to_come[POINTS]
 

@@ -25,6 +25,7 @@ LEVELS = (
     (theme.ICONS.ICON_FA_TRIANGLE_EXCLAMATION, theme.AMBER),
     (theme.ICONS.ICON_FA_CIRCLE_EXCLAMATION, theme.BAD),
 )
+UNKNOWN = theme.ICONS.ICON_FA_HOURGLASS_HALF, theme.DIM
 Row = tuple[str, F64, theme.RGBA, str]  # label, power RGB [W], colour, meaning
 
 
@@ -57,10 +58,11 @@ def shares(balance: EnergyBalance, remaining: float, escaped: F64, *, distribute
     what has ``escaped``, RGB [W], is of the same moment; the balance was measured a little before. Where light overshoots
     [Feda92], surfaces have absorbed what will be taken back from them: that is unshot, not absorbed."""
     emitted = (
-        "Emitted",
+        "Emitted, about" if balance.estimated else "Emitted",
         balance.emitted,
         theme.TEXT,
-        "By all lamps and the sky; not what a lamp sends into a surface that it lies on",
+        "By all lamps and the sky; not what a lamp sends into a surface that it lies on. How much of a sky enters is estimated "
+        "until all of it has shot",
     )
     away = ("Escaped", escaped if distributes else balance.escaped, theme.ESCAPED, "Left the scene where no surface is")
     if not distributes:
@@ -91,13 +93,15 @@ def _imbalance(view: View, stats: Stats) -> None:
     session = view.session
     coarse, finer = session.coarse, session.finer_maps
     verdict = verdict_of(stats.imbalance, session.family, stats.remaining, coarse=coarse, finer=finer)
-    icon, colour = LEVELS[verdict.level]
+    icon, colour = LEVELS[verdict.level] if verdict.known else UNKNOWN
     imgui.text_colored(imgui.ImVec4(*colour), f"{icon} Imbalance")
     _explain()
     imgui.same_line()
     widgets.right(widgets.percent(abs(stats.imbalance)), colour)
     if verdict.text is not None:
-        widgets.wrapped(plain(verdict.text), colour)
+        widgets.one_line(plain(verdict.text), colour)
+    else:
+        imgui.text_unformatted("")  # as high as with something to say
 
 
 def _explain() -> None:

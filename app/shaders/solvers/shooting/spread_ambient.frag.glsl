@@ -2,6 +2,7 @@
 // sources outside have yet to give.
 #include "solvers/shooting/around.glsl"
 #include "solvers/shooting/block.glsl"
+#include "common/even_ambient.glsl"
 
 uniform usampler2D t_around;
 uniform sampler2D t_gathered;  // of gather points, see smooth_ambient.frag.glsl: a is 0 of those that have not looked yet
@@ -9,6 +10,8 @@ uniform sampler2D t_irradiance;
 uniform sampler2D t_to_come;   // see to_come.frag.glsl
 
 layout(location = 0) out vec4 out_ambient;  // see common/ambient.glsl
+
+#define FORESEEN 0  // whether what they receive was found elsewhere, and all of it is still to come
 
 void main() {
     ivec2 px = ivec2(gl_FragCoord.xy);
@@ -24,8 +27,10 @@ void main() {
         vec4 one = texelFetch(t_gathered, ivec2(point & 0xFFFFu, point >> 16) * int(point != NO_POINT), 0);
         sum += weight.x * weight.y * float(point != NO_POINT && one.a > 0.0) * vec4(one.rgb, 1.0);
     }
+    vec4 own = texelFetch(t_gathered, px / BLOCK, 0);
+    vec3 gathered = texelFetch(t_to_come, ivec2(0), 0).rgb;  // no point around has looked yet
+    if (sum.a > 0.0) gathered = sum.rgb / sum.a;
     // a piece of a chart beside the gather point of another one: that sees other things
-    vec3 gathered = sum.a > 0.0 ? sum.rgb / sum.a : clamp(texelFetch(t_gathered, px / BLOCK, 0).rgb, -abs(H), abs(H));
-    vec3 direct = texelFetch(t_to_come, ivec2(0), 0).rgb * H, most = texelFetch(t_to_come, ivec2(1, 0), 0).rgb;
-    out_ambient = vec4(max(gathered + clamp(direct, -most, most), -abs(H)), -max(dot(H, vec3(1.0)), 1e-30));
+    else if (own.a > 0.0) gathered = FORESEEN == 1 ? own.rgb : clamp(own.rgb, -abs(H), abs(H));
+    out_ambient = vec4(max(gathered + from_sources(t_to_come, H), -abs(H)), -max(dot(H, vec3(1.0)), 1e-30));
 }
