@@ -28,7 +28,7 @@ ScalarT = TypeVar("ScalarT", bound=np.generic)
 MAX_FACETS = (1 << 24) - 2  # item ids are held as floats, see common/item.glsl
 TABLE_WIDTH = 2048  # columns of the facet table
 BLOCK = 128  # tiles in work at a time
-FACET_ENTRIES = 3  # of a facet in it, as in common/facet.glsl
+FACET_ENTRIES = 4  # of a facet in it, as in common/facet.glsl
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,11 +332,13 @@ class TilePool:
 
     def _facet_table(self) -> F32:
         """(rows, TABLE_WIDTH, 4): per facet, from 1, see common/facet.glsl: ∂p/∂u per texel of level 0 and its chart; ∂p/∂v; its
-        plane."""
+        plane; where its chart's lower corner would be."""
         charts, count = self.charts, self.charts.facet_count
         rows = -(-FACET_ENTRIES * (count + 1) // TABLE_WIDTH)
         table = np.zeros((rows * TABLE_WIDTH, 4), np.float32)
-        of_u, of_v, of_plane = (table[FACET_ENTRIES + k :: FACET_ENTRIES][:count] for k in range(FACET_ENTRIES))
+        of_u, of_v, of_plane, of_corner = (
+            table[FACET_ENTRIES + k :: FACET_ENTRIES][:count] for k in range(FACET_ENTRIES)
+        )
         of_u[:, :3], of_v[:, :3] = self.dpdu, self.dpdv
         of_u[charts.face_facet, 3] = charts.face_chart
         normal = np.cross(self.dpdu, self.dpdv)
@@ -344,6 +346,9 @@ class TilePool:
         of_plane[:, :3] = normal
         corner = self.space.local_from_world(self.scene.corners[charts.face_triangle, 0])
         of_plane[charts.face_facet, 3] = np.einsum("ij,ij->i", normal[charts.face_facet], corner)
+        u, v = charts.face_uv[:, 0, 0], charts.face_uv[:, 0, 1]
+        along = self.dpdu[charts.face_facet] * u[:, None] + self.dpdv[charts.face_facet] * v[:, None]
+        of_corner[charts.face_facet, :3] = corner - along
         return table.reshape(rows, TABLE_WIDTH, 4)
 
     def _shapes(self, tiles: Tiles) -> NDArray[np.void]:

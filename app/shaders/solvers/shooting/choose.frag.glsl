@@ -12,6 +12,7 @@
 #include "solvers/shooting/emitter_group.glsl"
 #include "solvers/shooting/shooter.glsl"
 #include "solvers/shooting/belongs.glsl"
+#include "solvers/shooting/covered.glsl"
 
 const float WEAKEST = 0.1;       // a shot under a tenth of the batch's best waits for a later batch
 const float MOST_REPRESENTED = 8.0;    // times its own area, a patch may represent
@@ -99,9 +100,9 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
     Shooter s = no_shooter();
     if (lead.area <= 0.0) return s;
     vec3 dpdu = facet_entry(lead.facet, 0).xyz, dpdv = facet_entry(lead.facet, 1).xyz;
-    float texel_size = texelFetch(t_leaves, corner_px / TILE, 0).z;
-    dpdu *= texel_size;
-    dpdv *= texel_size;
+    vec3 leaf = texelFetch(t_leaves, corner_px / TILE, 0).xyz;
+    dpdu *= leaf.z;
+    dpdv *= leaf.z;
     s.chart = chart_of(lead.facet);
     // the facet's own normal: the texels' packed ones tilt by 2^-15, enough to see what lies in the same plane
     s.normal = normalize(cross(dpdu, dpdv));
@@ -111,7 +112,7 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
     float area = 0.0, power = 0.0;
     bool planar = true, alone = true;
     vec2 lit = UNLIT_YET;
-    ivec2 lower = ivec2(size), upper = ivec2(-1);
+    Covered covered = nothing_covered();
     for (int i = 0; i < size * size; ++i) {
         ivec2 at = ivec2(i % size, i / size), px = corner_px + at;
         Texel texel = texel_at(px);
@@ -128,8 +129,8 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
         power += texel.area * own;
         planar = planar && texel.facet == lead.facet;
         lit = lit_with(lit, irradiance_at(px));
-        lower = min(lower, at);
-        upper = max(upper, at);
+        vec2 middle = vec2(px % TILE) + 0.5;
+        add_texel(covered, texel, vec2(at) - 0.5 * float(size - 1), (leaf.xy * float(TILE) + middle) * leaf.z, leaf.z);
     }
     s.area = area;
     s.exitance = flux / area;
@@ -144,9 +145,10 @@ Shooter shooter_from_patch(ivec2 corner_px, int size) {
     s.centre = area_centre / area;
     s.centre -= s.normal * dot(s.centre - s.origin, s.normal);
 
-    // the covered block of texels as a parallelogram in the shooter's plane, scaled to the area that it covers
-    vec2 extent = vec2(upper - lower + 1);
-    vec3 edge_u = dpdu * extent.x, edge_v = dpdv * extent.y;
+    // what is covered as a parallelogram in the shooter's plane, scaled to its area
+    vec2 along, across;
+    covered_edges(covered, along, across);
+    vec3 edge_u = dpdu * along.x + dpdv * along.y, edge_v = dpdu * across.x + dpdv * across.y;
     if (dot(cross(edge_u, edge_v), s.normal) < 0.0) edge_v = -edge_v;
     float scale = sqrt(area / length(cross(edge_u, edge_v)));
     s.edge_u = edge_u * scale;
