@@ -7,10 +7,10 @@ from app.solvers.shooting.audit import SOUND, Found
 from app.solvers.shooting.records import SHOOTER
 
 
-def patch(x: int, size: int, chart: int = 1, *, sees_from: float = 0.0) -> np.void:
-    """Of one unit along its edge."""
+def patch(x: int, size: int, chart: int = 1, *, sees_from: float = 0.0, covers: float = 1.0) -> np.void:
+    """16 texels are one unit along its edge; covers: the share of it that has texels."""
     record = np.zeros(1, SHOOTER.dtype)
-    record["area"], record["origin"] = 1.0, (sees_from, 0.0, 0.0)
+    record["area"], record["origin"] = covers * (size / 16) ** 2, (sees_from, 0.0, 0.0)
     record["patch_x"], record["signed_size"], record["chart"] = x, size, chart
     return record[0]  # type: ignore[no-any-return]
 
@@ -45,6 +45,14 @@ def test_what_all_quarters_lose_is_allowed_to_patches_of_that_chart_alone(found:
 def test_a_patch_without_quarters_that_shoot_is_divided(found: Found) -> None:
     found.learn(patch(0, 16), [])
     assert found.fails(patch(0, 16))
+
+
+def test_a_quarter_that_holds_all_of_a_patch_tells_nothing(found: Found) -> None:
+    corner = patch(0, 16, covers=0.2)
+    found.enter(corner, -0.05)
+    found.enter(patch(0, 8, covers=0.8), -0.05)
+    found.learn(corner, [patch(0, 8, covers=0.8)])
+    assert found.fails(corner)
 
 
 def test_a_patch_that_sees_from_elsewhere_is_audited_again(found: Found) -> None:

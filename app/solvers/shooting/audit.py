@@ -37,8 +37,9 @@ NEAR, AUDITED_NEAR = 0.1, 0.001
 # The middle of what a patch shoots moves as other light comes: by so much of its edge, and it is audited again.
 MOVED = 0.125
 # What a patch makes or loses because of its extent falls as its edge, to half in its quarters: where more than this share of it
-# is left in all of them, it has other causes.
-MENDED = 0.75
+# is left in all of them, it has other causes. A quarter that holds more than half of a patch, where a chart ends in it, tells
+# nothing: it is as wide.
+MENDED, SMALLER = 0.75, 0.5
 
 Patch = tuple[int, int, int]  # column, row, edge
 
@@ -124,7 +125,8 @@ class Found:
 
     def learn(self, shooter: np.void, quarters: list[np.void]) -> None:
         """See whether a known patch is off as much in quarters of it, which are known, too, or has something near."""
-        left = min((self._off[_patch_of(quarter)] for quarter in quarters), key=abs, default=0.0)
+        smaller = [quarter for quarter in quarters if quarter["area"] <= SMALLER * shooter["area"]]
+        left = min((self._off[_patch_of(quarter)] for quarter in smaller), key=abs, default=0.0)
         off = self._off[_patch_of(shooter)]
         if abs(off) > NEAR:
             self.near.add(int(shooter["chart"]))
