@@ -25,6 +25,7 @@ from app.solvers.gathering.compose import RADIUS
 from app.solvers.pairs.gather import CHOICES
 from app.solvers.shooting.gather_points import RAY_EDGE
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
+from app.solvers.shooting.outside_sources import BLENDED_EDGE
 from app.solvers.shooting.records import BATCH, BLOCK_LEVEL, BLOCK_ROWS, CELL_LEVEL, EMITTER, GROUP, LEVELS, RECORDS
 from app.solvers.shooting.see import ESCAPED_BLOCK
 from app.visibility.bvh import DEEPEST
@@ -82,6 +83,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "LIGHTS": FLAG,
     "PIXELS": (1024,),
     "MARGIN": (4,),
+    "MANY_EDGE": (1, *sorted(BLENDED_EDGE.values())),
     "GATHERED": FLAG,
     "TRACED": FLAG,
     "FORESEEN": FLAG,

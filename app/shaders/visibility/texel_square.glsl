@@ -1,12 +1,13 @@
 // Where on a texel visibility is looked up, so that the mean is that over its area: of a light that is in one place, at 4×4 places; of
-// a light that shoots from many, at one, for each of its shots another one. Where one flat surface fills a texel; else, and of the
-// sky, in the middle.
+// a light that shoots from many, at one, for each of its shots another one, or where a part of it passes what is blended by chance,
+// at more. Where one flat surface fills a texel; else, and of the sky, in the middle.
 #include "common/facet.glsl"
 #include "common/tile.glsl"
 #include "common/leaves.glsl"
 
 const float WHOLE = 1e-3;  // of a texel's square that may be missing: rounding
 const int PLACES_EDGE = 4;
+#define MANY_EDGE 1  // places along the edge of a texel, of a shot of a light that shoots from many
 const int MIDDLE = -1;  // the shot of a light that is looked up there
 const vec2 STEP = vec2(0.7548776662466927, 0.5698402909980532);  // of a sequence that fills a square evenly [Roberts18, R2]
 
@@ -36,10 +37,12 @@ vec2 within_texel(vec3 u, vec3 v, vec3 sight, float sample_width) {
 
 // How many places on a texel a shot looks at, and where the nth of them is, from -1/2 to 1/2 along the edges. shot: which of the
 // shots of its light it is, from 1; 0: the only one
-int places_of(int shot) { return shot == 0 ? PLACES_EDGE * PLACES_EDGE : 1; }
+int places_edge(int shot) { return shot == 0 ? PLACES_EDGE : shot == MIDDLE ? 1 : MANY_EDGE; }
+int places_of(int shot) { return places_edge(shot) * places_edge(shot); }
 
 vec2 place_of(int shot, int nth) {
-    vec2 even = (vec2(nth % PLACES_EDGE, nth / PLACES_EDGE) + 0.5) / float(PLACES_EDGE);
+    int edge = places_edge(shot);
+    vec2 even = vec2(nth % edge, nth / edge) / float(edge);
     if (shot == MIDDLE) return vec2(0.0);
-    return (shot == 0 ? even : fract(float(shot) * STEP)) - 0.5;
+    return (shot == 0 ? even + 0.5 / float(edge) : fract(even + float(shot) * STEP)) - 0.5;
 }

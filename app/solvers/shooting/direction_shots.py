@@ -18,7 +18,7 @@ from app.scene.sky_directions import axes_of
 from app.solvers.shooting.choose import band_of
 from app.solvers.shooting.equipment import Equipment
 from app.solvers.shooting.ledger import Ledger
-from app.solvers.shooting.outside_sources import OutsideShot
+from app.solvers.shooting.outside_sources import SUNS, OutsideShot, places_edge
 from app.solvers.shooting.records import BATCH, BLOCK_ROWS, IN_BLOCKS, OPEN, RECORDS, SHOOTER
 from app.solvers.shooting.see import MAPS_TEXELS
 
@@ -44,6 +44,7 @@ class DirectionShots:
             for sheer, more in kinds.items()
         }
         reads = lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE", "TILE")
+        reads |= {"MANY_EDGE": places_edge(SUNS, lightmap.scene)}
         self._receive, self._receive_rects = (
             Pass(gpu, "solvers/shooting/direction_receive", defines=defines | reads, slots=RECORDS, vertex=vertex)
             for vertex in ("common/fullscreen", "common/rects")

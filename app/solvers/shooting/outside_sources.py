@@ -28,6 +28,8 @@ APART_ANGLE = 1e-4
 SKY = "sky"  # name of the directions of the sky: they shoot in the order in which some of the first are spread over all of it
 POINTS, SUNS = "points", "suns"
 KINDS = POINTS, SUNS, SKY
+# places along the edge of a texel that a shot looks at where something is blended: 128 in all of one light
+BLENDED_EDGE = {POINTS: 2, SUNS: 4}
 LEAST = 1e-9  # of the strongest, that a difference has to be
 
 # What each source sends out, RGB: intensity of a point [W/sr], irradiance of a direction [W/m²]; by the light without it
@@ -101,6 +103,11 @@ def sources_of(scene: Scene, lightmap: Lightmap) -> Sources:
     if scene.sky is not None:
         _add(found, _directions(sky_directions(scene.sky), SKY))
     return found
+
+
+def places_edge(kind: str, scene: Scene) -> int:
+    """Places along the edge of a texel that each of many shots of a light looks at."""
+    return BLENDED_EDGE[kind] if any(m.blended for m in scene.materials) else 1
 
 
 def _add(found: Sources, more: Iterable[tuple[Light, F64]]) -> None:
@@ -204,4 +211,14 @@ def difference(wanted: Sources, given: Sources) -> Sources:
     return {source: light for source, light in change.items() if np.abs(light).sum() > LEAST * most[source.from_afar]}
 
 
-__all__ = ["OutsideShot", "Sources", "difference", "in_turns", "light_of", "share_of_shot", "shots_of", "sources_of"]
+__all__ = [
+    "OutsideShot",
+    "Sources",
+    "difference",
+    "in_turns",
+    "light_of",
+    "places_edge",
+    "share_of_shot",
+    "shots_of",
+    "sources_of",
+]

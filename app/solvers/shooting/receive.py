@@ -11,6 +11,7 @@ from app.gpu import Framebuffer, Gpu, Mesh, Pass
 from app.lightmap.lightmap import Lightmap
 from app.solvers.shooting.choose import band_of
 from app.solvers.shooting.options import VISIBILITIES, ShootingOptions
+from app.solvers.shooting.outside_sources import POINTS, places_edge
 from app.solvers.shooting.receivers import Receivers
 from app.solvers.shooting.records import IN_BLOCKS, RECORDS
 from app.solvers.shooting.see import See
@@ -45,7 +46,7 @@ class Receive:
             "VISIBILITY": VISIBILITIES.index(options.visibility),
         }
         if self._see.lights is not None:
-            defines |= {"LIGHT": True, "POINT": True}
+            defines |= {"LIGHT": True, "POINT": True, "MANY_EDGE": places_edge(POINTS, self._lightmap.scene)}
         else:
             defines |= {"DISC": options.form_factor == "disc", "DISC_SUBDIVISION": options.discs, "NEAR_FIELD": near}
         return Pass(
