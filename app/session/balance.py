@@ -46,9 +46,13 @@ def verdict_of(
     if not family.distributes and abs(imbalance) < remaining:
         return Verdict(0, f"no more than the {family.remains} that is left", known=False)
     what = "is lost" if imbalance > 0 else "comes from nothing"
-    return Verdict(
-        2 if abs(imbalance) >= TOO_MUCH else 1, f"{abs(imbalance):.1%} of the light {what}: {_remedy(family, finer)}"
-    )
+    level = 2 if abs(imbalance) >= TOO_MUCH else 1
+    return Verdict(level, f"{per_cent(abs(imbalance))} of the light {what}: {_remedy(family, finer)}")
+
+
+def per_cent(share: float, sign: str = "") -> str:
+    """A share of the light as it reads everywhere: with two decimals, or one from 10 % on. sign: as of a format."""
+    return f"{share:{sign}.{1 if abs(share) >= 0.1 else 2}%}"
 
 
 def finer_maps(charts: Charts, across: float, resolution: int) -> int | None:
@@ -76,4 +80,4 @@ def _remedy(family: Family, finer: int | None) -> str:
     return f"{why} large beside what stands between them; smaller ones ({smaller}){pixels}{other} would do"
 
 
-__all__ = ["FINE", "TOO_MUCH", "Verdict", "finer_maps", "verdict_of"]
+__all__ = ["FINE", "TOO_MUCH", "Verdict", "finer_maps", "per_cent", "verdict_of"]

@@ -11,7 +11,7 @@ from app.render.seen import seen_texels
 from app.scene.load import NO_LIGHT
 from app.scene.model import F64
 from app.scene.options import FileOptions
-from app.session.balance import verdict_of
+from app.session.balance import per_cent, verdict_of
 from app.session.session import Reading, Session
 from app.session.view import View
 
@@ -96,10 +96,10 @@ def _error(session: Session) -> dict[str, Any]:
 
 def notes(session: Session) -> list[str]:
     """What the solver has to say of the solution, and what its energy balance says of it."""
-    note = session.run.progress.note
-    verdict = verdict_of(session.stats.imbalance, session.family, finer=session.finer_maps)
+    note, stats = session.run.progress.note, session.stats
+    verdict = verdict_of(stats.imbalance, session.family, stats.remaining, finer=session.finer_maps)
     found = [] if note is None else [note]
-    if verdict.text is not None and verdict.level > 1:
+    if verdict.text is not None and verdict.known:
         found.append(verdict.text)
     return found
 
@@ -115,5 +115,6 @@ def summary(session: Session, result: dict[str, Any]) -> str:
     state = "stopped early" if result["interrupted"] else "converged" if result["converged"] else "stopped as asked"
     return (
         f"{session.family.words(stats.done)} in {stats.seconds:.1f} s, {stats.remaining:.2%} {stats.remains} ({state}), "
-        f"{result['texels']} texels, energy imbalance {result['imbalance']:+z.2%}{compared}, {result['renderer']}"
+        f"{result['texels']} texels, energy imbalance {per_cent(result['imbalance'], '+z')}{compared}, "
+        f"{result['renderer']}"
     )

@@ -12,6 +12,7 @@ from app.render.options import DisplayOptions
 from app.solvers import SOLVERS
 
 FLAG = re.compile(r"(?<![\w-])--(?:no-)?([a-z][a-z-]*)")
+PERCENT = re.compile(r"(?<=\d)%")
 SOLVER = re.compile(r"--solver (\w+)")
 PLACES = {
     "light": "Ceiling in the Lights panel",
@@ -37,7 +38,9 @@ def meaning(spec: Spec, off: str | None = None) -> str:
 
 
 def plain(text: str) -> str:
-    """``text``, with the name that a control has instead of its flag: "--solver gathering" is Gathering, "--density" Density."""
+    """``text``, with the name that a control has instead of its flag, "--solver gathering" is Gathering, "--density" Density, and
+    with numbers as they stand beside it: "2.10%" is 2.10 %."""
+    text = PERCENT.sub(" %", text)
     text = SOLVER.sub(lambda found: SOLVERS[found[1]].title if found[1] in SOLVERS else found[0], text)
     return FLAG.sub(lambda found: PLACES.get(found[1]) or title(found[1].replace("-", "_")), text)
 

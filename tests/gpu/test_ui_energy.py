@@ -67,7 +67,7 @@ def test_window_and_report_say_the_same(desk: Desk, monkeypatch: pytest.MonkeyPa
     desk.session.imbalance = 0.13
     desk.frames()
     run = SimpleNamespace(progress=SimpleNamespace(note=None))
-    stats, family = SimpleNamespace(imbalance=0.13), desk.session.family
+    stats, family = SimpleNamespace(imbalance=0.13, remaining=0.0), desk.session.family
     (note,) = notes(SimpleNamespace(family=family, stats=stats, run=run, finer_maps=None))  # type: ignore[arg-type]
     assert plain(note) in said and note.startswith("13.0% of the light is lost: ")
     assert "--" in note and not any("--" in text for text in said)

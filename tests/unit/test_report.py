@@ -11,19 +11,21 @@ import pytest
 from app.session.balance import finer_maps
 from app.session.report import notes, summary
 from app.solvers import SOLVERS
+from app.ui import widgets
+from app.ui.words import plain
 
 
 def ended(solver: str, imbalance: float, note: str | None = None) -> Any:
     """A session, as far as notes ask it."""
     return SimpleNamespace(
         family=SOLVERS[solver],
-        stats=SimpleNamespace(imbalance=imbalance),
+        stats=SimpleNamespace(imbalance=imbalance, remaining=0.0),
         run=SimpleNamespace(progress=SimpleNamespace(note=note)),
         finer_maps=None,
     )
 
 
-@pytest.mark.parametrize(("imbalance", "words"), [(0.063, "6.3% of the light is lost"), (-0.2, "comes from nothing")])
+@pytest.mark.parametrize(("imbalance", "words"), [(0.063, "6.30% of the light is lost"), (-0.2, "comes from nothing")])
 def test_light_that_is_lost_or_made_is_told(imbalance: float, words: str) -> None:
     said = notes(ended("shooting", imbalance, "leaves are out of memory"))
     assert said[0] == "leaves are out of memory"
@@ -48,7 +50,15 @@ def test_it_names_finer_maps_where_much_of_the_surface_is_a_few_pixels_wide() ->
 
 
 def test_an_even_balance_needs_no_word() -> None:
-    assert notes(ended("shooting", 0.019)) == []
+    assert notes(ended("shooting", 0.0049)) == []
+
+
+def test_the_console_says_what_the_panel_says_in_the_same_figures() -> None:
+    (said,) = notes(ended("shooting", 0.00583))
+    assert "0.58% of the light is lost" in said and plain("0.58% of").startswith(widgets.percent(0.00583))
+    noisy = ended("gathering", 0.019)
+    noisy.stats.remaining = 0.03
+    assert notes(noisy) == []
 
 
 @pytest.mark.parametrize(("imbalance", "words"), [(-1e-6, "+0.00%"), (-0.012, "-1.20%")])
