@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +30,7 @@ class Limits:
 
 
 class Gpu:
-    """A context with its shader library and pass timers.
+    """A context with its shader library and pass timers. compiling: whether passes draw only so that programs are compiled.
 
     Raises GpuError when the context is older than OpenGL 4.1.
     """
@@ -49,6 +50,7 @@ class Gpu:
             raise GpuError(f"OpenGL {ctx.version_code / 100:.1f} on {self.limits.renderer}: 4.1 or newer is needed")
         self.shaders = ShaderLibrary(ctx)
         self.timers = Timers(ctx)
+        self.compiling = False
 
     @property
     def software(self) -> bool:
@@ -89,6 +91,15 @@ class Gpu:
         self.ctx.detect_framebuffer(0).use()
         for resource in sorted(resources, key=lambda r: not isinstance(r, moderngl.Framebuffer)):
             resource.release()
+
+    @contextlib.contextmanager
+    def only_compiling(self) -> Iterator[None]:
+        """Passes draw a pixel at most while inside: drivers compile a program when it first draws. What is drawn is wrong."""
+        self.compiling = True
+        try:
+            yield
+        finally:
+            self.compiling = False
 
     def release(self) -> None:
         self.shaders.release()

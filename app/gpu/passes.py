@@ -18,6 +18,7 @@ from app.gpu.context import Gpu
 from app.gpu.shader import FULLSCREEN, Glsl, ShaderError
 
 GL_CLIP_DISTANCE0 = 0x3000
+ONE_SHAPE = 4  # vertices, at most, of a triangle or of a strip of two
 BLEND: dict[str, Any] = {
     "add": (moderngl.ONE, moderngl.ONE),
     "multiply": (moderngl.ZERO, moderngl.SRC_COLOR),
@@ -91,6 +92,8 @@ class Pass:
         for name, value in (uniforms or {}).items():
             self._uniforms[name].value = value
         ctx = self.gpu.ctx
+        if self.gpu.compiling:
+            vertices, instances, scissor = min(vertices, ONE_SHAPE), 1, (0, 0, 1, 1)
         target.use()
         target.viewport = viewport or (0, 0, *target.size)
         if scissor:
@@ -108,10 +111,13 @@ class Pass:
                 array.render(mode, vertices=vertices, instances=instances)
             else:
                 array = mesh.vertex_array(self.program)
+                some = self.gpu.compiling
                 if mesh.per_instance:
-                    array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=mesh.count)
+                    array.render(
+                        moderngl.TRIANGLE_STRIP, vertices=4, instances=min(mesh.count, 1) if some else mesh.count
+                    )
                 else:
-                    array.render(mode, vertices=mesh.visible_mesh, instances=instances)
+                    array.render(mode, vertices=ONE_SHAPE if some else mesh.visible_mesh, instances=instances)
         if scissor:  # or later clears would keep it
             target.scissor = None  # type: ignore[assignment]  # None is no scissor; moderngl's stub is wrong
         for plane in range(clip_distances):

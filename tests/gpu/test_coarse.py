@@ -361,6 +361,23 @@ def test_programs_draw_once_before_light_needs_them(
     assert warmed_for("furnace") == 1
 
 
+def test_programs_that_only_are_to_be_compiled_draw_next_to_nothing(gpu: Gpu) -> None:
+    """And light is then as without."""
+    session = Session(gpu, atlas=AtlasOptions(texels=2000))
+    session.open_now("furnace")
+    session.work(4)
+    light = session.lightmap.irradiance()
+    session.solver.reset()
+    for _ in session.solver.warm_up():
+        pass
+    assert (session.lightmap.irradiance() != 0).any(-1).sum() <= 1 < (light != 0).any(-1).sum()
+    session.solver.reset()
+    session.restart()
+    session.work(4)
+    np.testing.assert_array_equal(session.lightmap.irradiance(), light)
+    session.release()
+
+
 def test_nothing_stays_on_the_gpu(
     gpu: Gpu, view: View, better: threading.Event, forgotten: Callable[[], list[object]]
 ) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -381,15 +382,14 @@ class Shooting:
 
     def warm_up(self) -> Iterator[None]:
         """Every pass, and how finer patches are chosen."""
-        for run in self.passes(1).values():
-            run()
+        runs: list[Callable[[], object]] = [*self.passes(1).values()]
+        runs += [partial(run_to_end, self.batch.choose_once(choice, 1)) for choice in self.batch.phases.choices[1:]]
+        for run in runs:
+            with self.gpu.only_compiling():
+                run()
             self.gpu.ctx.finish()
             yield
         yield from self.batch.outside.warm_up()
-        for choice in self.batch.phases.choices[1:]:
-            run_to_end(self.batch.choose_once(choice, 1))
-            self.gpu.ctx.finish()
-            yield
 
     def release(self) -> None:
         if self._leaves is not None:
