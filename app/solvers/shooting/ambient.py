@@ -238,6 +238,7 @@ class Ambient:
                 "u_area": ledger.area,
                 "u_albedo": ledger.albedo,
                 "u_rest": float(even),
+                "u_ahead": ledger.ahead,
                 "u_outside": tuple((ledger.foreseen / ledger.watt).tolist()),
             },
         )

@@ -28,8 +28,10 @@ class Ledger:
     emitted: by all lamps, and from outside, RGB [W]; of that lamps: by those with an area; directions: what has come from the sky
     and directional lights, as far as it is known; points: what point and spot lights have sent out; to_come: about what of either
     is still to come; foreseen: of that what the picture shows as ambient light: nothing while lights replace others, which
-    lit other places. estimated: whether to_come is not known for sure. albedo: mean of all texels, RGB; area: of all texels,
-    solver space: see ``weigh``. watt: watts in one stored unit of power, the lightmap's unit [W/m²] times solver area.
+    lit other places, nor of a kind that has yet to begin. estimated: whether to_come is not known for sure. ahead: what is
+    foreseen besides, over what has come from directions: where nobody has heard yet how much that is. albedo: mean of all texels,
+    RGB; area: of all texels, solver space: see ``weigh``. watt: watts in one stored unit of power, the lightmap's unit
+    [W/m²] times solver area.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, shooters: ShooterBatch) -> None:
@@ -46,7 +48,7 @@ class Ledger:
         self._enter_directions = Pass(gpu, "solvers/shooting/ledger_directions", slots=RECORDS)
         self.lamps, self.albedo, self.area = np.zeros(3), (0.0, 0.0, 0.0), 0.0
         self.directions = self.points = self.to_come = self.foreseen = np.zeros(3)
-        self.estimated = False
+        self.estimated, self.ahead = False, 0.0
         self._fit()
 
     def _fit(self) -> None:

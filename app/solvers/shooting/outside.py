@@ -88,7 +88,8 @@ class Outside:
         self._given: Sources = {}
         self._queue: list[OutsideShot] = []
         self._at = self.made = 0
-        self._received, self._box_sent = dict.fromkeys(KINDS, 0.0), dict.fromkeys(KINDS, 0.0)  # of directions [W]
+        self._received, self._box_sent = dict.fromkeys(KINDS, 0.0), dict.fromkeys(KINDS, 0.0)  # of directions [W],
+        self._box_out = dict.fromkeys(KINDS, 0.0)  # and of all that were shot, also where no report of it is there
         self.change()
 
     def change(self) -> None:
@@ -180,9 +181,14 @@ class Outside:
     def _enter(self) -> None:
         """Enter in the ledger what was sent out, and what is to come."""
         to_come = {kind: flux[self._at] for kind, flux in self._to_come.items()}
-        self._ledger.to_come = sum((self._share_received(k) * flux for k, flux in to_come.items()), np.zeros(3))
+        arriving = {kind: self._share_received(kind) * flux for kind, flux in to_come.items()}
+        self._ledger.to_come = sum(arriving.values(), np.zeros(3))
+        begun = [kind for kind in KINDS if kind == POINTS or self._box_sent[kind] > 0]  # a sun tells little of a sky
+        out, kind = sum(self._box_out.values()), self.sent.kind
+        alone = out > 0 and out == self._box_out[kind] and begun == [POINTS] and not self._in_turns
+        self._ledger.ahead = self._powers[kind] / out if alone else 0.0
         self._ledger.estimated = any(to_come[kind].any() for kind in (SUNS, SKY))
-        self._ledger.foreseen = np.zeros(3) if self._in_turns else self._ledger.to_come
+        self._ledger.foreseen = np.zeros(3) if self._in_turns else sum((arriving[k] for k in begun), np.zeros(3))
         self._ledger.points = self._points_before + self._to_come[POINTS][0] - to_come[POINTS]
 
     # -- shots ---------------------------------------------------------------------------------------------------------
@@ -202,6 +208,7 @@ class Outside:
         self.made += count
         power = 0.0 if first.kind == POINTS else float(sum(np.abs(shot.flux).sum() for shot in now))
         self.sent = Sent(self._powers, first.kind, power)
+        self._box_out[first.kind] += power
         self._enter()
         return count
 

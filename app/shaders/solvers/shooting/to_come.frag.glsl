@@ -5,10 +5,13 @@
 // light about what the first did. Of lamps Φ is f of what is unshot, f the share of what was shot until now that stayed in the
 // scene. But one lamp, or a sun, lights other places than the lamps, or the sky, that follow: a texel has MOST times the mean at most.
 //
-// The rest is even until gather points know it of each texel: of the even ambient term what lamps give at once is left out, and what
-// all that comes from outside will give, reflected, is added:
+// The rest is even until gather points know it of each texel: what surfaces have yet to shoot, and all reflections of that, of lamps
+// and of what comes from outside:
 //
-//   a - Φ_lamps f / A + ρf Φ_outside / (A (1 - ρf))
+//   ((Φ_surfaces + ρ Φ_outside) f + ρ Φ_lamps f²) / (A (1 - ρf))
+//
+// The first f is that of all light, from outside too, as in the even ambient term; reflections take that of what patches shot: until
+// these have, nobody knows how much leaves the scene through the windows that let it in.
 #include "solvers/shooting/so_far.glsl"
 
 uniform sampler2D t_lamps;  // one texel: Σ r A of lamps, and Σ |r A| over blocks, summed over RGB
@@ -16,6 +19,7 @@ uniform sampler2D t_even;   // one texel, see even_ambient.frag.glsl
 uniform vec3 u_albedo;
 uniform float u_area;  // of all texels, solver space
 uniform vec3 u_outside;  // power that is still to come from outside
+uniform float u_ahead;   // and over what has come from there, as long as the host does not know that
 uniform float u_rest;    // 0 leaves out the rest
 
 layout(location = 0) out vec4 out_to_come;  // see common/even_ambient.glsl
@@ -29,10 +33,12 @@ void main() {
     vec3 unshot = mix(vec3(0.0), lamps.rgb, greaterThan(abs(lamps.rgb), vec3(CANCELS * lamps.a)));
     SoFar all = so_far();
     vec3 stays = share_stayed(all.shot, all.gone), arrived = max(all.shot * stays + all.directions, vec3(1e-30));
-    vec3 to_come = unshot * stays + u_outside, stays_of_all = share_stayed(all.shot + all.directions, all.gone);
-    vec3 reflected = u_albedo * stays_of_all, area = vec3(max(u_area, 1e-30));
-    vec3 even = texelFetch(t_even, ivec2(0), 0).rgb - unshot * stays_of_all / area;
-    even += u_outside * reflected / (area * max(1.0 - reflected, LEAST_LOST));
+    vec3 outside = u_outside + u_ahead * all.directions, to_come = unshot * stays + outside;
+    vec3 of_all = share_stayed(all.shot + all.directions, all.gone);
+    float area = max(u_area, 1e-30);
+    vec3 all_unshot = texelFetch(t_even, ivec2(0), 0).rgb * area * max(1.0 - u_albedo * of_all, LEAST_LOST) / max(of_all, 1e-6);
+    vec3 reflected = u_albedo * stays, at_first = (all_unshot - unshot + u_albedo * outside) * of_all;
+    vec3 even = (at_first + reflected * unshot * stays) / (area * max(1.0 - reflected, LEAST_LOST));
     int which = int(gl_FragCoord.x);
     out_to_come = vec4(which == 0 ? u_rest * even : which == 1 ? to_come / arrived : MOST * abs(to_come) / area, 0.0);
 }
