@@ -317,7 +317,7 @@ class Run:
 
         def over(_: Progress) -> bool:
             nonlocal told, ask_at
-            if left is not None and left.near:
+            if left is not None and left.waits:
                 self._gpu.ctx.finish()
             now = time.perf_counter()
             self.seconds = now - start

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-NEAR_END = 2  # times as long as the last piece of work took: from there on the GPU is waited for
+NEAR_END = 2  # times as long as the last piece of work took: from there on the GPU is waited for,
+LONG = 0.1  # s: and after pieces that took longer, which it costs little
 
 
 class TimeLeft:
@@ -11,19 +12,24 @@ class TimeLeft:
     def __init__(self, seconds: float, grain: int) -> None:
         self._seconds, self._grain = seconds, grain
         self._issued, self._now, self._last = 0, 0.0, 0.0
-        self._each = 0.0  # seconds that a unit takes, by the last piece of work that issued any
+        self._rates = (0.0, 0.0)  # seconds that a unit took in the last two pieces of work that issued any
 
     def piece(self, issued: int, now: float) -> None:
         """A piece of work is over: so much has been issued until now [s]."""
         more, self._last = issued - self._issued, now - self._now
         if more > 0:
-            self._each = self._last / more
+            self._rates = self._rates[1], self._last / more
         self._issued, self._now = issued, now
 
     @property
-    def near(self) -> bool:
-        """Whether few pieces are left, so that each is to be timed well."""
-        return self._seconds - self._now < NEAR_END * self._last
+    def _each(self) -> float:
+        """Seconds that a unit takes: some pieces have more to do than others."""
+        return max(self._rates)
+
+    @property
+    def waits(self) -> bool:
+        """Whether the GPU is to be waited for after the next piece, so that it is timed well: else it may be one behind."""
+        return self._each == 0.0 or self._last > LONG or self._seconds - self._now < NEAR_END * self._last
 
     @property
     def over(self) -> bool:
