@@ -26,7 +26,6 @@ MOST_PIECES = 1 << 12  # beyond which most are copies or loose parts, whose bett
 def coarse_charts(scene: Scene, tile: int, texels: int, report: Report) -> Charts | None:
     """Those of a scene's lit sides, of about so many texels; None where it falls apart into too many pieces. tile: texels along
     the edge of a leaf. report(share) is called now and then and may raise to cancel."""
-    lit = sides_with_texels(scene)
     normals = scene.normals_areas[0]
     axis = np.abs(normals).argmax(axis=1)
     way = 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0)
@@ -39,6 +38,7 @@ def coarse_charts(scene: Scene, tile: int, texels: int, report: Report) -> Chart
     report(0.5)
     if count > MOST_PIECES:
         return None
+    lit = sides_with_texels(scene)
     layout = scaled(measured(piece, _seen_along(scene.corners, way), np.empty((0, 2)), lit, edges), scene)
     density = density_for(layout, texels)
     facet = np.arange(len(piece), dtype=np.int32)

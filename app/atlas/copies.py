@@ -140,8 +140,8 @@ def _centred(corners: F64) -> F64:
 def _fits(copies: F64, shape: F64) -> NDArray[np.bool_]:
     """(k,) whether points (k, n, 3) about their centre are those of a shape (1, n, 3), turned and scaled [Kabsch76]."""
     radius = np.sqrt((copies**2).sum((1, 2)) / np.maximum((shape**2).sum(), np.finfo(float).tiny))
-    u, _, v = np.linalg.svd(np.einsum("kni,nj->kij", copies, shape[0]))
+    u, _, v = np.linalg.svd(copies.transpose(0, 2, 1) @ shape[0])
     u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]  # no mirror
-    placed = radius[:, None, None] * np.einsum("nj,kij->kni", shape[0], u @ v)
+    placed = radius[:, None, None] * (shape[0] @ (u @ v).transpose(0, 2, 1))
     off = np.abs(copies - placed).max((1, 2))
     return np.asarray(off <= SAME * radius * np.abs(shape).max())

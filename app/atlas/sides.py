@@ -138,6 +138,14 @@ def numbered(label: NDArray[np.integer]) -> NDArray[np.int64]:
     return np.asarray((np.cumsum(used) - 1)[label], np.int64)
 
 
+def kinds(label: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The labels (…), which are not negative, that there are, and the number (…) of each among these, as np.unique has them."""
+    number = numbered(label)
+    found = np.empty(int(number.max(initial=-1)) + 1, np.int64)
+    found[number.reshape(-1)] = label.reshape(-1)
+    return found, number
+
+
 def not_alone(rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """The rows (n, k) that have an equal one; few others, that only seem to have."""
     mixed = (rows.astype(np.uint64) * np.cumprod(np.full(rows.shape[1], SPREAD))).sum(axis=1)

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from app.atlas.copies import find_surfaces
 from app.atlas.large_surfaces import large_surfaces, pieces, seen_whole
-from app.atlas.sides import distinct_rows, middle, totals
+from app.atlas.sides import distinct_rows, kinds, middle, numbered, totals
 from app.scene.model import F64, I32
 from app.util import cache
 
@@ -81,7 +81,7 @@ def unwrap(
     warnings: list[str] = []
     tell = progress or (lambda stage, share: None)
     surfaces = find_surfaces(points, triangles, groups)
-    originals, of = np.unique(surfaces.original, return_inverse=True)
+    originals, of = kinds(surfaces.original)
     whole, uv = seen_whole(
         points,
         triangles[originals],
@@ -107,7 +107,7 @@ def unwrap(
     if len(originals) < len(triangles):
         chart, uv = _of_copies(chart[of], surfaces.surface), uv[of]
     chart, uv = _to_scale(chart, uv, corners)
-    count, laid = int(chart.max()) + 1, len(np.unique(chart[(whole >= 0)[of] & (chart >= 0)]))
+    count, laid = int(chart.max()) + 1, len(kinds(chart[(whole >= 0)[of] & (chart >= 0)])[0])
     rest = np.flatnonzero(chart < 0)
     if len(rest):
         label = np.unique(facet[rest], return_inverse=True)[1].astype(np.int32)
@@ -137,10 +137,9 @@ def _xatlas(
     progress: Progress,
 ) -> tuple[I32, F64]:
     """xatlas's own charts, from the cache or from a worker."""
-    used, local = np.unique(triangles, return_inverse=True)
+    used, local = kinds(triangles)
     centred = points[used] - (points[used].min(axis=0) + points[used].max(axis=0)) / 2
     centred *= XATLAS_SIZE / np.linalg.norm(np.ptp(centred, axis=0))
-    local = local.reshape(-1, 3)
     meshes, scale, most_area = _meshes(centred[local], groups, surface)
     given = {
         "positions": centred.astype(np.float32),
@@ -172,7 +171,7 @@ def _meshes(corners: F64, groups: I32, surface: NDArray[np.int64]) -> tuple[I32,
     Small surfaces of a group are a mesh together, to no other scale, and their charts as large as xatlas likes.
     """
     large = large_surfaces(surface)
-    mesh = np.unique(groups, return_inverse=True)[1].astype(np.int32)
+    mesh = numbered(groups).astype(np.int32)
     if not large:
         return mesh, np.ones(int(mesh.max()) + 1, np.float32), 0.0
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
@@ -182,7 +181,7 @@ def _meshes(corners: F64, groups: I32, surface: NDArray[np.int64]) -> tuple[I32,
     number = int(mesh.max()) + 1
     for k, rows in enumerate(parts):
         mesh[rows] = number + k
-    mesh = np.unique(mesh, return_inverse=True)[1].astype(np.int32)
+    mesh = numbered(mesh).astype(np.int32)
     scale = np.ones(int(mesh.max()) + 1)
     for rows in parts:
         scale[mesh[rows[0]]] = np.sqrt(
@@ -250,7 +249,7 @@ def _to_scale(chart: I32, uv: F64, corners: F64) -> tuple[I32, F64]:
     uv *= scale[label][:, None, None]
     chart[inside & ~(flat * scale[label] ** 2 > LEAST_SHARE * area)] = -1
     inside = chart >= 0
-    chart[inside] = np.unique(chart[inside], return_inverse=True)[1]
+    chart[inside] = numbered(chart[inside])
     return chart, uv
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from app.atlas.sides import FEW, WELD, Edges, distinct_rows, numbered, rows_by, scene_size, weld
+from app.atlas.sides import FEW, WELD, Edges, distinct_rows, kinds, numbered, rows_by, scene_size, weld
 from app.scene import shapes
 from app.scene.model import Material, Scene
 
@@ -59,3 +60,12 @@ def test_corners_that_nearly_coincide_are_joined() -> None:
     apart = cKDTree(points).query_pairs(WELD * scene_size(scene), output_type="ndarray")
     assert len(points) < len(np.unique(positions, axis=0)) and not len(apart)
     assert np.abs(points[welded] - scene.corners).max() < 4 * WELD * scene_size(scene)
+
+
+@pytest.mark.parametrize(
+    "labels", [np.array([[5, 0, 5], [9, 5, 0]]), np.array([10**9, 3, 10**9]), np.empty(0, np.int64)]
+)
+def test_kinds_are_those_of_unique(labels: NDArray[np.int64]) -> None:
+    found, number = kinds(labels)
+    wanted, of = np.unique(labels, return_inverse=True)
+    assert found.tolist() == wanted.tolist() and number.tolist() == of.reshape(labels.shape).tolist()
