@@ -36,6 +36,7 @@ FLAG = (False, True)
 # What a host may set a define to: every choice, of a plain number its end. A define that no host sets is a constant.
 DEFINES: Mapping[str, tuple[object, ...]] = {
     "VECTOR_ROWS": (16,),
+    "RAYS": (4,),
     "RESOLUTION": (int(OPTION["resolution"].minimum),),
     "LEVEL": tuple(range(MAX_LEVEL + 1)),
     "HIGHEST": (MAX_LEVEL,),

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
-from solver_scenes import Solution, begin, table_room
+from solver_scenes import Solution, begin, grey, quads_scene, room, table_room
 
 from app.errors import UserError
 from app.gpu import Gpu, Texture
@@ -118,6 +118,31 @@ def test_a_bright_room_is_beyond_sixteen_bits_and_the_solve_says_so(gpu: Gpu) ->
         assert (note is not None and "--bits 32" in note) == said
         assert (abs(np.average(lit.H.mean(1), weights=lit.area) * 0.001 - 1) < 0.01) != said
         lit.release()
+
+
+# -- light with edges --------------------------------------------------------------------------------------------------
+
+
+def test_light_is_reflected_from_where_it_falls(gpu: Gpu) -> None:
+    """The floor is four patches, most of each in the shade of a low table, whose underside sees their lit rims from afar. Were
+    they as bright all over, it would have more than three times the light. Further bounces are those of whole patches, which
+    adds a sixth: the rims are the brightest to the walls, too."""
+    lamp = [[1.5, 2.5, 1.5], [2.5, 2.5, 1.5], [2.5, 2.5, 2.5], [1.5, 2.5, 2.5]]
+    top = np.array([[0.5, 0.3, 0.5], [0.5, 0.3, 3.5], [3.5, 0.3, 3.5], [3.5, 0.3, 0.5]])
+    underside = top[::-1] - [0.0, 0.05, 0.0]
+    scene = quads_scene(
+        [*room((4.0, 3.0, 4.0)), lamp, top, underside], [grey(0.1), grey(0.0, 20.0)], [0] * 6 + [1, 0, 0]
+    )
+    gathered = begin(gpu, scene, density=4, solver="gathering", noise=1e-3, smooth=False)
+    gathered.gather(256)
+    lit = lit_by(gpu, scene, 4, patch_level=3, rays=1024)
+    assert (matrix_of(lit).patches.end - matrix_of(lit).patches.start).max() == 64
+    found, wanted = (
+        np.average(one.H[one.object == 8].mean(1), weights=one.area[one.object == 8]) for one in (lit, gathered)
+    )
+    assert found == pytest.approx(wanted, rel=0.2)
+    gathered.release()
+    lit.release()
 
 
 # -- rows --------------------------------------------------------------------------------------------------------------

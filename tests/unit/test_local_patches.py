@@ -10,10 +10,15 @@ from solver_scenes import table_room
 from app.atlas.parametrize import parametrize
 from app.lightmap.tile_pool import TilePool
 from app.scene.model import Material
-from app.solvers.local.patches import Patches, morton, patch_count, patches_of
+from app.solvers.local.patches import CELL_BITS, Patches, morton, patch_count, patches_of
 from app.solvers.local.selection import Selection, distances, ranges, swaps
 
 MOST = 200
+
+
+def enclosed(texels: NDArray[np.int64]) -> NDArray[np.float64]:
+    """No ray of any texel is lost."""
+    return np.zeros(len(texels))
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +29,7 @@ def pool() -> TilePool:
 
 @pytest.fixture(scope="module")
 def patches(pool: TilePool) -> Patches:
-    return patches_of(pool, 0)
+    return patches_of(pool, 0, enclosed)
 
 
 def texels_in(patches: Patches, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -34,7 +39,7 @@ def texels_in(patches: Patches, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
 
 @pytest.mark.parametrize("level", [0, 1, 2])
 def test_patches_are_squares_of_texels_and_cover_the_area_once(pool: TilePool, level: int) -> None:
-    patches = patches_of(pool, level)
+    patches = patches_of(pool, level, enclosed)
     assert patches.count == patch_count(pool, level)
     size = (patches.end - patches.start)[: patches.count]
     assert size.max() == 4**level and (texels_in(patches, np.arange(patches.count)) == 1).all()
@@ -61,6 +66,18 @@ def test_every_cluster_is_its_children(patches: Patches) -> None:
         assert spread.max() <= patches.edge * 2 ** patches.level[node] + 1e-9
 
 
+def test_no_cluster_is_of_what_is_open_and_what_is_enclosed(pool: TilePool) -> None:
+    """What of the room lies beyond a plane, and is no more than a cube of 8 edges away from it, may count as either."""
+    x = pool.surfaces.position[..., 0]
+    beyond = pool.image_from_tiles((x > 2.0)[..., None])[..., 0]
+    patches = patches_of(pool, 0, lambda texels: beyond[texels >> 16, texels & 0xFFFF].astype(float))
+    away = pool.space.world_from_local(patches.centre)[: patches.count, 0] - 2.0
+    sure = np.abs(away) > 8 * patches.edge * pool.space.scale
+    for node in np.flatnonzero(patches.level > 0):
+        mine = slice(patches.start[node], patches.end[node])
+        assert np.ptp(np.sign(away[mine][sure[mine]])) == 0 if sure[mine].any() else True
+
+
 def test_albedo_is_the_mean_over_the_area(pool: TilePool, patches: Patches) -> None:
     materials = tuple(Material(str(k), (0.1 * k, 0.5, 0.0)) for k in range(4))
     albedo = patches.albedo(materials, pool.scene.material_ids, pool.charts.face_triangle)
@@ -72,7 +89,7 @@ def test_albedo_is_the_mean_over_the_area(pool: TilePool, patches: Patches) -> N
 
 def test_morton_codes_are_those_of_cubes_in_cubes() -> None:
     random = np.random.default_rng(1)
-    cell = random.integers(0, 1 << 20, (100, 3))
+    cell = random.integers(0, 1 << CELL_BITS, (100, 3))
     code = morton(cell)
     np.testing.assert_array_equal(code >> 3, morton(cell >> 1))
     assert morton(np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]])).tolist() == [1, 2, 4]

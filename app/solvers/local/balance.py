@@ -16,20 +16,21 @@ LEAST = 1e-6  # 1 - λ: in a furnace of λ = 1 light never ends
 
 
 def balance_of(lightmap: Lightmap, direct: DirectLight, patches: Patches, members: Members) -> EnergyBalance:
-    """emitted = absorbed + escaped + imbalance, RGB [W]: escaped is the light of lamps that no texel got, and of what nodes
-    reflect the share that their own rays lost. What the sky and directional lights send to texels is what they emit. Reads every
-    texel and waits for the GPU."""
+    """emitted = absorbed + escaped + imbalance, RGB [W]: escaped is the light of lamps that no texel got, and what
+    texels reflect where rays start that are lost. What the sky and directional lights send to texels is what they emit. Reads
+    every texel and waits for the GPU."""
     held = members.held
     area = lightmap.pool.surfaces.area[..., None]
     albedo, H = lightmap.albedo().astype(np.float64), lightmap.irradiance().astype(np.float64)
     raw = np.frombuffer(direct.light.read(), np.float32).reshape(*lightmap.size[::-1], 4)
     D = lightmap.pool.tiles_from_image(raw)[..., :3].astype(np.float64) * lightmap.unit
-    nodes, lost = held.nodes, 1.0 - held.received[held.node >= 0]
+    nodes = held.nodes
     emitted = lightmap.emitted + direct.from_outside() + lightmap.sent_by_points
     escaped = emitted - (D * area).sum((0, 1, 2))
     if len(nodes):
-        B = patches.mean(_in_order(lightmap, patches, albedo * H))[nodes]
-        escaped = escaped + (lost * patches.area[nodes]) @ B * lightmap.space.scale**2
+        B = _in_order(lightmap, patches, albedo * H)
+        lost = np.stack([(B[starts] * gone[:, None]).mean(0) for starts, gone in held.lost()])
+        escaped = escaped + patches.area[nodes] @ lost * lightmap.space.scale**2
     whole = float(area.sum())
     return EnergyBalance(
         emitted=emitted,
@@ -55,12 +56,16 @@ def matrix_error(lighting: Lighting, members: Members) -> float:
     held, there = members.held, members.held.node >= 0
     if not there.any():
         return 0.0
-    indirect, reflected = (
+    indirect, first = (
         np.frombuffer(texture.read(), np.float32).reshape(-1, 4)[there, :3].astype(np.float64)
-        for texture in (lighting.indirect, lighting.reflected)
+        for texture in (lighting.indirect, lighting.first)
     )
-    outside = np.frombuffer(lighting.outside.read(), np.float32)[:3].astype(np.float64)
-    again = held.outside[there, None] * outside + held.matrix() @ (reflected + members.albedo[held.nodes] * indirect)
+    outside, scale = (
+        np.frombuffer(texture.read(), np.float32)[:3].astype(np.float64)
+        for texture in (lighting.outside, lighting.scale)
+    )
+    received = scale * first + held.outside[there, None] * outside
+    again = received + held.matrix() @ (members.albedo[held.nodes] * indirect)
     area = held.area[there, None]
     goes_on = members.mean_albedo * float(np.average(held.row_sum[there], weights=held.area[there]))
     residual = float((area * np.abs(again - indirect)).sum() / max((area * indirect).sum(), 1e-300))

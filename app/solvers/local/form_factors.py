@@ -11,6 +11,8 @@ set, is put on its diagonal: light that a node would send to itself. Rows sum to
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
@@ -97,6 +99,12 @@ class LocalSet:
         kernel[self.node < 0] = 0.0
         kernel[slot] = self.diagonal[slot] / self.area[slot]
         return np.asarray(kernel)
+
+    def lost(self) -> Iterator[tuple[I64, NDArray[np.bool_]]]:
+        """Of each of ``nodes``, (N,) where each of its rays starts, a place in the order of texels, and whether it is lost."""
+        for node in self.nodes:
+            one = np.array([node])
+            yield self._rows.starts(one)[0], self._rows.of(one)[0] == LOST
 
     @property
     def outside(self) -> F64:

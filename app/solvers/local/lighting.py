@@ -1,10 +1,12 @@
 """Lighting: from the direct light on texels, by one product with the matrix, to the indirect light of nodes, and back to texels.
 
-    H_i = x_i + Σ_j G_ij (e_j + ρ_j x_j),    e = mean of ρ H_direct over a node,    x_i = F_i,outside B_outside
+    H_i = x_i + Σ_j G_ij ρ_j x_j,    x_i = 1/N Σ_k B(hit_k) + F_i,outside B_outside,    B = ρ H_direct
     G_ij = S_ij √(A_j / A_i)
 
-``iterate`` sums H = x + F (e + ρ H) a few times instead, from the light of the frame before. When nodes come and go, what is
-shown becomes what it is now by and by, so that a border that moves is not seen; when lamps change, at once.
+The first bounce comes from the very texels that rays of a node hit, since direct light has edges: as its mean over a node, the
+light of a sunny side would come from the shaded one, too. One factor brings it to what rays carry away from where they start, so
+that no light is made. ``iterate`` sums H = x + F ρ H a few times instead, from the light of the frame before. When nodes come and
+go, what is shown becomes what it is now by and by, so that a border that moves is not seen; when lamps change, at once.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from app.lightmap.textures import QUAD_FORMAT, quads, upload
 from app.scene.model import F64
 from app.solvers.local.matrix import ROW, LocalMatrix
 from app.solvers.local.patches import Patches
+from app.solvers.local.rows import Rows
 from app.visibility.origins import Origins
 
 SWEEPS = 4  # bounces of ``iterate`` whenever it lights
@@ -30,22 +33,23 @@ COLOURS = 1024  # that tell nodes apart, where they are shown
 class Lighting:
     """Of one local set of ``most`` slots. Whoever makes it releases it.
 
-    reflected, indirect: e and H_i of each slot [stored units]. outside: B_outside, and in its alpha its share of indirect light.
-    from_outside: share of the indirect light in the set that came from outside, as
-    of the last lighting but one.
+    reflected, first, indirect: the mean of B, the first bounce and H_i of each slot [stored units]; scale: factor of the first
+    bounce. outside: B_outside, and in its alpha its share of indirect light. from_outside: share of the indirect light in the set
+    that came from outside, as of the last lighting but one.
     """
 
     def __init__(
-        self, gpu: Gpu, lightmap: Lightmap, origins: Origins, patches: Patches, places: Texture, most: int, edge: int
+        self, gpu: Gpu, lightmap: Lightmap, origins: Origins, patches: Patches, rows: Rows, most: int, edge: int
     ) -> None:
-        """places: of each texel in the order; edge: of a patch [texels]."""
+        """edge: of a patch [texels]."""
         self._gpu, self._lightmap, self._origins, self.most, self._edge = gpu, lightmap, origins, most, edge
-        self._patches, self._places = patches, places
+        self._patches, self._rows, self._places = patches, rows, rows.places
         self._order = folded_u32(gpu, patches.order.astype(np.uint32))
         self._slots = folded_u32(gpu, np.zeros(len(patches.order), np.uint32))
         rows_of: dict[str, object] = {"VECTOR_ROWS": most // ROW}
-        reads = lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE") | rows_of
-        self._reflect = Pass(gpu, "solvers/local/reflect", defines=reads)
+        self._reflect = Pass(gpu, "solvers/local/reflect", defines=lightmap.defines("MATERIAL_BITS", "ALBEDO_TEXTURE"))
+        self._gather = Pass(gpu, "solvers/local/gather", defines=rows_of)
+        self._conserve = Pass(gpu, "solvers/local/conserve", defines=rows_of)
         self._send = Pass(gpu, "solvers/local/send", defines=rows_of)
         self._receive = Pass(gpu, "solvers/local/receive", defines=rows_of)
         self._mean = Pass(gpu, "solvers/local/outside", defines=rows_of)
@@ -56,13 +60,18 @@ class Lighting:
             vertex="common/rects",
         )
         self._mark = Pass(gpu, "solvers/local/mark", defines=rows_of)
-        rows = most // ROW
-        self._nodes = gpu.texture((ROW, NODE_VECTORS * rows), 4, "f4")
-        self.reflected, self._sent, self.indirect = (gpu.texture((ROW, rows), 4, "f4") for _ in range(3))
-        self.outside = gpu.texture((1, 1), 4, "f4")
+        size = ROW, most // ROW
+        self._nodes = gpu.texture((ROW, NODE_VECTORS * size[1]), 4, "f4")
+        self._ends, self._uploaded = gpu.texture((rows.rays, most), 2, "u4"), np.full(most, -1)
+        self.reflected, self.first, self._carried, self._sent, self.indirect = (
+            gpu.texture(size, 4, "f4") for _ in range(5)
+        )
+        self.outside, self.scale = (gpu.texture((1, 1), 4, "f4") for _ in range(2))
+        self._emitted = gpu.texture(self._slots.size, 4, "f4")
         self._targets: dict[Texture, Framebuffer] = {
-            t: gpu.target(t) for t in (self.reflected, self._sent, self.indirect, self.outside)
+            t: gpu.target(t) for t in (self._emitted, self._sent, self.indirect, self.outside, self.scale)
         }
+        self._gathering = gpu.target(self.reflected, self.first, self._carried)
         self._marks: tuple[Texture, Framebuffer] | None = None
         self._target: Framebuffer | None = None
         self._of: Texture | None = None
@@ -71,7 +80,7 @@ class Lighting:
 
     def clear(self) -> None:
         """No light."""
-        for target in self._targets.values():
+        for target in (*self._targets.values(), self._gathering):
             target.clear()
         self._forget_reading()
         self.from_outside = 0.0
@@ -93,6 +102,15 @@ class Lighting:
         table[2, :, 0], table[2, :, 1] = patches.level[node], entered
         table[2, :, 3] = node % COLOURS
         self._nodes.write(table.tobytes())
+        self._write_ends(node)
+
+    def _write_ends(self, node: NDArray[np.int64]) -> None:
+        """Where the rays of what is new in slots start, and what they hit: places in the order."""
+        slots = np.flatnonzero((node != self._uploaded) & (node >= 0))
+        ends = np.stack([self._rows.starts(node[slots]), self._rows.of(node[slots])], -1).astype(np.uint32)
+        for slot, row in zip(slots.tolist(), ends, strict=True):
+            self._ends.write(row.tobytes(), viewport=(0, slot, self._rows.rays, 1))
+        self._uploaded[slots] = node[slots]
 
     def set_slots(self, slot_at: NDArray[np.int32]) -> None:
         """In which slot each texel in order is, -1 in none."""
@@ -103,22 +121,31 @@ class Lighting:
 
     # -- light ---------------------------------------------------------------------------------------------------------
 
-    def light(self, matrix: LocalMatrix, direct: Texture, *, sweeps: int = SWEEPS) -> None:
-        """Bring ``indirect`` up to date with the direct light on texels."""
+    def light(self, matrix: LocalMatrix, direct: Texture, *, other: bool = True, sweeps: int = SWEEPS) -> None:
+        """Bring ``indirect`` up to date with the set, and with the direct light on texels where that is another one."""
         nodes = {"t_nodes": self._nodes}
-        known = self._lightmap.textures("t_position_area", "t_normal_ids", "t_materials", "t_albedo")
-        self._reflect.draw(
-            self._targets[self.reflected],
-            textures=nodes | known | {"t_order": self._order, "t_direct": direct},
-        )
-        read = nodes | {"t_reflected": self.reflected, "t_outside": self.outside, "t_indirect": self.indirect}
-        for _ in range(1 if matrix.coloured else sweeps):
-            self._send.draw(self._targets[self._sent], textures=read, uniforms={"u_anew": matrix.coloured})
-            product = matrix.multiply(self._sent)
-            self._receive.draw(
-                self._targets[self.indirect],
-                textures=nodes | {"t_product": product, "t_outside": self.outside},
+        known = self._lightmap.textures("t_normal_ids", "t_materials", "t_albedo")
+        if other:
+            self._reflect.draw(
+                self._targets[self._emitted], textures=known | {"t_order": self._order, "t_direct": direct}
             )
+        ends = {"t_emitted": self._emitted, "t_ends": self._ends, "t_slots": self._slots}
+        self._gather.draw(self._gathering, textures=nodes | ends)
+        first = {"t_first": self.first}
+        self._conserve.draw(
+            self._targets[self.scale],
+            textures=nodes | first | {"t_carried": self._carried},
+            uniforms={"u_most": self.most},
+        )
+        first |= nodes | {"t_outside": self.outside, "t_scale": self.scale}
+        for _ in range(1 if matrix.coloured else sweeps):
+            self._send.draw(
+                self._targets[self._sent],
+                textures=first | {"t_indirect": self.indirect},
+                uniforms={"u_anew": matrix.coloured},
+            )
+            product = matrix.multiply(self._sent)
+            self._receive.draw(self._targets[self.indirect], textures=first | {"t_product": product})
         self._mean.draw(
             self._targets[self.outside],
             textures=nodes | {"t_reflected": self.reflected, "t_indirect": self.indirect},
@@ -187,7 +214,8 @@ class Lighting:
         if self._marks is not None:
             self._gpu.release_all(*self._marks)
         self._gpu.release_all(*self._targets.values(), *self._targets)
-        self._gpu.release_all(self._nodes, self._order, self._slots)
+        self._gpu.release_all(self._gathering, self.reflected, self.first, self._carried)
+        self._gpu.release_all(self._nodes, self._ends, self._order, self._slots)
 
 
 def folded_u32(gpu: Gpu, values: NDArray[np.uint32]) -> Texture:

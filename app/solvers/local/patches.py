@@ -1,12 +1,14 @@
 """Patches are squares of texels, and clusters are groups of them: what light is exchanged between.
 
-Patches that face the same way and lie in one cube of space are a cluster; eight such cubes make the cube of the next level, as in
-the hierarchy of [Smits94]. Texels are put in an order in which every patch and every cluster is a range, so that what a ray hit
-is one number, its place in that order, at all levels at once.
+Patches that face the same way, lie in one cube of space and are all open or all enclosed are a cluster; eight such cubes make
+the cube of the next level, as in the hierarchy of [Smits94]. What is outside of a window faces as walls inside do: as one
+cluster, the light in a room would be lost to the open. Texels are put in an order in which every patch and every cluster is a
+range, so that what a ray hit is one number, its place in that order, at all levels at once.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,8 +19,11 @@ from app.lightmap.tile_pool import TilePool
 from app.scene.model import F64, Material
 
 I64 = NDArray[np.int64]
+Look = Callable[[I64], F64]
 FEWEST = 48  # clusters of a level, above which no further one is made
-CELL_BITS = 20  # of a cube's place along each axis
+CELL_BITS = 18  # of a cube's place along each axis
+OPEN = 0.5  # share of rays, more of which leave the scene from outside of a house than from its inside
+AROUND = 6  # bits of a Morton code: openness is of what is in one chart and in a cube of 8 edges of a patch
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +74,9 @@ def patch_count(pool: TilePool, level: int) -> int:
     return len(np.unique(_squares(pool, level, *_covered(pool))))
 
 
-def patches_of(pool: TilePool, level: int) -> Patches:
-    """All patches, squares of 2^level texels along each edge, and the clusters above them."""
+def patches_of(pool: TilePool, level: int, look: Look) -> Patches:
+    """All patches, squares of 2^level texels along each edge, and the clusters above them. look: which share of rays is lost
+    from texels (n,), y << 16 | x in the tile pool."""
     slot, y, x = _covered(pool)
     surfaces, space = pool.surfaces, pool.space
     area = surfaces.area[slot, y, x] / space.scale**2
@@ -82,20 +88,27 @@ def patches_of(pool: TilePool, level: int) -> Patches:
         for v in (position, surfaces.normal[slot, y, x].astype(np.float64))
     )
     edge = float(np.sqrt(whole.mean()))
+    corner = pool.corners(slot)
+    px = (corner[:, 1] + y) << 16 | (corner[:, 0] + x)
     side = np.argmax(np.abs(normal), axis=1)
     facing = 2 * side + (np.take_along_axis(normal, side[:, None], 1)[:, 0] < 0)
     cell = np.floor((centre - centre.min(0)) / (2 * edge)).astype(np.int64)
-    key = (facing << 3 * CELL_BITS) | morton(np.minimum(cell, (1 << CELL_BITS) - 1))
+    code = morton(np.minimum(cell, (1 << CELL_BITS) - 1))
+    first = np.unique(patch, return_index=True)[1]
+    chart = pool.charts.face_chart[surfaces.face[slot, y, x][first]].astype(np.int64)
+    place = np.unique(np.stack([chart, code >> AROUND], 1), axis=0, return_inverse=True)[1].reshape(-1)
+    openness = np.bincount(place, look(px[first])) / np.bincount(place)
+    kind = 2 * facing + (openness > OPEN)[place]
+    key = (kind << 3 * CELL_BITS) | code
     by_place = np.lexsort((patch, key[patch]))
     nodes = _levels(key[patch[by_place]], patch[by_place])
     texel_area = area[by_place]
     sums = np.concatenate([[0.0], np.cumsum(texel_area)])
     moments = np.concatenate([np.zeros((1, 3)), np.cumsum(texel_area[:, None] * position[by_place], axis=0)])
     node_area = sums[nodes.end] - sums[nodes.start]
-    corner = pool.corners(slot[by_place])
     colours = pool.albedo_tiles
     return Patches(
-        order=(corner[:, 1] + y[by_place]) << 16 | (corner[:, 0] + x[by_place]),
+        order=px[by_place],
         start=nodes.start,
         end=nodes.end,
         level=nodes.level,
@@ -146,13 +159,14 @@ class _Nodes:
 
 
 def _levels(key: I64, patch: I64) -> _Nodes:
-    """The ranges of patches, and of clusters level by level, of texels in order. key: facing, and Morton code of the cube."""
+    """The ranges of patches, and of clusters level by level, of texels in order. key: facing and openness, and Morton code of the
+    cube."""
     bounds = [np.flatnonzero(np.concatenate([[True], patch[1:] != patch[:-1]]))]
     first = [0]
     children = [np.zeros((len(bounds[0]), 2), np.int64)]
-    shift = 0
-    while len(bounds[-1]) > FEWEST and shift <= 3 * CELL_BITS:
-        code = (key >> 3 * CELL_BITS << 3 * CELL_BITS) | (key & ((1 << 3 * CELL_BITS) - 1)) >> shift
+    shift, cell = 0, key & ((1 << 3 * CELL_BITS) - 1)
+    while len(bounds[-1]) > FEWEST and (shift == 0 or cell.max() >> (shift - 3)):
+        code = (key >> 3 * CELL_BITS << 3 * CELL_BITS) | cell >> shift
         starts = np.flatnonzero(np.concatenate([[True], code[1:] != code[:-1]]))
         below = np.searchsorted(bounds[-1], np.concatenate([starts, [len(key)]]))
         base = first[-1]

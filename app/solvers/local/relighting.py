@@ -19,20 +19,20 @@ class Relighting:
 
     def __init__(self, lighting: Lighting, matrix: LocalMatrix, held: LocalSet, members: Members) -> None:
         self._lighting, self._matrix, self._held, self._members = lighting, matrix, held, members
-        self._lit, self.left = False, 0
+        self._lit, self._other_direct, self.left = False, True, 0
 
     @property
     def done(self) -> bool:
         """Whether the light is that of the set as it is."""
         return self._lit and self.left == 0
 
-    def changed(self) -> None:
-        """The set or its direct light is another one."""
-        self._lit = False
+    def changed(self, *, direct: bool = True) -> None:
+        """The set is another one, and the direct light of texels or what they reflect of it, unless that is as it was."""
+        self._lit, self._other_direct = False, self._other_direct or direct
 
     def forget(self) -> None:
         """There is no light any more."""
-        self._lit, self.left = False, 0
+        self._lit, self._other_direct, self.left = False, True, 0
 
     def go_on(self, direct: Texture) -> None:
         """Find the light where it is not known yet: bounces that are done one after the other, and light from outside that
@@ -44,7 +44,8 @@ class Relighting:
             self.left = self._bounces
         elif not self.left:
             return
-        self._lighting.light(self._matrix, direct)
+        self._lighting.light(self._matrix, direct, other=self._other_direct)
+        self._other_direct = False
         self._lit, self.left = True, max(self.left - 1, 0)
 
     @property

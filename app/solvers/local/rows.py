@@ -2,8 +2,9 @@
 
     F_ij = n_ij / N,    n_ij of the N rays of node i hit node j
 
-A row is the sorted places in the order of texels (patches.py) of what its rays hit: one search gives n_ij for a patch and for a
-cluster of any level. Rows are kept in memory up to a budget, and on disk for the next time.
+A row is the places in the order of texels (patches.py) of what its rays hit: they give n_ij for a patch and for a cluster of any
+level. Rays start all over the node, and are well spread over the hemisphere whatever texel each of them starts from. Rows are
+kept in memory up to a budget, and on disk for the next time.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from app.visibility.rays import RayScene
 
 I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]
-FORMAT = b"glowtree rows 1"  # changes when rays start elsewhere, or rows are held otherwise
+FORMAT = b"glowtree rows 3"  # changes when rays start elsewhere, or rows are held otherwise
 CACHE_FILES = 8  # kept, newest first
 BYTES = 4  # for each ray
 ROWS_OF_A_NODE = 2  # of the set: what enters while it moves needs its row before another is forgotten
@@ -104,7 +105,7 @@ class Rows:
         return np.asarray(self._row[nodes] >= 0)
 
     def of(self, nodes: I64) -> I32:
-        """(n, N) i32 sorted: the place of what each ray of a node hit, LOST where it hit nothing that has texels."""
+        """(n, N) i32: the place of what each ray of a node hit, LOST where it hit nothing that has texels."""
         assert self.has(nodes).all(), "rows are made before they are asked for"
         return self._hits[self._row[nodes]]
 
@@ -149,11 +150,7 @@ class Rows:
     def _traced(self, nodes: I64) -> I32:
         """(n, N) what their rays hit."""
         patches, count = self._patches, self.rays
-        share = (np.arange(count) + 0.5) / count
-        low, high = self._weights[patches.start[nodes]], self._weights[patches.end[nodes]]
-        at = np.searchsorted(self._weights, low[:, None] + share * (high - low)[:, None], side="right") - 1
-        at = np.clip(at, patches.start[nodes][:, None], patches.end[nodes][:, None] - 1)
-        start = upload(self._gpu, patches.order[at].astype(np.uint32)[..., None])
+        start = upload(self._gpu, patches.order[self.starts(nodes)].astype(np.uint32)[..., None])
         found = self._gpu.texture((count, len(nodes)), 1, "u4")
         target = self._gpu.target(found)
         lightmap, pool = self._lightmap, self._lightmap.pool
@@ -166,7 +163,15 @@ class Rows:
         hits = np.frombuffer(found.read(), np.uint32).reshape(len(nodes), count)
         self._gpu.release_all(target, found, start)
         self.traced += hits.size
-        return np.sort(np.minimum(hits, LOST).astype(np.int32), axis=1)
+        return np.minimum(hits, LOST).astype(np.int32)
+
+    def starts(self, nodes: I64) -> I64:
+        """(n, N) the place of the texel from which each ray of a node starts: all over its area."""
+        patches = self._patches
+        share = (np.arange(self.rays) + 0.5) / self.rays
+        low, high = self._weights[patches.start[nodes]], self._weights[patches.end[nodes]]
+        at = np.searchsorted(self._weights, low[:, None] + share * (high - low)[:, None], side="right") - 1
+        return np.asarray(np.clip(at, patches.start[nodes][:, None], patches.end[nodes][:, None] - 1))
 
     # -- on disk -------------------------------------------------------------------------------------------------------
 

@@ -32,6 +32,7 @@ from app.solvers.local.inspectable import facts_of, figures_of, note_of
 from app.solvers.local.lighting import Lighting
 from app.solvers.local.matrix import LocalMatrix
 from app.solvers.local.members import Members
+from app.solvers.local.openness import openness_of
 from app.solvers.local.options import LocalOptions
 from app.solvers.local.patches import patches_of
 from app.solvers.local.relighting import Relighting
@@ -55,8 +56,7 @@ BATCH = 64
 class Local:
     """Lights one lightmap around the observer. Whoever makes it releases it.
 
-    issued: nodes that have entered the set so far. Raises UserError for a set that
-    does not fit memory or the driver, and for quadtrees.
+    issued: nodes that have entered the set so far. Raises UserError for a set that does not fit, and for quadtrees.
     """
 
     def __init__(self, gpu: Gpu, lightmap: Lightmap, options: LocalOptions) -> None:
@@ -83,7 +83,7 @@ class Local:
         """Patches, rows and matrix of these options."""
         gpu, lightmap = self.gpu, self.lightmap
         level, most = size_of_set(gpu, lightmap.pool, options)
-        patches = patches_of(lightmap.pool, level)
+        patches = patches_of(lightmap.pool, level, lambda at: openness_of(gpu, lightmap, self.rays, self.origins, at))
         most = fitting(most, patches.count, options)
         rows_in(options.row_memory, options.rays, most)  # before anything is released
         matrix = LocalMatrix(gpu, most, options.bounces, options.bits)
@@ -91,7 +91,7 @@ class Local:
         self._parts.append(matrix)
         rows = Rows(gpu, lightmap, self.rays, self.origins, patches, options.rays, options.row_memory, most)
         self._parts.append(rows)
-        lighting = Lighting(gpu, lightmap, self.origins, patches, rows.places, most, 2**level)
+        lighting = Lighting(gpu, lightmap, self.origins, patches, rows, most, 2**level)
         self._parts.append(lighting)
         self.options, self.patches, self.rows, self.lighting, self.level = options, patches, rows, lighting, level
         self.set, self.matrix = LocalSet(patches, rows, most), matrix
@@ -172,7 +172,7 @@ class Local:
             self._fill_anew()  # paths through nodes that left pile up
         yield from self.matrix.flush_in(FLUSH_PARTS * bands)
         self.lighting.set_slots(self.set.slot_at)
-        self._relighting.changed()
+        self._relighting.changed(direct=False)
         return entered
 
     # -- how far it is -------------------------------------------------------------------------------------------------
