@@ -34,7 +34,7 @@ I64 = NDArray[np.int64]
 class Seams:
     """Each edge from both sides, all from one side first. own (k, 2, 2): its ends in the atlas [texels of level 0], with its
     chart to the left; other (k, 2, 2): the same ends in the other chart, which lies to the right there. jumps (j, 2, 2): edges
-    that would be seams if nothing stood there, in each of their charts."""
+    of charts that end where a seam begins, since something stands there."""
 
     own: F64 = field(default_factory=lambda: np.empty((0, 2, 2)))
     other: F64 = field(default_factory=lambda: np.empty((0, 2, 2)))
@@ -90,8 +90,8 @@ def find_seams(
     meets = (start[a] == end[b]) & (start[a] != end[a]) & (chart[face[a]] != chart[face[b]])
     a, b = a[meets], b[meets]
     ta, tb = triangle[face[a]], triangle[face[b]]
-    smooth = scene.material_ids[ta] == scene.material_ids[tb]
-    jumps = np.zeros(len(a), bool) if ends is None else (ends[ta, k[a]] == JUMPS) | (ends[tb, k[b]] == JUMPS)
+    jumps = np.zeros(len(face), bool) if ends is None else ends[triangle[face], k] == JUMPS
+    smooth = (scene.material_ids[ta] == scene.material_ids[tb]) & ~(jumps[a] | jumps[b])
     if scene.normals is None:
         normals = scene.normals_areas[0]
         smooth &= np.einsum("ek,ek->e", normals[ta], normals[tb]) > np.cos(CREASE)
@@ -99,12 +99,17 @@ def find_seams(
         for mine, theirs in ((first, second), (second, first)):
             apart = scene.normals[ta, mine[a]] - scene.normals[tb, theirs[b]]
             smooth &= np.abs(apart).max(1) < SAME_NORMAL
-    a, b, jumps = a[smooth], b[smooth], jumps[smooth]
+    a, b = a[smooth], b[smooth]
     one = np.stack([uv[face[a], first[a]], uv[face[a], second[a]]], axis=1)
     other = np.stack([uv[face[b], second[b]], uv[face[b], first[b]]], axis=1)
-    own, other = np.concatenate([one, other[:, ::-1]]), np.concatenate([other, one[:, ::-1]])
-    jumps = np.tile(jumps, 2)
-    return Seams(own[~jumps], other[~jumps], own[jumps])
+    at_seams = np.zeros(int(corners.max()) + 1, bool)
+    at_seams[start[a]] = at_seams[end[a]] = True
+    jump = np.flatnonzero(jumps & (at_seams[start] | at_seams[end]))
+    return Seams(
+        np.concatenate([one, other[:, ::-1]]),
+        np.concatenate([other, one[:, ::-1]]),
+        np.stack([uv[face[jump], first[jump]], uv[face[jump], second[jump]]], axis=1),
+    )
 
 
 def seam_texels(seams: Seams, finer: int = 1) -> SeamTexels:
