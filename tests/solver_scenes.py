@@ -212,13 +212,18 @@ class Solution:
         self.lightmap.texture("t_residual").write(np.ones((height, width, 4), np.float32).tobytes())
 
     def patches(self) -> NDArray[np.int64]:
-        """(p, 2) column and row of the lower texel of every patch of the shooting level that covers a surface."""
+        """(p, 2) column and row of the lower texel of every patch of the shooting level that covers a surface; of what is divided
+        there, of the first part, if that does."""
         pool, found = self.lightmap.pool, []
         for slot in range(pool.tiles):
             edge = self.solver.patch_edge(pool.corner(slot))
             inside = pool.surfaces.area[slot].reshape(pool.tile // edge, edge, pool.tile // edge, edge).sum((1, 3)) > 0
-            found.append(np.argwhere(inside)[:, ::-1] * edge + pool.corner(slot))
-        return np.concatenate(found)
+            for x, y in (np.argwhere(inside)[:, ::-1] * edge).tolist():
+                corner = pool.corner(slot)[0] + x, pool.corner(slot)[1] + y
+                own = self.solver.patch_edge(corner)
+                if (pool.surfaces.area[slot, y : y + own, x : x + own] > 0).any():
+                    found.append(corner)
+        return np.array(found, np.int64)
 
     def audits(self) -> list[Audit]:
         """What becomes of a shot from each patch. Spoils the residual."""
