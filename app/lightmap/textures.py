@@ -102,10 +102,9 @@ class LightTextures:
         return texture, target
 
     def take_ambient(self, texture: Texture, target: Framebuffer) -> None:
-        """Have this ambient term from now on, the lightmap's own, in place of quite another one."""
+        """Have this ambient term from now on, the lightmap's own."""
         self.gpu.release_all(self.ambient_target, self._textures["t_ambient"])
         self._textures["t_ambient"], self.ambient_target = texture, target
-        self.ambients += 1
 
     @property
     def ambient_of_each(self) -> bool:

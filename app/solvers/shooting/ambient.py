@@ -9,6 +9,8 @@ patches is overshot [Feda92]: a patch shoots, with its residual, what it will re
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 
 from app.errors import UserError
@@ -32,6 +34,7 @@ FIRST_SWEEPS = 4  # until what they find takes the place of an even term: with f
 POINTS_A_FRAME, POINTS_A_LOOK = 512, 2048
 # What a point takes, of the time of a look: to see what its texels have to pass on; to find what its rays hit
 SEEING, TRACING = 0.25, 8.0
+FIRST_UPDATES = 4  # batches after which each texel has its even term, whether frames are drawn or not
 FIRST = 4  # times as many points of a frame until what they find is shown, or is known what their rays hit
 TRACED_AT_ONCE = 512  # points, at most: with ten thousands of triangles on a software rasteriser 50 ms
 # Share of the light that is passed on until points look again: of that, what they foresaw is shown
@@ -69,6 +72,9 @@ class Ambient:
         self._points: GatherPoints | None = None
         self._looked = 0  # sweeps since light began; what they find is hidden for as long as they are few
         self._hidden: tuple[Texture, Framebuffer] | None = None
+        self._foreseen = self._watched = False  # whether others told what is to come; whether frames are drawn
+        self._updates = 0  # since light began
+        self._spread_even = Pass(gpu, "solvers/shooting/spread_even")
         self._tree: BackgroundTask[Bvh] | None = None
         self.shown, self.held = shown, False
         self.note: str | None = None
@@ -93,10 +99,25 @@ class Ambient:
             textures={"t_unshot": bins.unshot, "t_ledger": ledger.texture, "t_shooters": self._shooters.texture},
             uniforms={"u_shots": shots or 0, "u_albedo": ledger.albedo, "u_area": ledger.area},
         )
-        if self.shown and self.note is None and not self._lightmap.ambient_of_each:
-            self._find_what_is_to_come(self._lightmap.ambient_target)
+        self._updates += 1
+        if self.shown and self.note is None and self._looked < FIRST_SWEEPS and not self._foreseen:
+            self._show_even()
         if self._owed and self._points is not None:
             self._look_for_frames(self._points)
+
+    def _show_even(self) -> None:
+        """Show the even term: of each texel where frames may be drawn while light arrives in some of them and not yet in others;
+        not where memory does not do."""
+        lightmap = self._lightmap
+        of_each = self._watched or self._updates <= FIRST_UPDATES
+        with contextlib.suppress(UserError):
+            lightmap.hold_ambient(of_each=of_each)
+        if not lightmap.ambient_of_each:
+            self._find_what_is_to_come(lightmap.ambient_target)
+            return
+        self._find_what_is_to_come(self._to_come_target)
+        bound = {"t_to_come": self._to_come} | lightmap.textures("t_irradiance")
+        self._spread_even.draw(lightmap.ambient_target, textures=bound)
 
     def changed(self, share: float = 1.0) -> None:
         """Other light is unshot than when the lightmap was given its ambient term. share: of all light, that was passed on."""
@@ -106,6 +127,7 @@ class Ambient:
     def refresh(self, whole: bool, wait: bool) -> None:
         """Give the lightmap the ambient term of the light as it is; if not ``whole``, POINTS_A_FRAME towards it. wait: for the
         tree that rays walk, without which it is an even one."""
+        self._watched |= not whole
         if not self.shown or not self._gathers or self.note is not None or not self._sweeps:
             return
         try:
@@ -134,6 +156,7 @@ class Ambient:
             lightmap.hold_ambient()
         except UserError:
             return
+        self._foreseen = True
         self._to_come_target.clear()
         spread.find_around(0, spread.rows)
         spread.draw(lightmap.ambient_target, irradiance, self._to_come, 0, spread.rows, foreseen=True)
@@ -178,6 +201,7 @@ class Ambient:
                 self._looked += 1
                 if self._hidden is not None and self._looked >= FIRST_SWEEPS:
                     self._lightmap.take_ambient(*self._hidden)
+                    self._lightmap.ambients += 1
                     self._hidden = None
                 self._passed_on *= float(np.mean(self._ledger.albedo))  # of it, what is reflected once more
 
@@ -204,6 +228,7 @@ class Ambient:
     def _show_none(self) -> None:
         """Until it is known what to show."""
         self._drop_hidden()
+        self._foreseen, self._updates = False, 0
         self._lightmap.hold_ambient(of_each=False)
         self._lightmap.ambient_target.clear()
 
@@ -290,7 +315,7 @@ class Ambient:
 
     def forget_foreseen(self) -> None:
         """Lamps and surfaces are others than in those texels where the light was that is foreseen."""
-        if self._looked < FIRST_SWEEPS and self._lightmap.ambient_of_each:
+        if self._foreseen and self._looked < FIRST_SWEEPS:
             self._show_none()
 
     def clear(self) -> None:
