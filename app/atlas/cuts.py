@@ -7,7 +7,6 @@ the floor's triangles are cut along the wall's foot, neighbours along with them,
 from __future__ import annotations
 
 import dataclasses
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +20,7 @@ from app.atlas.sides import Welded, numbered, scene_size
 from app.atlas.triangle_cuts import CutTriangles, cut_pieces
 from app.scene.model import F32, F64, I32, Scene
 from app.util.background import Report
+from app.util.threads import threads
 from app.util.words import counted
 
 # where triangles are not cut, for people
@@ -59,15 +59,12 @@ class _Met:
         tell(0.1)
         size = scene_size(scene)
         places = (points - points.min(0)) / size
-        beside = ThreadPoolExecutor(1)
-        try:
+        with threads(1) as beside:
             flat = beside.submit(facets, points, corners, scene.material_ids, size, edges)
             met = contacts(places[corners], surfaces(edges), lambda share: tell(0.1 + 0.4 * share))
             tell(0.5)
             found = met[0].with_more(standing_on_edges(places[corners], edges))
             return _Met(welded, places, flat.result(), found, *met[1:])
-        finally:
-            beside.shutdown(wait=False, cancel_futures=True)
 
 
 def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:

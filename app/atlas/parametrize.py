@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -29,6 +28,7 @@ from app.atlas.triangle_cuts import GOES_ON
 from app.atlas.unwrap import unwrap
 from app.errors import UserError
 from app.scene.model import F64, I32, Scene
+from app.util.threads import threads
 
 Progress = Callable[[str, float], None]
 
@@ -69,8 +69,7 @@ def parametrize(
     check(density, texels)
     report = progress or (lambda stage, share: None)
     report("joining corners", 0.0)
-    beside = ThreadPoolExecutor(1)
-    try:
+    with threads(1) as beside:
         sides = beside.submit(lit_sides, scene)
         welded = welded or Welded.of(scene)
         points, corners, edges = welded.points, welded.corners, welded.edges
@@ -82,8 +81,6 @@ def parametrize(
         lit = without_enclosed(sides.result(), scene, points, corners)
         layout, method, warnings = _unfold(scene, lit, welded, facet, ends, time_limit, report)
         all_planes = planes.result()
-    finally:
-        beside.shutdown(wait=False, cancel_futures=True)
     report("placing pieces side by side", UNFOLDED)
     plain, layout = layout, scaled(layout, scene)
     if density is None:
@@ -105,7 +102,7 @@ def parametrize(
         method,
         lambda share: report("placing pieces side by side", UNFOLDED + 0.1 * share),
     )
-    with ThreadPoolExecutor(1) as also:
+    with threads(1) as also:
         joins = also.submit(
             find_seams, scene, corners, lit.triangle, lit.back, charts.face_uv, charts.face_chart, ends, layout.rim
         )

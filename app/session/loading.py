@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,6 +34,7 @@ from app.session.versions import Version
 from app.solvers import SOLVERS
 from app.util import cache
 from app.util.background import BackgroundTask, Progress, Report
+from app.util.threads import threads
 from app.visibility.rays import tree_of
 
 UPLOADING, LOADED = "copying to the GPU", 0.9  # what comes after loading, and the share of opening that is done then
@@ -131,7 +131,7 @@ def load(
     tell = _Telling(progress or (lambda stage, share: None))
     options = options or LightmapOptions()
     check(atlas.density, atlas.texels)
-    with ThreadPoolExecutor(1) as beside, _threads(1) as meanwhile:
+    with threads(1) as beside, threads(1) as meanwhile:
         early: list[Future[tuple[Loaded, TexelPlaces] | None]] = []
         drawn: list[Future[Drawn]] = []
 
@@ -234,7 +234,7 @@ def _in_texels(
     blocks are in the texels that are ``known``. coarse: texels that are not there for long, nothing of which is kept on disk.
     drawn: as of ``kept_mesh``."""
     exposure = None
-    with _threads(2) as beside:
+    with threads(2) as beside:
         make_mesh = coarse_mesh if coarse else functools.partial(kept_mesh, drawn=drawn)
         mesh = beside.submit(make_mesh, scene, charts, _local(scene))
         seams = beside.submit(lambda: charts.seam_texels)
@@ -254,16 +254,6 @@ def _in_texels(
 def _local(scene: Scene) -> F64:
     """Its positions in the solver space."""
     return SolverSpace.of(scene).local_from_world(scene.positions)
-
-
-@contextlib.contextmanager
-def _threads(count: int) -> Iterator[ThreadPoolExecutor]:
-    """So many, for which who leaves does not wait: who cancels, least of all."""
-    threads = ThreadPoolExecutor(count)
-    try:
-        yield threads
-    finally:
-        threads.shutdown(wait=False, cancel_futures=True)
 
 
 class Loading(BackgroundTask[Loaded]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +18,7 @@ from app.atlas import charts_cache
 from app.atlas.charts import Charts
 from app.atlas.charts_cache import charts_of, kept_charts
 from app.atlas.options import AtlasOptions
+from app.atlas.parametrize import parametrize
 from app.atlas.seams import Seams, SeamTexels
 from app.scene import shapes
 from app.scene.model import Camera, Material, Scene
@@ -179,3 +181,21 @@ def test_it_can_be_stopped_at_any_moment(scene: Scene) -> None:
         with pytest.raises(CancelledError):
             charts_of(scene, ATLAS.replace(texels=3200 + last), progress=stop_at(last))
         assert told == last
+
+
+def test_who_stops_it_does_not_wait_for_what_is_made_beside(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped, through = threading.Event(), threading.Event()
+
+    def slow(*_: object) -> None:
+        stopped.wait(20)
+        through.set()
+
+    def stop(stage: str, share: float) -> None:
+        if stage == "finding what lies on surfaces":
+            raise CancelledError
+
+    monkeypatch.setattr(sys.modules[parametrize.__module__], "find_seams", slow)
+    with pytest.raises(CancelledError):
+        charts_of(scene, ATLAS.replace(texels=3300), progress=stop)
+    assert not through.is_set()
+    stopped.set()
