@@ -1,12 +1,15 @@
 """The polygon that a patch shoots from is what its texels cover, where these end within a texel, too."""
 
 import numpy as np
+import pytest
 from solver_scenes import begin, grey, quads_scene
 
 from app.gpu import Gpu
 from app.scene.model import F64
 
-WIDE, DEEP = 2.33, 2.17  # m, of a floor: at 8 texels/m, its last texels are covered in part
+DENSITY = 8.0  # texels/m
+# m, of a floor: its last texels are covered in part, at last so little that their moments are lost beside their place in a patch
+SIZES = {"strips": (2.33, 2.17), "thin strips": (2 + 3e-3 / DENSITY,) * 2, "thinnest strips": (2 + 1e-3 / DENSITY,) * 2}
 
 
 def corners_of(record: np.void) -> F64:
@@ -15,11 +18,12 @@ def corners_of(record: np.void) -> F64:
     return record["centre"] + np.array([-u - v, u - v, u + v, -u + v])
 
 
-def test_patches_of_a_strip_tile_it(gpu: Gpu) -> None:
+@pytest.mark.parametrize(("wide", "deep"), SIZES.values(), ids=SIZES)
+def test_patches_of_a_strip_tile_it(gpu: Gpu, wide: float, deep: float) -> None:
     """An L, which is no rectangle, so that its texels are not fitted to it."""
-    main = [(0, 0, 0), (0, 0, 1), (WIDE, 0, 1), (WIDE, 0, 0)]
-    arm = [(0, 0, 1), (0, 0, DEEP), (1, 0, DEEP), (1, 0, 1)]
-    solution = begin(gpu, quads_scene([main, arm], [grey(0.5)]), density=8.0)
+    main = [(0, 0, 0), (0, 0, 1), (wide, 0, 1), (wide, 0, 0)]
+    arm = [(0, 0, 1), (0, 0, deep), (1, 0, deep), (1, 0, 1)]
+    solution = begin(gpu, quads_scene([main, arm], [grey(0.5)]), density=DENSITY)
     solution.light_up()
     space, surfaces = solution.lightmap.pool.space, solution.lightmap.pool.surfaces
     whole, lower, upper = surfaces.area.max(), [], []
@@ -30,7 +34,9 @@ def test_patches_of_a_strip_tile_it(gpu: Gpu) -> None:
         if high[0] > 1 + 1e-3 and high[2] > 1 + 1e-3:
             continue  # it lies in the corner between the arms
         assert np.isclose((high - low)[[0, 2]].prod(), shot.area, rtol=1e-3)
-        assert low.min() > -1e-3 and high[0] < WIDE + 1e-3 and high[2] < DEEP + 1e-3
+        sides = np.array([4 / DENSITY, wide - 2, deep - 2])  # a patch has four texels a side, or the rest at a border
+        assert np.isclose((high - low)[[0, 2], None], sides, rtol=1e-3, atol=0).any(1).all()
+        assert low.min() > -1e-3 and high[0] < wide + 1e-3 and high[2] < deep + 1e-3
         lower.append(low[[0, 2]])
         upper.append(high[[0, 2]])
     assert (surfaces.area[surfaces.area > 0] < 0.9 * whole).sum() > 10
