@@ -161,6 +161,11 @@ class Batch:
         tiles = np.frombuffer(self.bins.unshot.read(), np.float32).reshape(-1, 4)[:, 3].astype(np.float64)
         return float(tiles.sum()) + self.outside.power_to_come() / self.ledger.watt
 
+    def remaining(self, unshot: float) -> float:
+        """Of a share of what is emitted that is unshot, what a progress says: while light from outside is left to shoot, an edit
+        takes back light, and gives as much."""
+        return self.ledger.capped(unshot) if self.outside.left else unshot
+
     def _patch_of(self, shot: Shot) -> tuple[int, int, int, int]:
         """Its patch, and the finest level of patches there."""
         return *shot.corner, shot.size, self.phases.level_at(shot.corner, self.phases.finest)

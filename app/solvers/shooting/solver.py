@@ -205,8 +205,7 @@ class Shooting:
                 self._uneven = None
         self._strongest = float(values["strongest"]) * ledger.watt
         batch.ambient.strongest = min(ledger.share(float(values["strongest"])), 1.0)
-        remaining = ledger.capped(unshot) if outside.left else unshot  # an edit takes back light, and gives as much
-        self._progress = Progress(int(values["shots"]), remaining, report.escaped * ledger.watt)
+        self._progress = Progress(int(values["shots"]), batch.remaining(unshot), report.escaped * ledger.watt)
         if choice is None:
             return
         if sizes_of(report.shooter):
@@ -218,8 +217,7 @@ class Shooting:
         """See what is unshot now, and what has escaped by now. All reports must have arrived. Waits for the GPU."""
         self._under_way.finish()
         ledger = self.batch.ledger
-        unshot, self._reports.escaped = ledger.share(self.batch.unshot()), ledger.escaped()
-        remaining = ledger.capped(unshot) if self.batch.outside.left else unshot
+        remaining, self._reports.escaped = self.batch.remaining(ledger.share(self.batch.unshot())), ledger.escaped()
         self._progress = replace(self._progress, remaining=remaining, escaped=self._reports.escaped * ledger.watt)
 
     @property
