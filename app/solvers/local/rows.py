@@ -30,9 +30,8 @@ FORMAT = b"glowtree rows 3"  # changes when rays start elsewhere, or rows are he
 CACHE_FILES = 8  # kept, newest first
 BYTES = 4  # for each ray
 ROWS_OF_A_NODE = 2  # of the set: what enters while it moves needs its row before another is forgotten
-LOST = np.iinfo(np.int32).max  # a ray that left the scene, or met a side without texels
+LOST = np.iinfo(np.int32).max  # the place of no texel: of what lost rays hit
 AT_ONCE = 1 << 16  # rays, of one draw
-NO_PLACE = 0xFFFFFFFF
 
 
 class Rows:
@@ -93,7 +92,7 @@ class Rows:
     def _upload_places(self) -> Texture:
         """t_places, R32UI: the place in the order of each texel of the tile pool."""
         width, height = self._lightmap.size
-        table = np.full((height, width, 1), NO_PLACE, np.uint32)
+        table = np.full((height, width, 1), LOST, np.uint32)
         order = self._patches.order
         table[order >> 16, order & 0xFFFF, 0] = np.arange(len(order))
         return upload(self._gpu, table)
@@ -160,10 +159,10 @@ class Rows:
             textures=textures | {"t_starts": start, "t_places": self.places},
             uniforms={"u_rows": lightmap.size[1], "u_pages": (float(pool.columns), pool.pages_per_texel)},
         )
-        hits = np.frombuffer(found.read(), np.uint32).reshape(len(nodes), count)
+        hits = np.frombuffer(found.read(), np.int32).reshape(len(nodes), count)
         self._gpu.release_all(target, found, start)
         self.traced += hits.size
-        return np.minimum(hits, LOST).astype(np.int32)
+        return hits
 
     def starts(self, nodes: I64) -> I64:
         """(n, N) the place of the texel from which each ray of a node starts: all over its area."""

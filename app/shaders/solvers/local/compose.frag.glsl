@@ -1,9 +1,10 @@
-// The light that is shown, H = direct + indirect, and how much of what was shown stays. Blended. The indirect light of patches of many texels, and of clusters, is smoothed over one
-// of them, which interpolates it: within a chart.
+// The light that is shown, H = direct + indirect, and how much of what was shown stays. Blended. The indirect light of patches of
+// many texels, and of clusters, is smoothed over one of them, which interpolates it: within a chart.
 #include "common/atlas.glsl"
 #include "common/texel_at.glsl"
 #include "direct_light/folded.glsl"
 #include "solvers/local/node.glsl"
+#include "solvers/local/place.glsl"
 
 uniform usampler2D t_origin_normal;  // and the chart
 uniform sampler2D t_direct;
@@ -15,12 +16,11 @@ uniform float u_stays;
 
 layout(location = 0) out vec4 out_irradiance;
 
-const uint NO_PLACE = 0xFFFFFFFFu;
 const int MOST_STEPS = 4;
 
 int slot_of(ivec2 px) {
     uint place = texelFetch(t_places, px, 0).x;
-    return place == NO_PLACE ? -1 : int(texelFetch(t_slots, folded(int(place)), 0).x) - 1;
+    return place == LOST ? -1 : int(texelFetch(t_slots, folded(int(place)), 0).x) - 1;
 }
 
 vec3 light_of(int slot) { return slot < 0 ? texelFetch(t_outside, ivec2(0), 0).rgb : texelFetch(t_indirect, at_slot(slot), 0).rgb; }
@@ -49,7 +49,7 @@ vec3 indirect_at(ivec2 px) {
 void main() {
     ivec2 px = ivec2(gl_FragCoord.xy);
     out_irradiance = vec4(0.0);
-    if (texelFetch(t_places, px, 0).x == NO_PLACE) return;
+    if (texelFetch(t_places, px, 0).x == LOST) return;
     vec3 indirect = indirect_at(px);
     if (!any(isnan(indirect))) indirect = max(indirect, 0.0);  // what is no number must be seen
     vec3 H = texelFetch(t_direct, px, 0).rgb + indirect;

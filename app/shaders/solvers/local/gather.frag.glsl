@@ -2,6 +2,7 @@
 // mean over the node; and how much of that they carry to the set.
 #include "direct_light/folded.glsl"
 #include "solvers/local/node.glsl"
+#include "solvers/local/place.glsl"
 
 uniform sampler2D t_emitted;  // of each texel in order, folded
 uniform usampler2D t_slots;  // of each texel in order, from 1, folded
@@ -10,8 +11,6 @@ uniform usampler2D t_ends;  // a row for each slot: places in the order of the t
 layout(location = 0) out vec4 out_reflected;
 layout(location = 1) out vec4 out_first;
 layout(location = 2) out vec4 out_carried;
-
-const uint LOST = 0x7FFFFFFFu;
 
 void main() {
     int slot = slot_at(ivec2(gl_FragCoord.xy));

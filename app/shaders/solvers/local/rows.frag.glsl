@@ -1,13 +1,12 @@
 // Rows of form factors: what the k-th ray of each node hits, its place in the order of texels. All rays of a node are of one sequence,
 // that of the texel where the first one starts. See app/solvers/local/rows.py.
+#include "solvers/local/place.glsl"
 #include "visibility/texel_ray.glsl"
 
 uniform usampler2D t_starts;  // a row for each node: y << 16 | x of the texel from which its k-th ray starts
 uniform usampler2D t_places;  // of each texel
 
 layout(location = 0) out uint out_place;
-
-const uint LOST = 0xFFFFFFFFu;
 
 Origin origin_of(ivec2 px) {
     uint start = texelFetch(t_starts, px, 0).x;
