@@ -24,14 +24,16 @@ NEAREST = (5, 6, 9, 10, 1, 2, 4, 7, 8, 11, 13, 14, 0, 3, 12, 15)  # of a block, 
 NOWHERE = -1e6  # a place that is none
 
 
-def carry_over(gpu: Gpu, of: Lightmap, to: Lightmap, known: TexelPlaces, places: F32) -> None:
-    """Let ``to``, in which nothing has been shot, show the light of another lightmap. known: the texels of that; places: of its
-    own blocks there, as long as its leaves were as they were first."""
+def carry_over(gpu: Gpu, of: Lightmap, to: Lightmap, places: F32) -> None:
+    """Let ``to``, in which nothing has been shot, show the light of another lightmap. places: of its blocks there. Raises
+    UserError where memory does not do: then it shows what it would without."""
     if to.foresee is not None:
-        probe = PlaceProbe(gpu, of, places if to.version == 0 else known.of_blocks(to.pool))
-        probe.draw(unit=to.unit)
-        to.foresee(probe.made)
-        probe.release()
+        probe = PlaceProbe(gpu, of, places)
+        try:
+            probe.draw(unit=to.unit)
+            to.foresee(probe.made)
+        finally:
+            probe.release()
 
 
 class TexelPlaces:

@@ -168,7 +168,7 @@ class Quadtree:
         for slot in old.tolist():
             self._leave(self.tile(slot))
         self.pool.free(old)
-        self._free.extend(old.tolist())
+        self._free.extend(old[::-1].tolist())  # what is split and merged again is where it was
         fresh = np.array([self._free.pop() for _ in range(len(tiles))], np.int64)
         self.pool.put(fresh, tiles)
         for slot in fresh.tolist():

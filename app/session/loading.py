@@ -43,9 +43,12 @@ COARSE_FROM = 32_768  # triangles: charts of fewer are there within about two se
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """The scene as it was read, the tile pool of it as it was made and cut, what of that is uploaded, how it was cut and is held,
-    the exposure to open it with [EV] if that was asked for, how long each stage took [s], the coarse
-    texels that were there before, of which light may be carried over, and where its blocks are among these."""
+    """A scene in texels, ready to be uploaded.
+
+    read: the scene as it was read. pool: its texels, as it was made and cut. arrays: what is uploaded of them. atlas, options:
+    how it was cut, and how its light is held. exposure: to open it with [EV], where that was asked for. seconds: that each stage
+    took. places: where its blocks are in the coarse texels that were there before, of which light may be carried over.
+    """
 
     read: Scene
     pool: TilePool
@@ -54,7 +57,6 @@ class Loaded:
     options: LightmapOptions
     exposure: float | None
     seconds: dict[str, float]
-    known: TexelPlaces | None = None
     places: F32 | None = None
 
 
@@ -172,7 +174,7 @@ def load(
         tree_of(pool, lambda share: tell(SORTING, 0.8 + (LOADED - 0.8) * share))
         seconds["rays"] = time.perf_counter() - start
     tell(UPLOADING, LOADED)
-    return Loaded(read, pool, arrays, atlas, options, exposure, seconds, known, places)
+    return Loaded(read, pool, arrays, atlas, options, exposure, seconds, places)
 
 
 class _Telling:

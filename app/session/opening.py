@@ -18,7 +18,12 @@ from app.session.loading import LOADED, UPLOADING, Loaded, Loading
 from app.solvers import SOLVERS, Solver
 from app.util.parts import run_to_end
 
-COMPILING, DRAWING = "making the solver ready", "making the picture ready"  # stages, after UPLOADING
+COMPILING, DRAWING, LIGHTING = (
+    "making the solver ready",
+    "making the picture ready",
+    "first light",
+)  # stages, after UPLOADING
+LIGHT_BANDS = 16  # parts of the first light, with frames of the window between them
 Prepare = Callable[
     [Lightmap], Callable[[], None]
 ]  # what else a lightmap needs before it is shown; returns what undoes it
@@ -32,8 +37,8 @@ class Opened(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """What can take the place of what is open: its light is as before any work. solver_name: of the table of solvers. began: when
-    its upload did [s], of ``time.perf_counter``."""
+    """What can take the place of what is open: its light is as before any work, or after the first piece, where it takes the
+    place of a picture. solver_name: of the table of solvers. began: when its upload did [s], of ``time.perf_counter``."""
 
     loaded: Loaded
     lightmap: Lightmap
@@ -62,13 +67,13 @@ class Opening:
         self.prepare: Prepare | None = None
         self.loading: Loading | None = None
         self._parts: Generator[tuple[str, float], None, Ready] | None = None
-        self._coarse = False  # whether these parts are of coarse texels
+        self._coarse = self._shows = False  # whether these parts are of coarse texels; whether coarse light is shown
         self._warm = set[tuple[int, str]]()  # solvers all of whose programs have drawn, since which reload of these
 
     def begin(self, loading: Loading) -> None:
         """This one instead of any other."""
         self.stop()
-        self.loading = loading
+        self.loading, self._shows = loading, False
 
     def stop(self) -> None:
         """None at all; nothing of it stays on the GPU."""
@@ -98,12 +103,13 @@ class Opening:
                 coarse, loading.coarse = loading.coarse, None
                 self._coarse = coarse is not None and not loading.ended
                 of = coarse if coarse is not None and self._coarse else loading.result
-                self._parts = self._upload(of, loading.solver, options, coarse=self._coarse)
+                lights = self._coarse or self._shows
+                self._parts = self._upload(of, loading.solver, options, coarse=self._coarse, lights=lights)
             stage, share = next(self._parts)
             if not self._coarse:
                 loading.stage, loading.fraction = stage, LOADED + (1 - LOADED) * share
         except StopIteration as last:
-            self._parts = None
+            self._parts, self._shows = None, self._coarse
             if not self._coarse:
                 self.loading = None
             ready: Ready = last.value
@@ -120,10 +126,17 @@ class Opening:
         return run_to_end(self._upload(loaded, solver_name, options))
 
     def _upload(
-        self, loaded: Loaded, solver_name: str, options: Mapping[str, Options], *, coarse: bool = False
+        self,
+        loaded: Loaded,
+        solver_name: str,
+        options: Mapping[str, Options],
+        *,
+        coarse: bool = False,
+        lights: bool = False,
     ) -> Generator[tuple[str, float], None, Ready]:
         """Upload what was loaded, and draw once with each program of the solver, since drivers compile it then, unless all have
-        drawn; in coarse texels the first shot does. Yields, after each part, the stage of the next and the share that is done.
+        drawn; in coarse texels the first shot does. lights: whether a picture stays until there is light, of a solver that cannot
+        be told what is to come. Yields, after each part, the stage of the next and the share that is done.
         Raises UserError; then, and when given up between two parts, nothing stays on the GPU."""
         began, gpu, family = time.perf_counter(), self._gpu, SOLVERS[solver_name]
         make = family.for_coarse if coarse and family.for_coarse is not None else family.make
@@ -155,6 +168,10 @@ class Opening:
             if self.prepare is not None:
                 undo.callback(self.prepare(lightmap))
                 gpu.ctx.finish()
-                yield DRAWING, 1.0
+                yield DRAWING, 0.95
+            if lights and not family.foresees:
+                for done, _ in enumerate(solver.work(family.batch, LIGHT_BANDS), 1):
+                    gpu.ctx.finish()
+                    yield LIGHTING, 1.0 - 0.05 / (1 + done)
             undo.pop_all()
         return Ready(loaded, lightmap, solver, solver_name, began)

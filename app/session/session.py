@@ -7,6 +7,7 @@ is in solved_scene.py, edits of it in editable_scene.py.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from collections.abc import Callable
@@ -186,8 +187,9 @@ class Session(EditableScene):
             lightmap.set_sky(self.scene.sky)
             lightmap.set_lights(self.scene.lights)
             solver.reset()
-        if refined and loaded.known is not None and loaded.places is not None and self.solver.issued > 0:
-            carry_over(self.gpu, self.lightmap, lightmap, loaded.known, loaded.places)
+        if refined and loaded.places is not None and self.solver.issued > 0:
+            with contextlib.suppress(UserError):
+                carry_over(self.gpu, self.lightmap, lightmap, loaded.places)
         self._remained = self.run.progress.remaining if refined else math.inf
         self.close()
         self.reading = self.reading if same_scene else self._reading

@@ -16,9 +16,11 @@ from gl_objects import forgotten, held
 
 from app.atlas import charts_cache
 from app.atlas.options import AtlasOptions
-from app.errors import UserError
+from app.errors import GpuError, UserError
 from app.gpu import Gpu
+from app.lightmap import carry_over
 from app.lightmap.options import LightmapOptions
+from app.lightmap.textures import LightTextures
 from app.render import resolve
 from app.scene.load import load_scene
 from app.scene.sky import Sky
@@ -149,6 +151,7 @@ def test_better_texels_begin_with_the_coarse_light(
     session.open("cornell-box")
     frames(session, lambda: session.opened and session.solver.issued > 4)
     session.run.running = False
+    session.solver.settle()  # within a batch, less has arrived than was taken from those who shoot
     coarse = shown()
     better.set()
     frames(session, lambda: session.loading is None)
@@ -163,6 +166,58 @@ def test_better_texels_begin_with_the_coarse_light(
     material = dataclasses.replace(session.materials[1], albedo=(0.1, 0.2, 0.7))
     session.set_material(1, material)
     assert not session.solver.batch.ambient._foreseen  # type: ignore[attr-defined]  # of walls that are others now
+
+
+def test_where_better_texels_cannot_begin_with_it_they_come_all_the_same(
+    gpu: Gpu,
+    view: View,
+    better: threading.Event,
+    monkeypatch: pytest.MonkeyPatch,
+    forgotten: Callable[[], list[object]],
+) -> None:
+    """What memory does not do for is a nicety: nothing of it stays."""
+    session, make = view.session, LightTextures.make_ambient
+
+    def full(*of: Any, of_each: bool = True) -> Any:
+        if of_each:
+            raise GpuError("no room")
+        return make(*of, of_each=of_each)
+
+    session.open("cornell-box")
+    frames(session, lambda: session.opened and session.solver.issued > 4)
+    session.run.running = False
+    with monkeypatch.context() as broken:
+        broken.setattr(LightTextures, "make_ambient", full)
+        better.set()
+        frames(session, lambda: session.loading is None)
+        assert session.message is None and not forgotten()
+    better.clear()
+    session.atlas = session.atlas.replace(texels=TEXELS + 1)
+    session.run.running = True
+    session.open("cornell-box")
+    frames(session, lambda: session.coarse and session.solver.issued > 4)
+    session.run.running = False
+    with monkeypatch.context() as broken:
+        broken.setattr(carry_over, "PlaceProbe", full)
+        better.set()
+        frames(session, lambda: session.loading is None)
+        assert session.message is None and not session.coarse and not forgotten()
+
+
+def test_gathered_light_takes_the_place_of_a_picture_once_it_is_there(view: View, better: threading.Event) -> None:
+    """It cannot be told what is to come: what it gives way to stays as long, neither coarse nor better texels are ever black."""
+    session = view.session
+    session.set_solver("gathering")
+    session.open("cornell-box")
+    frames(session, lambda: session.opened)
+    assert session.coarse and session.lightmap.irradiance().max() > 0
+    first = session.lightmap
+    better.set()
+    end = time.monotonic() + PATIENCE
+    while session.lightmap is first:
+        assert time.monotonic() < end
+        session.poll()
+    assert not session.coarse and session.lightmap.irradiance().max() > 0 and session.solver.issued > 0
 
 
 def test_few_shots_show_most_of_a_lamp(gpu: Gpu, view: View, monkeypatch: pytest.MonkeyPatch) -> None:

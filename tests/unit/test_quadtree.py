@@ -106,6 +106,18 @@ def test_merging_ends_at_the_first_leaves(name: str) -> None:
     assert places(tree) == first
 
 
+def test_what_is_split_and_merged_again_is_where_it_was() -> None:
+    """Solvers do that once before there is light, which is for slots as they were."""
+    tree = tree_of("walls")
+    grow(tree, [0])
+    before = dict(tree.slots)
+    for slot in sorted(before.values())[:3]:
+        change = tree.split([slot])
+        assert tree.slots != before
+        tree.merge([change.children.tolist()])
+        assert tree.slots == before
+
+
 def test_a_family_merges_whole_or_not_at_all() -> None:
     tree = tree_of("walls")
     change = grow(tree, [0])

@@ -17,7 +17,7 @@ from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.textures import write_table
-from app.lightmap.tile_pool import TABLE_WIDTH
+from app.lightmap.tile_pool import TABLE_WIDTH, Moves
 from app.solvers.shooting.choose import Bins
 from app.solvers.shooting.gather_points import GatherPoints
 from app.solvers.shooting.ledger import Ledger
@@ -39,6 +39,7 @@ FIRST = 4  # times as many points of a frame until what they find is shown, or i
 TRACED_AT_ONCE = 512  # points, at most: with ten thousands of triangles on a software rasteriser 50 ms
 # Share of the light that is passed on until points look again: of that, what they foresaw is shown
 PASSED_ON = 1 / 16
+TEXEL_BYTES = 16  # of an ambient term of each texel
 
 
 class Ambient:
@@ -100,14 +101,15 @@ class Ambient:
             uniforms={"u_shots": shots or 0, "u_albedo": ledger.albedo, "u_area": ledger.area},
         )
         self._updates += 1
-        if self.shown and self.note is None and self._looked < FIRST_SWEEPS and not self._foreseen:
-            self._show_even()
+        self._show_even()
         if self._owed and self._points is not None:
             self._look_for_frames(self._points)
 
     def _show_even(self) -> None:
-        """Show the even term: of each texel where frames may be drawn while light arrives in some of them and not yet in others;
-        not where memory does not do."""
+        """Show the even term, unless more is known: of each texel where frames may be drawn while light arrives in some of them
+        and not yet in others; not where memory does not do."""
+        if not self.shown or self._looked >= FIRST_SWEEPS or self._foreseen:
+            return
         lightmap = self._lightmap
         of_each = self._watched or self._updates <= FIRST_UPDATES
         with contextlib.suppress(UserError):
@@ -151,16 +153,14 @@ class Ambient:
         lightmap = self._lightmap
         if not self.shown or self.note is not None:
             return
-        try:
+        with contextlib.suppress(UserError), contextlib.ExitStack() as undo:
             spread = PointSpread(self._gpu, lightmap)
+            undo.callback(spread.release)
             lightmap.hold_ambient()
-        except UserError:
-            return
-        self._foreseen = True
-        self._to_come_target.clear()
-        spread.find_around(0, spread.rows)
-        spread.draw(lightmap.ambient_target, irradiance, self._to_come, 0, spread.rows, foreseen=True)
-        spread.release()
+            self._foreseen = True
+            self._to_come_target.clear()
+            spread.find_around(0, spread.rows)
+            spread.draw(lightmap.ambient_target, irradiance, self._to_come, 0, spread.rows, foreseen=True)
 
     def _look_for_frames(self, points: GatherPoints) -> None:
         """As many looks as frames asked for, once they are enough, and where as much was passed on that it is seen."""
@@ -218,12 +218,14 @@ class Ambient:
         return self._points
 
     def _do_without(self, error: UserError) -> None:
-        """Show none: there cannot be points."""
-        self.note = f"no ambient term is shown: {error}"
+        """Show the even term from now on: there cannot be points."""
+        self.note = f"the ambient term stays an even one: {error}"
         if self._points is not None:
             self._points.release()
             self._points = None
-        self._show_none()
+        self._drop_hidden()
+        self._foreseen = False
+        self._show_even()
 
     def _show_none(self) -> None:
         """Until it is known what to show."""
@@ -240,8 +242,9 @@ class Ambient:
 
     @property
     def memory(self) -> int:
-        """Bytes on the GPU of what gathers it."""
-        return 0 if self._points is None else self._points.memory
+        """Bytes on the GPU of what gathers it, besides the lightmap's own."""
+        hidden = 0 if self._hidden is None else self._hidden[0].width * self._hidden[0].height * TEXEL_BYTES
+        return hidden + (0 if self._points is None else self._points.memory)
 
     def _find_what_is_to_come(self, target: Framebuffer, *, even: bool = True) -> None:
         """See what lamps and sources outside have yet to give, and the even term of the rest, or nothing of that."""
@@ -288,13 +291,16 @@ class Ambient:
         if self._points is not None:
             self._points.leaves_changed()
 
-    def resize(self) -> None:
+    def resize(self, moves: Moves) -> None:
         """For a lightmap that has got another number of slots."""
         self.find_lamps()
         if self._points is not None:
             self._next_row = 0
             if self._hidden is not None:
-                self._drop_hidden()
+                hidden, target = self._hidden
+                self._gpu.release_all(target)
+                hidden = self._lightmap.moved(hidden, moves)
+                self._hidden = hidden, self._gpu.target(hidden)
             try:
                 self._points.resize()
             except UserError as error:
@@ -311,7 +317,8 @@ class Ambient:
     def carried(self) -> list[tuple[Texture, Framebuffer]]:
         """What goes with leaves that split or merge, see LeafFollower."""
         lightmap = self._lightmap
-        return [(lightmap.texture("t_ambient"), lightmap.ambient_target)] if lightmap.ambient_of_each else []
+        shown = [(lightmap.texture("t_ambient"), lightmap.ambient_target)] if lightmap.ambient_of_each else []
+        return shown if self._hidden is None else [*shown, self._hidden]
 
     def forget_foreseen(self) -> None:
         """Lamps and surfaces are others than in those texels where the light was that is foreseen."""

@@ -249,7 +249,7 @@ class Batch:
         self.ledger.resize()
         self.phases.resize()
         self.receivers.follow()
-        self.ambient.resize()
+        self.ambient.resize(moves)
         if self.replay is not None:
             self.replay.resized(moves)
 
