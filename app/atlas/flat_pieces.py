@@ -24,6 +24,7 @@ from app.util.background import Report
 
 MOST_PIECES = 8192  # that are parted, beyond which none is: each takes a millisecond
 THIN = 0.01  # width of a body that parts what it stands on along its middle: a texel's, of some 50,000 in a room
+WIDE = 3 * THIN  # width of a gap between sheets, from which on texels beside it have neighbours of their own in it
 LONG = 4  # its length, over that
 MOST_ENDS = 64  # of feet in one flat piece, that are drawn on: those of grass are not
 
@@ -81,7 +82,7 @@ def parted_pieces(
                 outside[cover.query(lines, predicate="covered_by")[0]] = False
             kept |= outside
         stands = np.concatenate([flat[kept], *middles])
-        parts, loose = _drawn_on(stands, piece.border)
+        parts, loose = _drawn_on(np.concatenate([stands, _through_gaps(flat[kept], piece)]), piece.border)
         left += loose
         if len(parts):
             out.append(dataclasses.replace(piece, stands=stands, parts=parts))
@@ -115,18 +116,39 @@ def piece_of(corners: F64, members: I64) -> Piece:
 def _middles_of_thin(hidden: shapely.Geometry, flat: F64) -> F64:
     """Segments (n, 2, 2) along the middle of what is thin and long of what bodies hide of triangles (t, 3, 2)."""
     thick = shapely.buffer(shapely.buffer(hidden, -0.5 * THIN), 0.5 * THIN + NEAR, join_style="mitre")
-    boxes = shapely.oriented_envelope(shapely.get_parts(shapely.difference(hidden, thick)))
+    middles = _middles_of_long(shapely.get_parts(shapely.difference(hidden, thick)), THIN)
+    if not len(middles):
+        return middles
+    whole = shapely.union_all(shapely.polygons(_on_grid(flat)), grid_size=FLAT)
+    lines = shapely.get_parts(shapely.intersection(shapely.linestrings(middles), whole))
+    return np.reshape(shapely.get_coordinates(lines[shapely.length(lines) > NEAR]), (-1, 2, 2))
+
+
+def _through_gaps(stands: F64, piece: Piece) -> F64:
+    """Segments (n, 2, 2) along the middle of what is thin and long between sheets that stand on a piece, segments (k, 2, 2), and
+    out at its ends, where the piece goes on: a chart around a gap of a texel or two would be its own neighbour across it."""
+    if len(stands) < 3:  # two sheets, and the end between them
+        return np.empty((0, 2, 2))
+    ring, line = shapely.get_coordinates(shapely.get_parts(piece.border), return_index=True)
+    follows = np.flatnonzero(line[1:] == line[:-1])
+    lines = noded(np.concatenate([stands, np.stack([ring[follows], ring[follows + 1]], axis=1)]))
+    middles = _middles_of_long(shapely.get_parts(shapely.polygonize(shapely.linestrings(lines))), WIDE)
+    way = middles[:, 1] - middles[:, 0]
+    way *= 2 * NEAR / np.linalg.norm(way, axis=1, keepdims=True)
+    inside = shapely.distance(shapely.points(middles), piece.border) > NEAR
+    out = middles + np.where(inside, 1.0, 0.0)[..., None] * np.stack([-way, way], axis=1)
+    return np.asarray(out[inside.any(1)])
+
+
+def _middles_of_long(polygons: NDArray[np.object_], width: float) -> F64:
+    """Segments (n, 2, 2) along the middle of polygons that are thinner than this, and long."""
+    boxes = shapely.oriented_envelope(polygons)
     boxes = boxes[shapely.area(boxes) > 0]
     rings = shapely.get_coordinates(shapely.get_exterior_ring(boxes)).reshape(-1, 5, 2)
     sides = np.linalg.norm(np.diff(rings[:, :3], axis=1), axis=2)  # (n, 2)
     rings = np.where((sides[:, 0] < sides[:, 1])[:, None, None], rings[:, :4], rings[:, 1:])  # a short side first
-    long = (sides.min(1) < THIN) & (sides.max(1) > LONG * sides.min(1))
-    if not long.any():
-        return np.empty((0, 2, 2))
-    middles = np.stack([rings[:, :2].mean(1), rings[:, 2:4].mean(1)], axis=1)[long]
-    whole = shapely.union_all(shapely.polygons(_on_grid(flat)), grid_size=FLAT)
-    lines = shapely.get_parts(shapely.intersection(shapely.linestrings(middles), whole))
-    return np.reshape(shapely.get_coordinates(lines[shapely.length(lines) > NEAR]), (-1, 2, 2))
+    long = (sides.min(1) < width) & (sides.max(1) > LONG * sides.min(1))
+    return np.asarray(np.stack([rings[:, :2].mean(1), rings[:, 2:4].mean(1)], axis=1)[long])
 
 
 def axes_of(corners: F64) -> F64:

@@ -156,6 +156,15 @@ def test_a_thin_door_parts_the_floor_along_its_middle() -> None:
         assert mine.max() <= 1.0 + 1e-5 or mine.min() >= 1.0 - 1e-5
 
 
+def test_a_hollow_wall_parts_the_floor_that_goes_on_around_its_end() -> None:
+    """The floor between its sheets is a chart of its own: one of both rooms would have the other one's texels across a gap."""
+    sheets = [[(x, 0.0, 0.0), (x, 0.5, 0.0), (x, 0.5, 0.6), (x, 0.0, 0.6)] for x in (0.98, 1.02)]
+    end = [(0.98, 0.0, 0.6), (0.98, 0.5, 0.6), (1.02, 0.5, 0.6), (1.02, 0.0, 0.6)]
+    cut, charts = charts_of(scene_of(sheets[0][::-1], sheets[1], end))
+    floor = charts.face_chart[(cut.corners[charts.face_triangle, :, 1] < 1e-9).all(1)]
+    assert on_one_side(spans(cut, charts, 0)[np.unique(floor)], 1.0)
+
+
 def test_a_board_a_little_before_a_wall_parts_it() -> None:
     """Where it ends above the floor, the wall below it is in the dark: its texels may not be those of the wall above."""
     board = box((2e-4, 0.05, 0.1), (0.02, 0.06, 0.9))
