@@ -15,12 +15,12 @@ from app.gpu import Gpu
 from app.lightmap.lightmap import Lightmap
 from app.lightmap.probe import PlaceProbe
 from app.lightmap.textures import FORESEEN_EDGE as EDGE
+from app.lightmap.textures import NEAREST
 from app.lightmap.tile_pool import TilePool
 from app.scene.model import F32, F64
 
 TURNED = 4.0  # texels that the way is longer to one whose normal is turned by a radian
 FARTHEST = 1.0  # texels of the plane beside one, at most
-NEAREST = (5, 6, 9, 10, 1, 2, 4, 7, 8, 11, 13, 14, 0, 3, 12, 15)  # of a block, from its middle, as in gather_point.glsl
 NOWHERE = -1e6  # a place that is none
 
 

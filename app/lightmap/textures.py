@@ -35,6 +35,7 @@ LOOKED_AT = 8192  # texels, to find what lamps without area give at most
 LIGHT = ("t_irradiance", "t_residual")
 EVEN_AMBIENT = (3, 1)  # size of an ambient term for all texels
 FORESEEN_EDGE = 4
+NEAREST = (5, 6, 9, 10, 1, 2, 4, 7, 8, 11, 13, 14, 0, 3, 12, 15)  # texels of such a block, row by row, from its middle
 QUAD_FORMAT = {"in_rect": "4f", "in_from": "2f"}  # see common/rects.vert.glsl
 BYTES = {"f4": 4, "u4": 4, "f2": 2, "f1": 1}
 

@@ -26,6 +26,7 @@ from app.solvers.pairs.gather import CHOICES
 from app.solvers.shooting.gather_points import RAY_EDGE
 from app.solvers.shooting.options import MAX_LEVEL, VISIBILITIES, ShootingOptions
 from app.solvers.shooting.outside_sources import BLENDED_EDGE
+from app.solvers.shooting.point_spread import POINT
 from app.solvers.shooting.records import BATCH, BLOCK_LEVEL, BLOCK_ROWS, CELL_LEVEL, EMITTER, GROUP, LEVELS, RECORDS
 from app.solvers.shooting.see import ESCAPED_BLOCK
 from app.visibility.bvh import DEEPEST
@@ -49,6 +50,7 @@ DEFINES: Mapping[str, tuple[object, ...]] = {
     "GROUP": (GROUP,),
     "BLOCK": (ESCAPED_BLOCK,),
     "BLOCK_LEVEL": (BLOCK_LEVEL,),
+    "NEAREST": (POINT["NEAREST"],),
     "FINEST": (0, MAX_LEVEL),
     "LEVELS": (LEVELS,),
     "EMITTER": (EMITTER,),

@@ -13,7 +13,7 @@ import numpy as np
 from app.errors import UserError
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
-from app.solvers.shooting.point_spread import EDGE, PointSpread
+from app.solvers.shooting.point_spread import EDGE, POINT, PointSpread
 from app.solvers.shooting.records import BLOCK_LEVEL
 from app.visibility.rays import RayScene
 
@@ -45,7 +45,7 @@ class GatherPoints:
         self._spread = PointSpread(gpu, lightmap)
         points = self.columns, self.rows = self._spread.columns, self._spread.rows
         self._ray_edge = min(RAY_EDGE, gpu.limits.max_texture // max(points))
-        looks = {"BLOCK_LEVEL": BLOCK_LEVEL, "RAY_EDGE": self._ray_edge} | lightmap.defines("MATERIAL_BITS")
+        looks = POINT | {"RAY_EDGE": self._ray_edge} | lightmap.defines("MATERIAL_BITS")
         traced = looks | lightmap.defines("TILE") | dict(self._rays.defines)
         self._trace = Pass(gpu, "solvers/shooting/gather_hits", defines=traced)
         self._gather = Pass(gpu, "solvers/shooting/gather_ambient", defines=looks)

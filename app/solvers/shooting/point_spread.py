@@ -6,9 +6,11 @@ import functools
 
 from app.gpu import Framebuffer, Gpu, Pass, Texture
 from app.lightmap.lightmap import Lightmap
+from app.lightmap.textures import NEAREST
 from app.solvers.shooting.records import BLOCK_LEVEL
 
 EDGE = 1 << BLOCK_LEVEL  # texels along the edge of the block that a point stands for
+POINT = {"BLOCK_LEVEL": BLOCK_LEVEL, "NEAREST": ", ".join(map(str, NEAREST))}  # of passes that look its texel up
 
 
 class PointSpread:
@@ -21,7 +23,7 @@ class PointSpread:
         self._gpu, self._lightmap = gpu, lightmap
         self.columns, self.rows = (edge >> BLOCK_LEVEL for edge in lightmap.size)
         blocks = {"BLOCK_LEVEL": BLOCK_LEVEL}
-        self._find = Pass(gpu, "solvers/shooting/around", defines=lightmap.defines("MATERIAL_BITS", "TILE") | blocks)
+        self._find = Pass(gpu, "solvers/shooting/around", defines=lightmap.defines("MATERIAL_BITS", "TILE") | POINT)
         self._spread = functools.cache(
             lambda foreseen: Pass(gpu, "solvers/shooting/spread_ambient", defines=blocks | {"FORESEEN": foreseen})
         )

@@ -6,14 +6,16 @@
 uniform sampler2D t_position_area;
 uniform usampler2D t_normal_ids;
 
-const int NEAREST[16] = int[](5, 6, 9, 10, 1, 2, 4, 7, 8, 11, 13, 14, 0, 3, 12, 15);  // from the middle of 4×4
+#define NEAREST  // texels of a block, row by row, from its middle
+
+const int FROM_MIDDLE[BLOCK * BLOCK] = int[](NEAREST);
 
 // Its texel; of area 0 where the block covers nothing.
 Texel gather_point(ivec2 block) {
     ivec2 px = ivec2(0);
     float area = 0.0;
     for (int nth = 0; nth < BLOCK * BLOCK && area <= 0.0; ++nth) {
-        px = block * BLOCK + ivec2(NEAREST[nth] % BLOCK, NEAREST[nth] / BLOCK);
+        px = block * BLOCK + ivec2(FROM_MIDDLE[nth] % BLOCK, FROM_MIDDLE[nth] / BLOCK);
         area = texelFetch(t_position_area, px, 0).w;
     }
     return load_texel(t_position_area, t_normal_ids, px);
