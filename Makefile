@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 PYTEST := $(BIN)/python -m pytest -n 2 --dist worksteal
+GLSL   := tests/gpu/test_shaders.py tests/gpu/test_shader_library.py
 SOLVE  := tests/physics/test_energy.py::test_light_is_conserved_around_a_table
 BAKE   := tests/gpu/test_baking.py::test_the_scene_as_edited_is_written_with_its_light
 
@@ -15,7 +16,7 @@ run: $(VENV)/.run
 # where there is no screen, by a solve and a bake
 test: $(VENV)/.dev lint
 	$(PYTEST) tests/unit tests/gpu tests/physics --gl41
-	$(PYTEST) tests/desktop tests/screenshots tests/web tests/gpu/test_shaders.py $(SOLVE) $(BAKE)
+	$(PYTEST) tests/desktop tests/screenshots tests/web $(GLSL) $(SOLVE) $(BAKE)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

@@ -37,6 +37,7 @@ from app.util.parts import run_to_end
 from app.visibility.projections import PROJECTIONS
 
 UNIT_SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])  # faces +z
+RAYS = 32  # of a texel, where light is gathered and not said otherwise
 NOISE = 0.02  # over the mean, at which gathering is done
 ENOUGH = 20_000  # shots: a solve that needs more does not converge
 
@@ -285,3 +286,11 @@ def solve(gpu: Gpu, scene: Scene, **options: object) -> Solution:
     solution = begin(gpu, scene, **options)  # type: ignore[arg-type]
     solution.settle()
     return solution
+
+
+def gathered(gpu: Gpu, scene: Scene, rays: int = RAYS, **options: object) -> Solution:
+    """``begin`` and gather so many rays of each texel; light is not smoothed."""
+    known: dict[str, object] = {"density": 4, "smooth": False}
+    lit = begin(gpu, scene, solver="gathering", **(known | options))  # type: ignore[arg-type]
+    lit.gather(rays)
+    return lit
