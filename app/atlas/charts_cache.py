@@ -63,6 +63,7 @@ def charts_of(
             waiting()
         found = _made(scene, atlas, roots, progress, cut)
         if found[1].lasting:
+            _ = found[1].seam_texels  # found here once, not in two threads that both need them
             cache.store(functools.partial(_content, scene, *found), file, CACHE_FILES)
     return found
 

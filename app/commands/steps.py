@@ -77,7 +77,7 @@ def open_scene(
         session.open_now(flags.scene, tell, from_flags(FileOptions, flags))
     if needs_light and not session.scene.emits:
         raise UserError(f"{flags.scene}: {NO_LIGHT}")
-    for warning in (*([note] if note else []), *session.scene.warnings, *session.charts.warnings):
+    for warning in (*([note] if note else []), *session.warnings):
         console.warn(warning)
 
 

@@ -47,7 +47,8 @@ class Loaded:
 
     read: the scene as it was read. pool: its texels, as it was made and cut. arrays: what is uploaded of them. atlas, options:
     how it was cut, and how its light is held. exposure: to open it with [EV], where that was asked for. seconds: that each stage
-    took. places: where its blocks are in the coarse texels that were there before, of which light may be carried over.
+    took. notes: what went wrong beside it. places: where its blocks are in the coarse texels that were there before, of which
+    light may be carried over.
     """
 
     read: Scene
@@ -57,6 +58,7 @@ class Loaded:
     options: LightmapOptions
     exposure: float | None
     seconds: dict[str, float]
+    notes: tuple[str, ...] = ()
     places: F32 | None = None
 
 
@@ -109,7 +111,6 @@ def read_and_unfold(
     return read, scene, charts, seconds | {"unfold": time.perf_counter() - start}
 
 
-@cache.written_beside()
 def load(
     source: str | Path | Scene,
     atlas: AtlasOptions,
@@ -133,48 +134,52 @@ def load(
     tell = _Telling(progress or (lambda stage, share: None))
     options = options or LightmapOptions()
     check(atlas.density, atlas.texels)
-    with threads(1) as beside, threads(1) as meanwhile:
-        early: list[Future[tuple[Loaded, TexelPlaces] | None]] = []
-        drawn: list[Future[Drawn]] = []
+    with cache.written_beside() as failures:
+        with threads(1) as beside, threads(1) as meanwhile:
+            early: list[Future[tuple[Loaded, TexelPlaces] | None]] = []
+            drawn: list[Future[Drawn]] = []
 
-        def drawing(scene: Scene) -> None:
-            drawn.append(meanwhile.submit(Drawn.of, _local(scene), scene.triangles))
+            def drawing(scene: Scene) -> None:
+                drawn.append(meanwhile.submit(Drawn.of, _local(scene), scene.triangles))
 
-        def waiting(read: Scene, scene: Scene) -> None:
-            if coarse is not None and scene.emits and len(scene.triangles) >= COARSE_FROM:
-                early.append(beside.submit(_show_coarse, read, scene, atlas, options, expose, rays, tell.again, coarse))
+            def waiting(read: Scene, scene: Scene) -> None:
+                if coarse is not None and scene.emits and len(scene.triangles) >= COARSE_FROM:
+                    early.append(
+                        beside.submit(_show_coarse, read, scene, atlas, options, expose, rays, tell.again, coarse)
+                    )
 
-        read, scene, charts, seconds = read_and_unfold(
-            source,
-            atlas,
-            default_light,
-            tell,
-            file=file,
-            sky=sky,
-            roots=options.adaptive,
-            make=make,
-            show=show,
-            waiting=waiting,
-            cut=drawing,
-        )
-        shown, known = (early[0].result() if early else None) or (None, None)
-    start = time.perf_counter()
-
-    def cutting(share: float) -> None:
-        tell("cutting into texels", 0.6 + 0.2 * share)
-
-    cutting(0.0)
-    known = known if foresees else None
-    more: dict[str, Any] = {"expose": expose and shown is None, "drawn": drawn[0].result if drawn else None}
-    pool, arrays, exposure, places = _in_texels(scene, charts, options, cutting, known=known, **more)
-    exposure = exposure if shown is None else shown.exposure
-    seconds["texels"] = time.perf_counter() - start
-    if rays:
+            read, scene, charts, seconds = read_and_unfold(
+                source,
+                atlas,
+                default_light,
+                tell,
+                file=file,
+                sky=sky,
+                roots=options.adaptive,
+                make=make,
+                show=show,
+                waiting=waiting,
+                cut=drawing,
+            )
+            shown, known = (early[0].result() if early else None) or (None, None)
         start = time.perf_counter()
-        tree_of(pool, lambda share: tell(SORTING, 0.8 + (LOADED - 0.8) * share))
-        seconds["rays"] = time.perf_counter() - start
-    tell(UPLOADING, LOADED)
-    return Loaded(read, pool, arrays, atlas, options, exposure, seconds, places)
+
+        def cutting(share: float) -> None:
+            tell("cutting into texels", 0.6 + 0.2 * share)
+
+        cutting(0.0)
+        known = known if foresees else None
+        more: dict[str, Any] = {"expose": expose and shown is None, "drawn": drawn[0].result if drawn else None}
+        pool, arrays, exposure, places = _in_texels(scene, charts, options, cutting, known=known, **more)
+        exposure = exposure if shown is None else shown.exposure
+        seconds["texels"] = time.perf_counter() - start
+        if rays:
+            start = time.perf_counter()
+            tree_of(pool, lambda share: tell(SORTING, 0.8 + (LOADED - 0.8) * share))
+            seconds["rays"] = time.perf_counter() - start
+        tell(UPLOADING, LOADED)
+    notes = tuple(f"what took long is not kept for next time: {failure}" for failure in failures[:1])
+    return Loaded(read, pool, arrays, atlas, options, exposure, seconds, notes, places)
 
 
 class _Telling:

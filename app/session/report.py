@@ -47,14 +47,15 @@ def report(session: Session) -> dict[str, Any]:
         "balance": ("fine", "fair", "bad")[verdict_of(stats.imbalance, session.family).level],
         **_error(session),
         **({} if session.expected is None else {"expected_error": session.expected._asdict()}),
-        "warnings": [*_of_scene(session), *session.charts.warnings, *notes(session)],
+        "warnings": [*_of_opening(session), *notes(session)],
     }
 
 
-def _of_scene(session: Session) -> list[str]:
-    """What was repaired or left out of the scene; not that it has no light, where it was given some since."""
+def _of_opening(session: Session) -> list[str]:
+    """What was repaired, left out or could not be done as it was opened; not that it has no light, where it was given some
+    since."""
     lit = session.edited_scene.emits
-    return [warning for warning in session.scene.warnings if not (lit and warning == NO_LIGHT)]
+    return [warning for warning in session.warnings if not (lit and warning == NO_LIGHT)]
 
 
 def _read_as(reading: Reading) -> dict[str, Any]:

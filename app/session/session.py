@@ -197,6 +197,7 @@ class Session(EditableScene):
         self.read = self.read if same_scene else loaded.read
         self._choice.at_work = ready.solver_name
         self.atlas, self.light = loaded.atlas, lightmap.options
+        self._load_notes = loaded.notes
         self.load_seconds = loaded.seconds | {"upload": time.perf_counter() - ready.began}
         self.source = self.scene.source or self.scene.name
         self.message = None

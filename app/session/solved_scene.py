@@ -40,6 +40,7 @@ class SolvedScene:
         self.lightmap: Lightmap
         self.solver: Solver[Any]
         self._opened = self._busy = False
+        self._load_notes: tuple[str, ...] = ()
         self._steady: Scene | None = None  # as it was edited, while its lamps flicker
 
     # -- what is open --------------------------------------------------------------------------------------------------
@@ -65,6 +66,11 @@ class SolvedScene:
     @property
     def charts(self) -> Charts:
         return self.lightmap.charts
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What was repaired, left out or could not be done as it was opened."""
+        return (*self.scene.warnings, *self.charts.warnings, *self._load_notes)
 
     @property
     def name(self) -> str:

@@ -122,7 +122,7 @@ class FakeSession:
         self.scene.normals_areas = np.zeros((len(MATERIALS), 3)), np.ones(len(MATERIALS))
         self.read = self.unedited = FakeScene(**vars(self.scene))
         self.source, self.reading = "fake box", object()
-        self.charts = SimpleNamespace(density=40.0, tile=16, warnings=(), size=(160, 96))
+        self.charts = SimpleNamespace(density=40.0, tile=16, size=(160, 96))
         self.lightmap = SimpleNamespace(space=FakeSpace())
         self.options, self.display = ShootingOptions(), DisplayOptions()
         self.atlas, self.light = AtlasOptions(), LightmapOptions()
@@ -224,6 +224,10 @@ class FakeSession:
         rates = {"progress": 0.25, "remaining": 0.0318, "seconds": 0.3, "per_second": 212.0, "converged": False}
         rates |= {"edit_work": None, "fresh_work": None}
         return SimpleNamespace(**energies, **counts, **rates)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return tuple(self.scene.warnings)
 
     @property
     def energy(self) -> EnergyBalance:

@@ -23,8 +23,9 @@ from app.atlas.seams import Seams, SeamTexels
 from app.scene import shapes
 from app.scene.model import Camera, Material, Scene
 from app.scene.sky import Sky
+from app.session.loading import load
 from app.util import cache
-from app.util.background import CancelledError
+from app.util.background import CancelledError, Report
 
 __all__ = ["own_cache"]
 
@@ -70,10 +71,10 @@ def test_another_thread_may_write_them_meanwhile(scene: Scene, tmp_path: Path, m
     go, writers = threading.Event(), list[threading.Thread]()
     write = cache.write
 
-    def wait_and_write(path: Path, arrays: cache.Arrays) -> None:
+    def wait_and_write(path: Path, arrays: cache.Arrays, report: Report) -> None:
         assert go.wait(60)
         writers.append(threading.current_thread())
-        write(path, arrays)
+        write(path, arrays, report)
 
     monkeypatch.setattr(cache, "write", wait_and_write)
     with cache.elsewhere(tmp_path):
@@ -130,6 +131,13 @@ def test_notes_are_kept_with_charts_unless_another_try_may_do_without(
         kept = kept_charts(scene, ATLAS, roots=False)
     assert (kept is not None) == lasting and first[1].warnings == ("small",)
     assert kept is None or _same(kept[1], first[1])
+
+
+def test_where_they_cannot_be_kept_one_note_says_so(scene: Scene, tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("no folder")
+    with cache.elsewhere(file):
+        assert load(scene, ATLAS).notes == (f"what took long is not kept for next time: {file}: Not a directory",)
 
 
 def test_a_damaged_file_is_made_again(scene: Scene) -> None:

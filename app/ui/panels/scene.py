@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 def draw(view: View, state: State) -> None:
     """The whole panel."""
     _counts(view, state)
-    said = (*view.session.scene.warnings, *view.session.charts.warnings)
-    warnings = [warning for warning in said if warning != NO_LIGHT]  # the view says it, while it is so
+    warnings = [warning for warning in view.session.warnings if warning != NO_LIGHT]  # the view says it, while it is so
     if warnings:
         widgets.section(f"{len(warnings)} warning{'s' * (len(warnings) > 1)}")
     for warning in warnings:
