@@ -2,7 +2,8 @@
 
 A foot that ends inside of a piece is drawn on to whatever is next, since a chart would reach around its end. What a body hides by
 standing on a piece (see contacts.py) needs no cut, nor what only touches its rim; but a door is thinner than texels may be, which
-would lie on both of its sides, and parts the floor along its middle. Lengths are over the scene's size.
+would lie on both of its sides, and parts the floor along its middle, and so does a narrow gap between two sheets. Lengths are
+over the scene's size.
 """
 
 from __future__ import annotations
@@ -116,9 +117,9 @@ def piece_of(corners: F64, members: I64) -> Piece:
 def _middles_of_thin(hidden: shapely.Geometry, flat: F64) -> F64:
     """Segments (n, 2, 2) along the middle of what is thin and long of what bodies hide of triangles (t, 3, 2)."""
     thick = shapely.buffer(shapely.buffer(hidden, -0.5 * THIN), 0.5 * THIN + NEAR, join_style="mitre")
-    middles = _middles_of_long(shapely.get_parts(shapely.difference(hidden, thick)), THIN)
+    middles = _long_boxes(shapely.get_parts(shapely.difference(hidden, thick)), THIN).mean(2)
     if not len(middles):
-        return middles
+        return np.empty((0, 2, 2))
     whole = shapely.union_all(shapely.polygons(_on_grid(flat)), grid_size=FLAT)
     lines = shapely.get_parts(shapely.intersection(shapely.linestrings(middles), whole))
     return np.reshape(shapely.get_coordinates(lines[shapely.length(lines) > NEAR]), (-1, 2, 2))
@@ -127,12 +128,17 @@ def _middles_of_thin(hidden: shapely.Geometry, flat: F64) -> F64:
 def _through_gaps(stands: F64, piece: Piece) -> F64:
     """Segments (n, 2, 2) along the middle of what is thin and long between sheets that stand on a piece, segments (k, 2, 2), and
     out at its ends, where the piece goes on: a chart around a gap of a texel or two would be its own neighbour across it."""
-    if len(stands) < 3:  # two sheets, and the end between them
+    if np.linalg.norm(stands[:, 1] - stands[:, 0], axis=1).sum() < 2 * LONG * WIDE:  # both sheets
         return np.empty((0, 2, 2))
     ring, line = shapely.get_coordinates(shapely.get_parts(piece.border), return_index=True)
     follows = np.flatnonzero(line[1:] == line[:-1])
     lines = noded(np.concatenate([stands, np.stack([ring[follows], ring[follows + 1]], axis=1)]))
-    middles = _middles_of_long(shapely.get_parts(shapely.polygonize(shapely.linestrings(lines))), WIDE)
+    boxes = _long_boxes(shapely.get_parts(shapely.polygonize(shapely.linestrings(lines))), WIDE)
+    sides = shapely.points(boxes.mean(1))  # (n, 2)
+    at_border = shapely.distance(sides, piece.border) <= NEAR
+    at_sheets = shapely.distance(sides, shapely.multilinestrings(shapely.linestrings(stands))) <= NEAR
+    long = np.linalg.norm(boxes[:, 0, 0] - boxes[:, 1, 0], axis=1) > LONG * WIDE  # what parts rooms, not feet of tables
+    middles = boxes[long & (at_sheets & ~at_border).all(1)].mean(2)
     way = middles[:, 1] - middles[:, 0]
     way *= 2 * NEAR / np.linalg.norm(way, axis=1, keepdims=True)
     inside = shapely.distance(shapely.points(middles), piece.border) > NEAR
@@ -140,15 +146,16 @@ def _through_gaps(stands: F64, piece: Piece) -> F64:
     return np.asarray(out[inside.any(1)])
 
 
-def _middles_of_long(polygons: NDArray[np.object_], width: float) -> F64:
-    """Segments (n, 2, 2) along the middle of polygons that are thinner than this, and long."""
+def _long_boxes(polygons: NDArray[np.object_], width: float) -> F64:
+    """(n, 2, 2, 2) boxes around polygons that are thinner than this, and long: both short sides, each from one long side to the
+    other."""
     boxes = shapely.oriented_envelope(polygons)
     boxes = boxes[shapely.area(boxes) > 0]
     rings = shapely.get_coordinates(shapely.get_exterior_ring(boxes)).reshape(-1, 5, 2)
     sides = np.linalg.norm(np.diff(rings[:, :3], axis=1), axis=2)  # (n, 2)
     rings = np.where((sides[:, 0] < sides[:, 1])[:, None, None], rings[:, :4], rings[:, 1:])  # a short side first
     long = (sides.min(1) < width) & (sides.max(1) > LONG * sides.min(1))
-    return np.asarray(np.stack([rings[:, :2].mean(1), rings[:, 2:4].mean(1)], axis=1)[long])
+    return np.asarray(rings[long][:, [[0, 1], [3, 2]]])
 
 
 def axes_of(corners: F64) -> F64:
