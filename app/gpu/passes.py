@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from app.gpu.context import Gpu
 from app.gpu.shader import FULLSCREEN, Glsl, ShaderError
+from app.gpu.timers import NOT_TIMED
 
 GL_CLIP_DISTANCE0 = 0x3000
 ONE_SHAPE = 4  # vertices, at most, of a triangle or of a strip of two
@@ -105,19 +106,18 @@ class Pass:
         mode = moderngl.POINTS if points else moderngl.TRIANGLE_STRIP if strip else moderngl.TRIANGLES
         for plane in range(clip_distances):
             ctx.enable_direct(GL_CLIP_DISTANCE0 + plane)
-        with self.gpu.timers.measure(self.label):
+        with NOT_TIMED if self.gpu.compiling else self.gpu.timers.measure(self.label):
             if mesh is None:
                 array = self.gpu.shaders.attributeless(self.program)
                 array.render(mode, vertices=vertices, instances=instances)
             else:
                 array = mesh.vertex_array(self.program)
-                some = self.gpu.compiling
                 if mesh.per_instance:
-                    array.render(
-                        moderngl.TRIANGLE_STRIP, vertices=4, instances=min(mesh.count, 1) if some else mesh.count
-                    )
+                    count = min(mesh.count, 1) if self.gpu.compiling else mesh.count
+                    array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=count)
                 else:
-                    array.render(mode, vertices=ONE_SHAPE if some else mesh.visible_mesh, instances=instances)
+                    count = min(mesh.drawn, ONE_SHAPE) if self.gpu.compiling else mesh.drawn
+                    array.render(mode, vertices=count, instances=instances)
         if scissor:  # or later clears would keep it
             target.scissor = None  # type: ignore[assignment]  # None is no scissor; moderngl's stub is wrong
         for plane in range(clip_distances):
@@ -152,7 +152,7 @@ class Mesh:
         self.per_instance = per_instance
         self._indices = None if indices is None else gpu.ctx.buffer(indices)
         self.count = len(data) // sum(int(f[0]) * 4 for f in attributes.values())
-        self.visible_mesh = -1  # indices, or all vertices
+        self.drawn = self.count if indices is None else len(indices) // 4  # vertices, or indices
         self._arrays: list[tuple[moderngl.Program, moderngl.VertexArray]] = []
         self._generation = gpu.shaders.generation
 
@@ -179,7 +179,7 @@ class Mesh:
         assert self._indices is not None
         self._indices.orphan()  # what is being drawn keeps its own
         self._indices.write(indices)
-        self.visible_mesh = indices.size
+        self.drawn = indices.size
 
     def _release_arrays(self) -> None:
         for _, array in self._arrays:

@@ -16,7 +16,7 @@ from app.atlas.options import AtlasOptions
 from app.errors import UserError
 from app.gpu import Gpu
 from app.scene.load import load_scene
-from app.scene.sky import Sky
+from app.scene.sky import Sky, Sun
 from app.session import loading, opening
 from app.session.session import Session
 from app.session.view import View
@@ -133,19 +133,27 @@ def test_programs_draw_once_before_light_needs_them(
     assert warmed_for("furnace") == 1
 
 
-def test_programs_that_only_are_to_be_compiled_draw_next_to_nothing(gpu: Gpu) -> None:
-    """And light is then as without."""
-    session = Session(gpu, atlas=AtlasOptions(texels=2000))
-    session.open_now("furnace")
-    session.work(4)
+@pytest.mark.parametrize(("scene", "sky"), [("furnace", None), ("cornell-box", Sky("clear", sun=Sun(0, 20)))])
+def test_programs_that_only_are_to_be_compiled_draw_next_to_nothing(
+    gpu: Gpu, scene: str, sky: Sky | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor are they timed; and light is then as without."""
+    session = Session(gpu, atlas=AtlasOptions(texels=2000), sky=sky)
+    session.open_now(scene)
+    session.work(40)
     light = session.lightmap.irradiance()
     session.solver.reset()
-    for _ in session.solver.warm_up():
-        pass
+    gpu.timers.reset()
+    with monkeypatch.context() as timed:
+        timed.setattr(gpu.timers, "enabled", True)
+        for _ in session.solver.warm_up():
+            pass
+        gpu.timers.flush()
+    assert not gpu.timers.calls
     assert (session.lightmap.irradiance() != 0).any(-1).sum() <= 1 < (light != 0).any(-1).sum()
     session.solver.reset()
     session.restart()
-    session.work(4)
+    session.work(40)
     np.testing.assert_array_equal(session.lightmap.irradiance(), light)
     session.release()
 
