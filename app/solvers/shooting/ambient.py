@@ -29,12 +29,16 @@ from app.visibility.bvh import Bvh
 from app.visibility.rays import tree_is_near, tree_of
 
 SWEEPS = 6  # looks of each point until nothing changes: as many reflections
-FIRST_SWEEPS = 4  # until what they find takes the place of an even term: with fewer reflections it would be darker
+# Until what they find takes the place of an even term: in a room of albedo 0.6 that has 79 % of the light that there will be on
+# average, and what is found in 1 to 5 sweeps 62, 77, 85, 90 and 93 %: after fewer it would be darker, in a brighter room as well
+FIRST_SWEEPS = 4
 # Of one frame, where not all must be: points that look around. Fewer passes do more at once: frames wait until there are so many.
 POINTS_A_FRAME, POINTS_A_LOOK = 512, 2048
 # What a point takes, of the time of a look: to see what its texels have to pass on; to find what its rays hit
 SEEING, TRACING = 0.25, 8.0
-FIRST_UPDATES = 4  # batches after which each texel has its even term, whether frames are drawn or not
+# Batches at first, after which each texel has its even term whether frames are drawn or not: the first frame, which says that
+# they are, comes after one or a few
+FIRST_UPDATES = 4
 FIRST = 4  # times as many points of a frame until what they find is shown, or is known what their rays hit
 TRACED_AT_ONCE = 512  # points, at most: with ten thousands of triangles on a software rasteriser 50 ms
 # Share of the light that is passed on until points look again: of that, what they foresaw is shown
