@@ -41,6 +41,7 @@ GEOMETRY = ("positions", "triangles", *BY_TRIANGLE)
 LIBRARIES = ("numpy", "scipy", "shapely", "xatlas")
 SCENE, SEAMS, NEAR = "scene_", "seams_", "near_seams_"  # before the names of what is theirs
 APART = ("seams", "warnings")
+NOTES = (SCENE + "warnings", "warnings")
 
 
 def charts_of(
@@ -68,9 +69,12 @@ def charts_of(
     return found
 
 
-def kept_charts(scene: Scene, atlas: AtlasOptions, *, roots: bool) -> tuple[Scene, Charts] | None:
-    """The same where they are kept; else None."""
-    return None if len(scene.triangles) < FEWEST else _read(scene, cache.read(_file(scene, atlas, roots)))
+def kept_notes(scene: Scene, atlas: AtlasOptions, *, roots: bool) -> tuple[str, ...] | None:
+    """What was to be said when the scene was cut and its charts were made, where these are kept; else None."""
+    if len(scene.triangles) < FEWEST:
+        return None
+    data = cache.read(_file(scene, atlas, roots), only=NOTES)
+    return None if data is None else tuple(str(note) for name in NOTES for note in data[name])
 
 
 def _file(scene: Scene, atlas: AtlasOptions, roots: bool) -> Path:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from app.atlas.covered import without_covered
 from app.atlas.facets import facets
-from app.atlas.flat_pieces import MOST_PIECES, Piece, on_rims, parted_pieces
+from app.atlas.flat_pieces import MOST_ENDS, MOST_PIECES, Piece, on_rims, parted_pieces
 from app.atlas.intersections import Contacts, contacts, standing_on_edges, surfaces
 from app.atlas.sides import Welded, numbered, scene_size
 from app.atlas.triangle_cuts import CutTriangles, cut_pieces
@@ -95,7 +95,8 @@ def cut_at_contacts(scene: Scene, report: Report | None = None) -> Cut:
             scene, places, corners, facet, edges, found, lambda share: tell(0.5 + 0.4 * share)
         )
     if loose:
-        notes.append(f"light may bleed by a texel at {loose:,} thin things that stand in a crowd, as grass does")
+        crowd = f"{loose:,} thin things stand in crowds, as grass does, of more than {MOST_ENDS} on one flat piece"
+        notes.append(f"{crowd}, which is not cut there: {BLEEDS}")
     if notes:
         scene = dataclasses.replace(scene, warnings=(*scene.warnings, *notes))
     if not pieces:

@@ -19,7 +19,9 @@ from app.scene.model import F64
 from app.util.background import Report
 
 NEAR = 4 * FLAT  # what is no farther apart is in one place
-MOST_AROUND = 64  # triangles of one edge, beyond which it is not looked at
+# triangles of one edge, beyond which it is not looked at: pairs take 0.07 to 0.19 µs each, so that 100,000
+# triangles take four seconds at worst
+MOST_AROUND = 64
 MOST_PAIRS = 1 << 24  # of triangles whose boxes meet, beyond which none is looked at: soups of loose triangles
 DENSE = 256  # triangles of a surface, from which on it is looked at by itself
 BLOCK = 1 << 16  # pairs of triangles that are looked at at once

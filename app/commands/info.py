@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from app.atlas.charts import Charts
-from app.atlas.charts_cache import kept_charts
+from app.atlas.charts_cache import kept_notes
 from app.atlas.options import AtlasOptions
 from app.atlas.parametrize import check, default_texels
 from app.atlas.texels import texel_count, uniform_leaves
@@ -46,7 +46,7 @@ OUTLINES = {
     **dict.fromkeys((".obj", ".ply", ".stl"), (outline_mesh, 100_000)),
 }
 TILE_SHARE = 1.6  # texels of tiles for each one that covers a surface: 1.2 in a box, 1.2 to 2.5 in furnished rooms, 3.4 of voxels
-NOT_LOOKED_FOR = "surfaces that meet or overlap, and such as are smaller than a texel: view and shot say of them"
+NOT_CHECKED = "surfaces that meet or overlap, and such as are smaller than a texel: view and shot say of them"
 SECONDS = 4e-5, 2e-6  # for each triangle and texel, on two cores of 2020
 
 
@@ -75,9 +75,9 @@ def info(flags: argparse.Namespace) -> int:
             counts, warnings = _estimates(outline, atlas, light), outline.warnings
             estimated = [*counts] if outline.exact else ["triangles", "size_m", *counts]
             counts["tile_edge"] = atlas.tile
-            notes = _notes_of_cutting(found, atlas, light)
+            notes = kept_notes(found, atlas, roots=light.adaptive) if isinstance(found, Scene) else None
             warnings = (*warnings, *(notes or ()))
-            values |= {"not_looked_for": NOT_LOOKED_FOR} if notes is None else {}
+            values |= {"not_checked_here": NOT_CHECKED} if notes is None else {}
     values |= {**counts, "estimated": estimated, "warnings": list(warnings)}
     rows = [
         (name, f"about {_text(value)}" if name in estimated else _text(value))
@@ -152,12 +152,6 @@ def _estimates(outline: Outline, atlas: AtlasOptions, light: LightmapOptions) ->
         "memory_mib": memory / 2**20,
         "seconds_to_open": _seconds(outline.triangles, texels),
     }
-
-
-def _notes_of_cutting(found: Scene | Outline, atlas: AtlasOptions, light: LightmapOptions) -> tuple[str, ...] | None:
-    """What was to be said of a large scene when it was cut and unfolded; None where that is not kept."""
-    kept = kept_charts(found, atlas, roots=light.adaptive) if isinstance(found, Scene) else None
-    return None if kept is None else (*kept[0].warnings[len(found.warnings) :], *kept[1].warnings)
 
 
 def _seconds(triangles: int, texels: int) -> float:

@@ -7,7 +7,7 @@ import hashlib
 import os
 import threading
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -51,11 +51,11 @@ def entry(kind: str, name: str) -> Path:
     return folder / kind / f"{name}.npz"
 
 
-def read(path: Path) -> Arrays | None:
-    """The arrays of a file, or None where there is no such file or it is not whole."""
+def read(path: Path, only: Collection[str] | None = None) -> Arrays | None:
+    """The arrays of a file, or some of them, or None where there is no such file or it is not whole, as far as it is read."""
     try:
         with np.load(path) as data:
-            return {name: np.asarray(data[name]) for name in data.files}
+            return {name: np.asarray(data[name]) for name in (data.files if only is None else only)}
     except Exception:  # what is no .npz file, or half of one, makes numpy and zipfile raise nearly anything
         return None
 

@@ -76,6 +76,13 @@ class Desk:
         self.point(*end)
         self.press(button, False)
 
+    def ask_to_type(self, x: float, y: float) -> None:
+        """Ctrl+click: what is there becomes a field for text."""
+        self.ui.io.add_key_event(imgui.Key.mod_ctrl, True)
+        self.click(x, y)
+        self.ui.io.add_key_event(imgui.Key.mod_ctrl, False)
+        self.frames(2)
+
     def key(self, key: imgui.Key, *, control: bool = False) -> None:
         for down in (True, False):
             if control:

@@ -262,9 +262,6 @@ def test_a_digit_goes_where_it_was_set(desk: Desk) -> None:
 
 def test_digits_that_are_typed_are_text(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
     desk.frames()
-    desk.ui.io.add_key_event(imgui.Key.mod_ctrl, True)
-    desk.click(*where["exposure"])
-    desk.ui.io.add_key_event(imgui.Key.mod_ctrl, False)
-    desk.frames(2)
+    desk.ask_to_type(*where["exposure"])
     desk.key(imgui.Key._3)
     assert desk.ui.state.toasts == []

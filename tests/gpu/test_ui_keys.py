@@ -107,10 +107,7 @@ def test_with_ctrl_the_keys_of_flight_are_commands(desk: Desk) -> None:
 
 def test_keys_typed_into_a_field_are_text(desk: Desk, where: dict[str, tuple[float, float]]) -> None:
     desk.frames()
-    desk.ui.io.add_key_event(imgui.Key.mod_ctrl, True)
-    desk.click(*where["exposure"])
-    desk.ui.io.add_key_event(imgui.Key.mod_ctrl, False)
-    desk.frames(2)
+    desk.ask_to_type(*where["exposure"])
     assert desk.ui.io.want_text_input
     desk.key(imgui.Key.space)
     desk.ui.io.add_input_characters_utf8("3.5")

@@ -85,9 +85,7 @@ def test_a_value_is_typed(desk: Desk, where: dict[str, tuple[float, float]], how
         desk.click(x, y)
         desk.click(x, y)  # within Dear ImGui's time
     else:
-        desk.ui.io.add_key_event(imgui.Key.mod_ctrl, True)
-        desk.click(x, y)
-        desk.ui.io.add_key_event(imgui.Key.mod_ctrl, False)
+        desk.ask_to_type(x, y)
     desk.frames(2)
     assert desk.ui.io.want_text_input
     desk.ui.io.add_input_characters_utf8("-3.25")

@@ -152,7 +152,7 @@ def test_info_of_a_large_scene_says_what_cutting_found_where_that_is_kept(
     line = ["info", "room.obj", "--light", "--unit", "m", "--up", "y", "--texels", "500", "--json"]
     with cache.elsewhere(folder):
         told = json_of(capsys, line)
-        assert "overlap" in told["not_looked_for"] and not any("same plane" in note for note in told["warnings"])
+        assert "overlap" in told["not_checked_here"] and not any("same plane" in note for note in told["warnings"])
         charts_cache.charts_of(load_scene("room.obj", default_light=True), AtlasOptions(texels=500))
         told = json_of(capsys, line)
-    assert "not_looked_for" not in told and any("same plane" in note for note in told["warnings"])
+    assert "not_checked_here" not in told and any("same plane" in note for note in told["warnings"])
