@@ -8,6 +8,8 @@ import sys
 from types import FrameType
 from typing import NoReturn
 
+from app.util.interrupt import end_as_by_ctrl_c, stopped
+
 
 def main() -> None:
     """Run the command line. What is imported for it takes a moment, in which Ctrl-C ends it at once: nothing is open yet."""
@@ -15,7 +17,6 @@ def main() -> None:
     if before is signal.default_int_handler:  # else it is ignored, as in a background job
         signal.signal(signal.SIGINT, _stop)
     from app.cli import run
-    from app.util.interrupt import end_as_by_ctrl_c
 
     signal.signal(signal.SIGINT, before)
     end_as_by_ctrl_c()
@@ -24,7 +25,7 @@ def main() -> None:
 
 def _stop(signal_number: int, frame: FrameType | None) -> NoReturn:
     """No exception: modules that are half imported would turn it into others."""
-    os.write(2, b"glowtree: stopped, nothing was written\n")
+    os.write(2, f"{stopped(sys.argv[1:])}\n".encode())
     os._exit(130)
 
 

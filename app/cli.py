@@ -38,6 +38,7 @@ from app.options import add_flags
 from app.render.options import DisplayOptions
 from app.session.checkpoint import CheckpointOptions
 from app.solvers import DEFAULT_SOLVER, SOLVERS, Family
+from app.util.interrupt import stopped
 
 
 def run(arguments: list[str]) -> int:
@@ -63,7 +64,7 @@ def run(arguments: list[str]) -> int:
         print("glowtree: not enough memory: ask for fewer --texels", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("glowtree: stopped, nothing was written", file=sys.stderr)
+        print(stopped(arguments), file=sys.stderr)
         return 130
     except BrokenPipeError:  # whoever read stdout has gone, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -52,8 +52,9 @@ class Parser(argparse.ArgumentParser):
             known = re.findall(r"--[\w-]+", self.format_usage())
             owners = [f"--solver {name}" for name, family in SOLVERS.items() if flag in _flags_of(family)]
             close = difflib.get_close_matches(flag, known, n=1, cutoff=ALIKE)
-            hint = f"; it needs {' or '.join(owners)}" if owners and "--solver" in known else ""
-            self.error(f"unknown argument {unknown[0]}{hint or (f'; did you mean {close[0]}?' if close else '')}")
+            if owners and "--solver" in known:
+                self.error(f"{flag} needs {' or '.join(owners)}")
+            self.error(f"unknown argument {unknown[0]}{f'; did you mean {close[0]}?' if close else ''}")
         return flags, unknown
 
     def error(self, message: str) -> NoReturn:

@@ -80,7 +80,7 @@ def info(flags: argparse.Namespace) -> int:
             values |= {"not_checked_here": NOT_CHECKED} if notes is None else {}
     values |= {**counts, "estimated": estimated, "warnings": list(warnings)}
     rows = [
-        (name, f"about {_text(value)}" if name in estimated else _text(value))
+        (name, _about(name, value) if name in estimated else _text(value))
         for name, value in values.items()
         if name not in ("estimated", "warnings")
     ]
@@ -175,6 +175,13 @@ def _texel_bytes(storage: str, textures: int) -> int:
 
 def _whole_rows(entry_bytes: int, entries: int) -> int:
     return entry_bytes * TABLE_WIDTH * -(-entries // TABLE_WIDTH)
+
+
+def _about(name: str, value: Any) -> str:
+    """An estimate; of seconds no more figures than it is good for."""
+    if name != "seconds_to_open":
+        return f"about {_text(value)}"
+    return "under 1" if value < 1 else f"about {float(f'{value:.2g}'):g}"
 
 
 def _text(value: Any) -> str:

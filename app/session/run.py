@@ -254,6 +254,7 @@ class Run:
         elif wanted and self._energy.due and self._pace.between:
             slow = True
             self._energy.measure(self.solver)
+            self.progress = self.solver.poll()  # of the moment of the balance: panels show both beside each other
         self.furthest = max(self.furthest, self.share_done(NEVER))
         if self.converged:
             self.effort.converged(self.progress.done)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+ONLY_LOOK = "view", "info", "doctor"  # commands that are not there to write something
 
 
 def end_as_by_ctrl_c() -> None:
@@ -16,6 +17,11 @@ def end_as_by_ctrl_c() -> None:
     where it is ignored it stays so."""
     if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def stopped(arguments: Sequence[str]) -> str:
+    """What to say of a command that Ctrl-C has ended."""
+    return f"glowtree: stopped{'' if not arguments or arguments[0] in ONLY_LOOK else ', nothing was written'}"
 
 
 @contextlib.contextmanager
@@ -42,4 +48,4 @@ def held_back() -> Iterator[Callable[[], bool]]:
             signal.signal(number, signal.default_int_handler)
 
 
-__all__ = ["end_as_by_ctrl_c", "held_back"]
+__all__ = ["end_as_by_ctrl_c", "held_back", "stopped"]

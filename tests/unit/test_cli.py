@@ -128,6 +128,7 @@ BAD = [
     (SHOT + "--shot 3", "did you mean --shots?"),
     (SHOT + "--resolutoin=256", "did you mean --resolution?"),
     (SHOT + "extra", "unknown argument extra"),
+    (SHOT + "--noise 0.1", "shot: --noise needs --solver gathering ("),
     ("info cornell-box --level 2", "unknown argument --level"),
 ]
 

@@ -243,8 +243,8 @@ class Shooting:
         return self.poll()
 
     def energy(self) -> EnergyBalance:
-        """Where all emitted energy is now, RGB [W]. Reads every texel and waits for the GPU."""
-        self.poll(wait=True)
+        """Where all emitted energy is now, RGB [W]; progress is of the same moment. Reads every texel and waits for the GPU."""
+        self.settle()
         return self.batch.ledger.balance()
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
