@@ -206,10 +206,10 @@ def _unfold(
     method = ", ".join(f"{number} {kind}" for number, kind in kinds if number)
     size = rectangles.size
     if ends is not None:
-        whole = int(chart.max(initial=-1)) + 1
+        before = int(chart.max(initial=-1)) + 1
         chart, uv, size = _parted(chart, uv, size, corners, ends)
-        parted = int(chart.max(initial=-1)) + 1
-        method += f", parted into {parted} charts where others stand on them" if parted > whole else ""
+        after = int(chart.max(initial=-1)) + 1
+        method += f", parted into {after} charts where others stand on them" if after > before else ""
     return measured(chart, uv, size, lit, welded.edges), method, unfolded.warnings
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from app.gpu import Framebuffer, Texture
 from app.lightmap.lightmap import Lightmap
 from app.render.camera import CameraView
-from app.render.exposure import exposure_of, first_exposure, is_trapped
+from app.render.exposure import TO_COME, exposure_of, first_exposure, is_trapped
 from app.render.false_colour import Scale, false_colour_scale
 from app.render.flat import FlatMesh
 from app.render.frame import FrameRenderer, Look
@@ -213,17 +213,16 @@ class View:
         self.display = self.display.replace(exposure=exposure)
 
     def look_for_light(self) -> str | None:
-        """What to say where all light has been distributed and none of it is anywhere, or where the camera sees anything. Looked
-        up once for a solution and a place of the camera, not in every frame while that moves; it becomes the session's message,
-        too."""
+        """What to say where all light has been distributed, or all but a hundredth, and none of it is anywhere, or where the
+        camera sees anything. Looked up once for a solution, once before it has converged, and for each place of the camera, not
+        in every frame while that moves; it becomes the session's message, too."""
         session = self.session
-        if not session.opened or not session.run.converged:
+        if not session.opened or not (session.run.converged or self._hardly_any_is_to_come):
             self._say_no_longer()
+            self._looked_at = None, None
             return None
-        light, place = (
-            (session.lightmap, session.solver.issued),
-            (*self.camera.world_from_camera.flat, self.camera.yfov),
-        )
+        solution = session.solver.issued if session.run.converged else None
+        light, place = (session.lightmap, solution), (*self.camera.world_from_camera.flat, self.camera.yfov)
         moving = light == self._looked_at[0] and time.perf_counter() < self._look_due
         if (light, place) == self._looked_at or moving:
             return None
@@ -240,6 +239,11 @@ class View:
             self._say_no_longer()
             return None
         return session.message
+
+    @property
+    def _hardly_any_is_to_come(self) -> bool:
+        """Whether what is left of the light will not show in a room that is dark by now."""
+        return self.session.family.distributes and self.session.run.progress.remaining < TO_COME
 
     def _only_backs_are_lit(self) -> bool:
         """Whether light is emitted, does not escape, and reaches no texel. Waits for the GPU where no texel reflects."""

@@ -69,6 +69,11 @@ def test_light_that_reaches_nothing_that_is_seen_is_said_to_be_trapped(
         view = opened(gpu, scene)
         assert view.look_for_light() is None, "nothing is said before it is known"
         view.session.solve(Stop())
+        solved = view.session.run.progress
+        for left, message in ((0.02, None), (0.005, said)):
+            view.session.run.progress = dataclasses.replace(solved, converged=False, remaining=left)
+            assert view.look_for_light() == message == view.session.message, "before it has converged"
+        view.session.run.progress = solved
         assert view.look_for_light() == said == view.session.message
         assert view.look_for_light() is None, "and once only"
         view.camera = CameraView(look_at((0.0, 0.0, 0.2), (0, 0, 0)), 1.2, 0.2)  # inside of the globe, at the bulb
