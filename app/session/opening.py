@@ -18,11 +18,8 @@ from app.session.loading import LOADED, UPLOADING, Loaded, Loading
 from app.solvers import SOLVERS, Solver
 from app.util.parts import run_to_end
 
-COMPILING, DRAWING, LIGHTING = (
-    "making the solver ready",
-    "making the picture ready",
-    "first light",
-)  # stages, after UPLOADING
+# Stages, after UPLOADING
+COMPILING, DRAWING, LIGHTING = "making the solver ready", "making the picture ready", "first light"
 LIGHT_BANDS = 16  # parts of the first light, with frames of the window between them
 Prepare = Callable[
     [Lightmap], Callable[[], None]
