@@ -19,7 +19,7 @@ from app.atlas.texels import texel_count, uniform_leaves
 from app.commands.flags import sky_of
 from app.lightmap.options import STORAGE, LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
-from app.lightmap.tile_pool import TABLE_WIDTH
+from app.lightmap.tile_pool import FACET_ENTRIES, TABLE_WIDTH
 from app.options import from_flags
 from app.scene.gltf import outline_gltf
 from app.scene.load import NO_LIGHT, load_scene, scene_file
@@ -35,7 +35,7 @@ from app.util.console import Console
 SURFACE_BYTES = 24  # per texel: position and area, normal and ids
 AMBIENT_BYTES = 16  # per texel, of what is shown beside H while it is shot
 TEXTURE_BYTES = 8  # per texel, for albedo and for emission
-FACET_ENTRY_BYTES = 16  # two of them per facet
+FACET_ENTRY_BYTES = 16  # FACET_ENTRIES of them per facet
 PAGE_BYTES = 4  # per cell of tile×tile texels of the atlas
 
 
@@ -145,7 +145,7 @@ def _estimates(outline: Outline, atlas: AtlasOptions, light: LightmapOptions) ->
         return values | {"texels_of_roots": texels, "texels_if_uniform": texels << 2 * light.depth}
     tiles = math.ceil(texels * TILE_SHARE / atlas.tile**2)
     memory = tiles * atlas.tile**2 * _texel_bytes(light.storage, outline.textures)
-    memory += _whole_rows(FACET_ENTRY_BYTES, 2 * (outline.sides + 1))
+    memory += _whole_rows(FACET_ENTRY_BYTES, FACET_ENTRIES * (outline.sides + 1))
     return values | {
         "texels": texels,
         "tiles": tiles,
@@ -164,7 +164,7 @@ def _memory(charts: Charts, slots: int, depth: int, storage: str, textures: int)
     columns = math.isqrt(max(slots - 1, 0)) + 1
     texels = columns * -(-slots // columns) * charts.tile**2
     pages = (PAGE_BYTES << 2 * depth) * math.prod(charts.size) // charts.tile**2
-    facets = _whole_rows(FACET_ENTRY_BYTES, 2 * (charts.facet_count + 1))
+    facets = _whole_rows(FACET_ENTRY_BYTES, FACET_ENTRIES * (charts.facet_count + 1))
     return texels * _texel_bytes(storage, textures) + pages + facets
 
 
