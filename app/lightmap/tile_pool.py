@@ -76,6 +76,8 @@ class TilePool:
     tile: edge of a leaf [texels], t below; tiles: number of slots; used (tiles,) bool: those that hold a leaf; adaptive: whether
     leaves may be of several levels; depth: the level in which pages are counted, that of the finest leaf or one more.
     leaves, surfaces, albedo_tiles, emission_tiles, shapes (SHAPE): of every slot, empty where it is not used.
+    usual_light: median of H to come on what the first camera sees, RGB (3,) [W/m²], by a forecast of the scene as it is here;
+    None: not known.
     dpdu, dpdv (facets, 3): ∂p/∂u and ∂p/∂v of each facet, solver space per texel of level 0.
     Raises UserError where facets and materials do not fit the 32 bits of a texel's ids.
     """
@@ -91,6 +93,7 @@ class TilePool:
         report: Callable[[float], None] | None = None,
     ) -> None:
         """leaves: by default all of level 0; slots: room for so many, at least. report: as of ``texel_surfaces``."""
+        self.usual_light: F64 | None = None
         self.scene, self.charts, self.adaptive, self.tile = scene, charts, adaptive, charts.tile
         self.space = SolverSpace.of(scene)
         self.material_bits = max(1, (len(scene.materials) - 1).bit_length())

@@ -45,6 +45,11 @@ LEAST_ABSORBED = 0.01  # 1 − ρ̄: in a furnace of ρ̄ = 1 light never ends, 
 def first_exposure(pool: TilePool, seen: Texels, scene: Scene | None = None) -> float:
     """EV for the light to come on what is seen, before the first shot; 0 where there is none. Needs no GPU. scene: the
     pool's, as it was edited."""
+    return forecast_of(pool, seen, scene)[0]
+
+
+def forecast_of(pool: TilePool, seen: Texels, scene: Scene | None = None) -> tuple[float, F64]:
+    """As ``first_exposure``, and the median of H to come on what is seen, RGB (3,) [W/m²]."""
     scene = scene or pool.scene
     materials = scene.materials
     albedos, emissions = ([getattr(m, of) for m in materials] for of in ("albedo", "emission"))
@@ -61,7 +66,8 @@ def first_exposure(pool: TilePool, seen: Texels, scene: Scene | None = None) -> 
     sky = scene.sky if scene.lit_by_sky else None
     strongest = pi * strongest_of(pool, emissions, pool.emission_tiles)
     light = forecast(pool.surfaces, albedo, exitance, strongest, asked, sky, scene.lights)
-    return _exposure(albedo(asked) * light.asked, scene.exposure)
+    usual = np.median(light.asked, axis=0) if len(asked) else np.zeros(3)
+    return _exposure(albedo(asked) * light.asked, scene.exposure), usual
 
 
 def exposure_of(lightmap: Lightmap, seen: Texels, mean_residual: F64, mean_emitted: F64 | None = None) -> float:

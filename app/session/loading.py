@@ -22,7 +22,7 @@ from app.lightmap.carry_over import TexelPlaces
 from app.lightmap.options import LightmapOptions
 from app.lightmap.quadtree import quadtree_pool
 from app.lightmap.tile_pool import Array, SolverSpace, TilePool
-from app.render.exposure import first_exposure
+from app.render.exposure import forecast_of
 from app.render.flat import FlatScene
 from app.render.seen import seen_texels
 from app.scene.load import load_scene
@@ -254,7 +254,7 @@ def _in_texels(
         places = None if known is None else known.of_blocks(pool)
         if expose:
             camera = scene.cameras[0]
-            exposure = first_exposure(pool, seen_texels(pool, camera.world_from_camera, camera.yfov))
+            exposure, pool.usual_light = forecast_of(pool, seen_texels(pool, camera.world_from_camera, camera.yfov))
         return pool, arrays.result(), exposure, places
 
 

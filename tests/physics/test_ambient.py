@@ -59,6 +59,20 @@ def test_it_is_even_until_there_is_a_tree_to_gather_by(gpu: Gpu, monkeypatch: py
         np.testing.assert_allclose(shown, mean(box), rtol=0.2)
 
 
+def test_an_even_term_is_no_more_than_a_forecast_of_what_is_seen(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A closed room without light would flash white."""
+    monkeypatch.setattr(ambient, "tree_is_near", lambda pool: False)
+    seen = {}
+    for usual in (None, 0.1):
+        rooms = begin(gpu, two_closed_rooms(), texels=400)
+        rooms.lightmap.pool.usual_light = None if usual is None else np.full(3, usual)
+        rooms.step(8)
+        seen[usual] = shown(rooms)[DARK].mean()
+        rooms.release()
+    assert seen[None] > 0.2
+    assert seen[0.1] == pytest.approx(0.1, rel=1e-3)
+
+
 @EVERY_LIGHTMAP
 def test_all_walls_show_their_light_from_the_first_batch_on(gpu: Gpu, adaptive: bool) -> None:
     """Also the ceiling, which turns away from the lamp; and a closed room beside shows none at any time."""

@@ -270,10 +270,18 @@ class Ambient:
                 "u_area": ledger.area,
                 "u_albedo": ledger.albedo,
                 "u_rest": float(even),
+                "u_usual": self._usual,
                 "u_ahead": ledger.ahead,
                 "u_outside": tuple((ledger.foreseen / ledger.watt).tolist()),
             },
         )
+
+    @property
+    def _usual(self) -> tuple[float, ...]:
+        """Of an even term, the most that is shown: what the forecast of the scene as it was opened has [stored units]."""
+        lightmap = self._lightmap
+        usual = lightmap.pool.usual_light if lightmap.scene is lightmap.pool.scene else None
+        return (1e30,) * 3 if usual is None else tuple((usual / lightmap.unit).tolist())
 
     def find_lamps(self) -> None:
         """See which texels emit now."""

@@ -10,6 +10,9 @@
 //
 //   ((Φ_surfaces + ρ Φ_outside) f + ρ Φ_lamps f²) / (A (1 - ρf))
 //
+// Neither is even where rooms are closed, nor do all lamps light where the first one does: of both no more is shown than is usual
+// on what the camera sees, by a forecast.
+//
 // The first f is that of all light, from outside too, as in the even ambient term; reflections take that of what patches shot: until
 // these have, nobody knows how much leaves the scene through the windows that let it in.
 #include "solvers/shooting/so_far.glsl"
@@ -21,6 +24,7 @@ uniform float u_area;  // of all texels, solver space
 uniform vec3 u_outside;  // power that is still to come from outside
 uniform float u_ahead;   // and over what has come from there, as long as the host does not know that
 uniform float u_rest;    // 0 leaves out the rest
+uniform vec3 u_usual;    // [stored units]
 
 layout(location = 0) out vec4 out_to_come;  // see common/even_ambient.glsl
 
@@ -40,5 +44,6 @@ void main() {
     vec3 reflected = u_albedo * stays, at_first = (all_unshot - unshot + u_albedo * outside) * of_all;
     vec3 even = (at_first + reflected * unshot * stays) / (area * max(1.0 - reflected, LEAST_LOST));
     int which = int(gl_FragCoord.x);
-    out_to_come = vec4(which == 0 ? u_rest * even : which == 1 ? to_come / arrived : MOST * abs(to_come) / area, 0.0);
+    vec3 most = MOST * abs(outside) / area + min(MOST * abs(unshot * stays) / area, u_usual);
+    out_to_come = vec4(which == 0 ? u_rest * min(even, u_usual) : which == 1 ? to_come / arrived : most, 0.0);
 }
