@@ -87,7 +87,7 @@ class Planes:
     def of(points: F64, triangles: I32, facet: I32, double_sided: Mask, flat: float, edges: Edges) -> Planes:
         """points (n, 3), triangles (m, 3), facet (m,), whether their material has two sides (m,)."""
         count = int(facet.max(initial=-1)) + 1
-        caps, cap = _caps(points, triangles, double_sided, flat, edges)
+        caps, cap = _caps(points, triangles, facet, double_sided, flat, edges)
         owner = facet.astype(np.int64)
         if len(caps):
             triangles, owner = np.concatenate([triangles, caps]), np.append(owner, count + cap.astype(np.int64))
@@ -184,14 +184,13 @@ def _normals_areas(corners: F64) -> tuple[F64, F64]:
     return normals / np.maximum(doubled, np.finfo(float).tiny)[:, None], doubled
 
 
-def _caps(points: F64, triangles: I32, double_sided: Mask, flat: float, edges: Edges) -> tuple[I32, I32]:
+def _caps(points: F64, triangles: I32, facet: I32, double_sided: Mask, flat: float, edges: Edges) -> tuple[I32, I32]:
     """(c, 3) triangles that would close bodies which lack a bottom and nothing else, each a fan in a loop of open edges, flat and
     convex; the number of each loop (c,). What has two sides may be looked into."""
     alone = edges.uses[edges.edge] == 1
     if not alone.any():
         return np.empty((0, 3), np.int32), np.empty(0, np.int32)
-    one, other = edges.pairs()
-    body = np.repeat(groups_of(len(triangles), np.stack([one // 3, other // 3], axis=1))[1], 3)  # of each half-edge
+    body = np.repeat(_bodies(facet, edges), 3)  # of each half-edge
     open_edges, two = np.bincount(body, alone), np.bincount(body, np.repeat(double_sided, 3)) > 0
     alone &= (open_edges[body] <= MOST_CORNERS) & ~two[body]
     start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
@@ -210,6 +209,15 @@ def _caps(points: F64, triangles: I32, double_sided: Mask, flat: float, edges: E
             caps.append(np.array([(corners[0], *corners[k : k + 2]) for k in range(1, len(loop) - 1)], np.int32))
     loops = np.repeat(np.arange(len(caps)), [len(fan) for fan in caps]).astype(np.int32)
     return np.concatenate([np.empty((0, 3), np.int32), *caps]), loops
+
+
+def _bodies(facet: I32, edges: Edges) -> I64:
+    """(m,) the number of the body of each triangle: what shares an edge, two and no more, or a facet. Where bodies pierce each
+    other both are cut, and have that edge in common."""
+    two, crowded = edges.first[:-1][edges.uses == 2], np.flatnonzero(edges.uses[edges.edge] > 2) // 3
+    _, first, which = np.unique(facet[crowded], return_index=True, return_inverse=True)
+    pairs = np.stack([edges.order[two] // 3, edges.order[two + 1] // 3], axis=1)
+    return groups_of(len(facet), np.concatenate([pairs, np.stack([crowded, crowded[first][which]], axis=1)]))[1]
 
 
 def _flat_and_convex(loop: F64, flat: float) -> bool:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from solver_scenes import grey, quads_scene
 
 from app.atlas import contacts
+from app.atlas.cuts import cut_at_contacts
 from app.atlas.parametrize import parametrize
 from app.atlas.points import random_points
 from app.atlas.texels import texel_count, texel_surfaces, uniform_leaves
@@ -52,6 +53,15 @@ def test_a_texel_is_looked_from_beside_what_stands_in_its_middle() -> None:
     assert floor.sum() == 1 and surfaces.area[floor] == pytest.approx(4 - 0.25)
     for place in surfaces.position[floor], surfaces.leading[floor]:
         assert not under(place).any() and np.abs(place[:, [0, 2]] - 1).max() < 0.5
+
+
+def test_a_box_without_bottom_that_walls_pierce_hides_what_is_under_it() -> None:
+    """Both are cut where they meet, and have the edges there in common: a door that stands a little in the wall beside it."""
+    _, *door = turned_box(0.0, 1.0)
+    wall = [[(x + 0.3, y, z) for x, y, z in quad] for quad in turned_box(0.5, 1.5)[SIDES]]
+    scene = cut_at_contacts(scene_of(FLOOR, *door, *wall)).scene
+    assert len(scene.triangles) > 2 * (1 + 1 + 5 + 4), "or nothing is pierced"
+    assert seen_area(scene)[0] == pytest.approx(4 - 0.25, rel=1e-5)
 
 
 @pytest.mark.parametrize("most_meet", [contacts.MOST_MEET, 10])
