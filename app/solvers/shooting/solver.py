@@ -244,7 +244,9 @@ class Shooting:
 
     def energy(self) -> EnergyBalance:
         """Where all emitted energy is now, RGB [W]; progress is of the same moment. Reads every texel and waits for the GPU."""
-        self.settle()
+        self.poll(wait=True)
+        if self.issued:
+            self._measure()
         return self.batch.ledger.balance()
 
     # -- beginning, and other options ----------------------------------------------------------------------------------
