@@ -278,8 +278,8 @@ def test_a_solver_takes_along_what_it_knows_of_its_leaves(planted: Callable[...,
     refinement._make_room(4 * len(fresh) + 400)
     refinement._apply(tree.split(fresh))
     marks.tiles[:] = np.arange(marks.tiles.size).reshape(marks.tiles.shape) % 3
-    siblings = tree.merges(np.flatnonzero(box.lightmap.pool.used))[::2]
-    refinement._apply(tree.merge(siblings))
+    siblings = tree.merges(np.flatnonzero(box.lightmap.pool.used))[::-2]
+    refinement._apply(tree.merge(siblings))  # the last first: parents are in high slots, which a smaller pool has not
     before = leaves_of(box)
     for held in before:
         assert held and (isinstance(held, set) or len(set(held.values())) > 1), "nothing to be lost"
