@@ -33,8 +33,8 @@ class TimeLeft:
 
     @property
     def over(self) -> bool:
-        """Whether the end is no farther than half a group."""
-        return self._seconds - self._now <= self._grain * self._each / 2
+        """Whether the end is no farther than half a group, by the last piece: one before it may have had more to begin with."""
+        return self._seconds - self._now <= self._grain * self._rates[1] / 2
 
     def room(self, most: int) -> int:
         """How much there is time for, to the nearest group; ``most`` while nothing is known."""

@@ -12,7 +12,7 @@ BATCH, FIRST, GRAIN = 16, 8, 4  # as rays are gathered
 @pytest.mark.parametrize("seconds", [14.0, 25.0, 31.7, 60.0])
 @pytest.mark.parametrize("extra", [0.0, 4.5])
 def test_the_last_pieces_fit_into_the_time_that_is_left(seconds: float, extra: float) -> None:
-    """Within half a group, as it took until then. extra: seconds that the first piece takes besides."""
+    """Within half a group. extra: seconds that the first piece takes besides."""
     each, now, issued = 0.8, 0.0, 0
     left = TimeLeft(seconds, GRAIN)
     pieces = []
@@ -22,7 +22,7 @@ def test_the_last_pieces_fit_into_the_time_that_is_left(seconds: float, extra: f
         now, issued = now + each * more + (0.0 if issued else extra), issued + more
         left.piece(issued, now)
         pieces.append(more)
-    assert abs(now - seconds) <= (each + (extra / FIRST if len(pieces) < 3 else 0.0)) * GRAIN / 2 + 1e-9
+    assert abs(now - seconds) <= each * GRAIN / 2 + 1e-9
     assert len(pieces) <= seconds / each / BATCH + 5, "not smaller than they need to be"
 
 

@@ -357,10 +357,8 @@ class Shooting:
         return {"items": maps.items, "depth": maps.depth}
 
     def vanished(self, shot: Shot | None = None) -> int:
-        """Triangles that ``last_shot`` or another one sees only because each is drawn as one sample at least. Waits for the
-        GPU."""
-        shot = shot or self.last_shot
-        return 0 if shot is None else self.batch.see.count_small(shot)
+        """Triangles that a shot, or the last one, sees only since each is drawn as one sample at least. Waits for the GPU."""
+        return 0 if (one := shot or self.last_shot) is None else self.batch.see.count_small(one)
 
     def patch_edge(self, texel: tuple[int, int]) -> int:
         """Texels along the edge of the largest patch that a texel (column, row) of the tile pool may shoot from now."""
