@@ -9,7 +9,7 @@ import pickle
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ import psutil
 import pytest
 from boxes import PLAIN, box, cornell, even, light_of, put, put_ambient, smooth
 from forests import Forest, forest
+from furnace_session import SHOOTING, session, view
 from gl_objects import forgotten, held
 from numpy.typing import NDArray
 from processes import started
@@ -44,12 +45,9 @@ from app.session.comparison_worker import INTERRUPTED
 from app.session.run import Stop
 from app.session.session import Session
 from app.session.view import View
-from app.solvers import ShootingOptions
 from app.viewer.picture import picture as shot
 
-__all__ = ["box", "cornell", "forest", "forgotten"]
-
-SHOOTING = ShootingOptions(resolution=64, residual=0.05)
+__all__ = ["box", "cornell", "forest", "forgotten", "session", "view"]
 
 
 # -- numbers -----------------------------------------------------------------------------------------------------------
@@ -91,21 +89,6 @@ def test_the_probe_reads_quadtrees(gpu: Gpu) -> None:
     assert np.abs(probe.irradiance(probe.look()) - expected).max() <= 0.6 * size
     probe.release()
     session.release()
-
-
-@pytest.fixture
-def view(gpu: Gpu) -> Iterator[View]:
-    session = Session(gpu, options=SHOOTING, atlas=AtlasOptions(texels=900))
-    view = View(session)
-    session.open_now("furnace")
-    yield view
-    view.release()
-    session.release()
-
-
-@pytest.fixture
-def session(view: View) -> Session:
-    return view.session
 
 
 def baked(session: Session, folder: Path, factor: float = 1.0) -> Path:
