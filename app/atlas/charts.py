@@ -77,6 +77,14 @@ class Charts:
         )
 
     @functools.cached_property
+    def narrow(self) -> float:
+        """The width [m] below which charts have a tenth of the area, as whole texels."""
+        size = self.chart_rects[:, 2:] / self.density
+        width, area = size.min(axis=1), size.prod(axis=1)
+        order = np.argsort(width)
+        return float(width[order[np.searchsorted(np.cumsum(area[order]), area.sum() / 10)]])
+
+    @functools.cached_property
     def seam_texels(self) -> SeamTexels:
         """Those of level 0 near seams."""
         return seam_texels(self.seams)

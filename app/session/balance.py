@@ -11,15 +11,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from app.atlas.charts import Charts
 from app.options import specs
 from app.solvers import Family
 
 FINE, TOO_MUCH = 0.005, 0.02  # of the emitted power
 # Pixels: 10,000 boxes that are two wide lose 7 % of the sky's light, and those that are eight wide 1 %
-FEW, SMALL = 8, 0.1
+FEW = 8
 MOST = 2048  # that the option allows
 
 
@@ -57,13 +55,9 @@ def per_cent(share: float, sign: str = "") -> str:
 
 def finer_maps(charts: Charts, across: float, resolution: int) -> int | None:
     """The resolution of maps in which no tenth of the area is on charts that are less than FEW pixels wide; None where that is so
-    already. Maps of light from outside are twice as wide. across: what they show [m]."""
-    size = charts.chart_rects[:, 2:] / charts.density
-    width, area = size.min(axis=1), size.prod(axis=1)
-    order = np.argsort(width)
-    least = float(width[order[np.searchsorted(np.cumsum(area[order]), SMALL * area.sum())]])
-    needed = math.ceil(FEW * across / (2 * least))
-    return None if needed <= resolution else min(1 << (needed - 1).bit_length(), MOST)
+    already, or options allow no finer. Maps of light from outside are twice as wide. across: what they show [m]."""
+    needed = math.ceil(FEW * across / (2 * charts.narrow))
+    return None if min(needed, MOST) <= resolution else min(1 << (needed - 1).bit_length(), MOST)
 
 
 def _remedy(family: Family, finer: int | None) -> str:

@@ -116,9 +116,8 @@ def test_no_frame_shows_less_while_points_look_for_the_first_time(gpu: Gpu, monk
     even, found = frames[0], frames[first]
     assert all(np.array_equal(even[1], now) for _, now, _ in frames[:first]), "nothing is seen of it before"
     change = found[2] / even[2]
-    assert (
-        change.min() > 0.95 and change.max() < 1.6
-    )  # the even term is 0.63 to 0.96 of what each wall will have: 1 / 0.63
+    # the even term is 0.63 to 0.96 of what each wall will have: 1 / 0.63
+    assert change.min() > 0.95 and change.max() < 1.6
     assert found[2].mean() > 0.9 * even[2].mean()  # and of all by the closed room beside, which it lights
     assert all(now[2].min() > 0.9 * found[2].min() for now in frames[first:])
     rooms.release()

@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from app.atlas.charts import Charts
 from app.session.balance import finer_maps
 from app.session.report import notes, summary
 from app.solvers import SOLVERS
@@ -41,9 +42,12 @@ def test_it_names_only_what_the_solver_has() -> None:
 def test_it_names_finer_maps_where_much_of_the_surface_is_a_few_pixels_wide() -> None:
     """10,000 boxes of 0.6 m on a floor of 100 m, 1.8 texels/m."""
     rects = np.array([[0, 0, 180, 180]] + [[0, 0, 1, 1]] * 50_000)
-    charts: Any = SimpleNamespace(chart_rects=rects, density=1.8)
-    assert [finer_maps(charts, 142.0, of) for of in (256, 512, 1024)] == [1024, 1024, None]
-    assert finer_maps(SimpleNamespace(chart_rects=rects[:200], density=1.8), 142.0, 256) is None  # type: ignore[arg-type]
+    charts, few = (SimpleNamespace(chart_rects=of, density=1.8) for of in (rects, rects[:200]))
+    boxes, floor = (SimpleNamespace(narrow=Charts.narrow.func(of)) for of in (charts, few))  # type: ignore[arg-type]
+    wanted = [finer_maps(boxes, 142.0, of) for of in (256, 512, 1024)]  # type: ignore[arg-type]
+    assert wanted == [1024, 1024, None]
+    assert finer_maps(floor, 142.0, 256) is None  # type: ignore[arg-type]
+    assert finer_maps(boxes, 1420.0, 2048) is None, "no finer ones can be had"  # type: ignore[arg-type]
     session = ended("shooting", 0.05)
     session.finer_maps = 1024
     assert "--resolution 1024" in notes(session)[0]
